@@ -1,0 +1,1 @@
+"""What light does to a fabric, and what a network learns of it."""

@@ -1,0 +1,55 @@
+"""Files that exist whole or not at all: written under a temporary name, synced, renamed into place."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from weaves.errors import BadInput, WorkFailed
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; on leaving without error it is synced and renamed to `path`.
+
+    A process killed in between leaves only a ``.tmp-*`` file, which no reader looks at and the next writer replaces.
+
+    Raises
+    ------
+    BadInput
+        If the folder cannot be created or written.
+    WorkFailed
+        If the disk is full.
+    """
+    temporary = path.with_name(f".tmp-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        temporary.unlink(missing_ok=True) if os.access(path.parent, os.W_OK) else None
+        if isinstance(error, PermissionError | NotADirectoryError | FileExistsError) or error.errno == 30:
+            raise BadInput(
+                str(path.parent), "", error.strerror or "not writable", "a folder that can be written is needed"
+            ) from error
+        raise WorkFailed(f"{path}: {error.strerror or error}; what was written before is kept") from error
+
+
+def atomic_write(path: Path, content: bytes) -> None:
+    """Write `content` to `path` whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the rename itself durable."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

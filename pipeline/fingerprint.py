@@ -1,0 +1,48 @@
+"""Identity of a specification: canonical bytes, and their SHA-256.
+
+Two specifications are the same work exactly when their fingerprints agree. Stage VERSIONs are part of what is
+fingerprinted; the git revision is not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+
+def canonical(specification: Any) -> bytes:
+    """Return the canonical bytes of a JSON-able specification.
+
+    Keys are sorted, floats use Python's shortest round-trip form, and an integral float equals the integer (TOML users
+    write 1 and 1.0 alike).
+
+    Raises
+    ------
+    ValueError
+        If a number is NaN or infinite.
+    """
+    text = json.dumps(_plain(specification), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return text.encode()
+
+
+def fingerprint(specification: Any, length: int = 16) -> str:
+    """Return the first `length` hexadecimal digits of the SHA-256 of the canonical bytes."""
+    return hashlib.sha256(canonical(specification)).hexdigest()[:length]
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value

@@ -1,0 +1,1 @@
+"""Questions and answers on disk: Parquet shards and the manifest that lists them."""

@@ -1,0 +1,52 @@
+"""Whether shards are what their manifest says: hashes, schema, ranges, finite values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.compute as pc
+
+from pipeline.fingerprint import file_sha256
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.schema import SCHEMA, STANDARD_ERRORS
+from pipeline.shards.store import read_table
+from pipeline.truth.frames import COMPONENTS
+from weaves.errors import BadInput
+
+_UNIT_TOLERANCE = 1e-5
+
+
+def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str]:
+    """Return every fault of one shard as a sentence; an empty list means it is sound."""
+    path = folder / entry.file
+    if not path.exists():
+        return [f"{path}: does not exist; run `twillight generate`"]
+    faults = []
+    if file_sha256(path) != entry.sha256:
+        faults.append(f"{path}: its bytes are not those that were written (SHA-256 differs); delete it and generate")
+    try:
+        table = read_table(path)
+    except BadInput as error:
+        return [*faults, str(error)]
+    if table.num_rows != entry.rows:
+        faults.append(f"{path}: holds {table.num_rows} rows, the manifest says {entry.rows}")
+    if pc.unique(table.column("fabric")).to_pylist() != [entry.fabric]:
+        faults.append(f"{path}: column fabric holds other names than {entry.fabric!r}")
+
+    # Values: finite, within their ranges, directions of unit length.
+    column = {name: table.column(name).to_numpy() for name in SCHEMA.names if name != "fabric"}
+    ends, picks = manifest.fabrics[entry.fabric].weave.repeat
+    ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (0.0, 1.0), "count": (1, np.inf)}
+    ranges |= dict.fromkeys(("sigma", *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
+    for name, values in column.items():
+        low, high = ranges.get(name, (-1.0, 1.0))
+        if not np.isfinite(values).all():
+            faults.append(f"{path}: column {name} holds values that are not finite")
+        elif values.size and (values.min() < low or values.max() > high):
+            faults.append(f"{path}: column {name} spans [{values.min()}, {values.max()}], allowed [{low}, {high}]")
+    for prefix in ("wi", "wo"):
+        length = np.sqrt(sum(column[f"{prefix}_{axis}"].astype(np.float64) ** 2 for axis in "xyz"))
+        if values.size and np.abs(length - 1).max() > _UNIT_TOLERANCE:
+            faults.append(f"{path}: {prefix} is off unit length by {np.abs(length - 1).max():.1e}")
+    return faults

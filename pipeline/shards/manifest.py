@@ -1,0 +1,102 @@
+"""What a data set holds: its fabrics and their roles, its shards and their hashes.
+
+Roles: `seen` fabrics are named by the recipe; `population` members are drawn at random and only trained on; `unseen`
+fabrics are never shown to a general model (a per-material model, which knows no other fabric, reads their training
+rows).
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+from weaves.fabric import Fabric
+
+from pipeline.atomic import atomic_write
+from pipeline.shards.schema import SCHEMA_VERSION
+from pipeline.shards.store import read_shard
+from pipeline.truth.query import Answers, Queries
+from weaves.errors import BadInput
+
+Role = Literal["seen", "population", "unseen"]
+Split = Literal["train", "validation", "test"]
+
+FILE = "manifest.json"
+
+
+class ShardEntry(BaseModel):
+    """One shard of a data set."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    file: str
+    """Name within the data set's folder."""
+    fabric: str
+    """Name of the fabric of all its rows."""
+    split: Split
+    """What its rows are for."""
+    start: int
+    """First row of the split's stream."""
+    rows: int
+    """Number of rows."""
+    sha256: str
+    """Hash of the file's bytes."""
+
+
+class Manifest(BaseModel):
+    """The contents of a data set folder."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    name: str
+    """Name of the recipe that asked for it."""
+    fingerprint: str
+    """Fingerprint of everything that shaped it."""
+    schema_version: int = SCHEMA_VERSION
+    """Version of the columns."""
+    roles: dict[Role, list[str]]
+    """Names of the fabrics in each role."""
+    fabrics: dict[str, Fabric]
+    """Every fabric in full."""
+    about: dict[str, Any]
+    """The recipe's data set section."""
+    shards: list[ShardEntry]
+    """The finished shards, in the order of fabric, split and row."""
+
+    @classmethod
+    def load(cls, folder: Path) -> Manifest:
+        """Read a data set's manifest; BadInput if it is missing or not one."""
+        path = folder / FILE
+        try:
+            return cls.model_validate_json(path.read_bytes())
+        except FileNotFoundError as error:
+            raise BadInput(str(path), "", "does not exist", "generate the data set first") from error
+        except (ValidationError, json.JSONDecodeError) as error:
+            first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": str(error)}
+            key = ".".join(map(str, first["loc"]))
+            raise BadInput(str(path), "", f"not a manifest ({key} {first['msg']})", "generate the data set") from error
+
+    def save(self, folder: Path) -> None:
+        """Write the manifest whole or not at all; the same contents give the same bytes."""
+        ordered = self.model_copy(update={"shards": sorted(self.shards, key=lambda s: (s.fabric, s.split, s.start))})
+        text = json.dumps(ordered.model_dump(mode="json"), indent=1, sort_keys=True)
+        atomic_write(folder / FILE, text.encode() + b"\n")
+
+    def names(self, *roles: Role) -> list[str]:
+        """Return the fabrics in any of the roles, in the recipe's order."""
+        return [name for role in roles for name in self.roles.get(role, [])]
+
+    def read(self, folder: Path, fabric: str, split: Split) -> tuple[Queries, Answers]:
+        """Return all rows of a fabric's split in stream order, checksums verified; BadInput if there are none."""
+        entries = sorted(
+            (s for s in self.shards if s.fabric == fabric and s.split == split), key=lambda entry: entry.start
+        )
+        if not entries:
+            raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
+        parts = [read_shard(folder / entry.file) for entry in entries]
+        queries = Queries(*(np.concatenate(columns) for columns in zip(*(q for q, _ in parts), strict=True)))
+        answers = Answers(*(np.concatenate(columns) for columns in zip(*(a for _, a in parts), strict=True)))
+        return queries, answers

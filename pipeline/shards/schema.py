@@ -1,0 +1,51 @@
+"""The columns of a shard: one row is one query with its answer.
+
+Flat named columns, 32-bit floats; conventions (who is `wi`, is the cosine inside) are those of pipeline.truth.frames.
+The file's own metadata repeats the choices that shaped it, so that a shard read alone is still understood.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pyarrow as pa
+
+from pipeline.truth.frames import COMPONENTS
+
+SCHEMA_VERSION: Final = 1
+
+_QUERY: Final = {
+    "u": "footprint centre along x (weft direction), yarn spacings, in [0, ends of the repeat]",
+    "v": "footprint centre along y (warp direction), yarn spacings, in [0, picks of the repeat]",
+    "sigma": "standard deviation of the footprint along each axis, yarn spacings, > 0",
+    "wi_x": "unit vector to the light",
+    "wi_y": "unit vector to the light",
+    "wi_z": "unit vector to the light; signed: below 0 the light is behind the cloth (transmission)",
+    "wo_x": "unit vector to the viewer",
+    "wo_y": "unit vector to the viewer",
+    "wo_z": "unit vector to the viewer, > 0",
+}
+_ANSWER: Final = {
+    "specular_warp": "S_warp, unit colour, incident cosine included, 1/sr",
+    "specular_weft": "S_weft, unit colour, incident cosine included, 1/sr",
+    "diffuse_warp": "C_warp, unit colour, incident cosine included, 1/sr",
+    "diffuse_weft": "C_weft, unit colour, incident cosine included, 1/sr",
+}
+
+STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
+
+
+def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:
+    return pa.field(name, kind, nullable=False, metadata={"meaning": meaning})
+
+
+SCHEMA: Final = pa.schema(
+    [
+        _field("fabric", pa.dictionary(pa.int32(), pa.string()), "name of the fabric in the manifest"),
+        *(_field(name, pa.float32(), meaning) for name, meaning in _QUERY.items()),
+        *(_field(name, pa.float32(), _ANSWER[name]) for name in COMPONENTS),
+        *(_field(error, pa.float32(), f"standard error of {error.split('_standard')[0]}") for error in STANDARD_ERRORS),
+        _field("count", pa.int32(), "points evaluated for this row"),
+    ]
+)
+"""Arrow schema of every shard, each column with its meaning."""

@@ -1,0 +1,1 @@
+"""Ground truth: the point model, visibility, and the Monte Carlo integration of patches."""

@@ -1,0 +1,109 @@
+"""Footprints folded by periodicity: where in the repeat a patch of any size puts its points, and with which weight.
+
+A kernel of any width over an endless fabric is a density on one repeat, wrapped; both kernels are products of one axis
+each. A narrow axis is sampled from the kernel itself and wrapped. A wide one would wrap many times and lose the order
+of low-discrepancy points, so it is sampled evenly over the repeat and weighted by the wrapped density instead; for a
+Gaussian of one repeat or more that weight is 1 to 4e-16. The choice depends on the size alone, so both are the same
+integral.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pipeline.truth.kernel import kernel
+
+GAUSSIAN, BOX = 0, 1
+
+_WIDE_GAUSSIAN = 0.3  # in repeats; from here on three harmonics give the wrapped density to 1e-12
+_HARMONICS = 3
+BOX_SIDE = math.sqrt(12.0)  # side of the square whose standard deviation is 1
+
+# Acklam's rational approximation of the normal quantile [Acklam2003Quantile].
+_A = (
+    -39.69683028665376,
+    220.9460984245205,
+    -275.9285104469687,
+    138.3577518672690,
+    -30.66479806614716,
+    2.506628277459239,
+)
+_B = (-54.47609879822406, 161.5858368580409, -155.6989798598866, 66.80131188771972, -13.28068155288572)
+_C = (
+    -0.007784894002430293,
+    -0.3223964580411365,
+    -2.400758277161838,
+    -2.549732539343734,
+    4.374664141464968,
+    2.938163982698783,
+)
+_D = (0.007784695709041462, 0.3224671290700398, 2.445134137142996, 3.754408661907416)
+_TAIL = 0.02425
+
+
+@kernel
+def _rational(t: float) -> float:
+    return (((((_C[0] * t + _C[1]) * t + _C[2]) * t + _C[3]) * t + _C[4]) * t + _C[5]) / (
+        (((_D[0] * t + _D[1]) * t + _D[2]) * t + _D[3]) * t + 1.0
+    )
+
+
+@kernel
+def normal_quantile(p: float) -> float:
+    """Return the x at which the standard normal distribution reaches p, 0 < p < 1, to 1.2e-9 relative.
+
+    A footprint's centre is known to float32, so the last digits of Acklam's form are not refined further.
+    """
+    if p < _TAIL:
+        return _rational(math.sqrt(-2.0 * math.log(p)))
+    if p > 1.0 - _TAIL:
+        return -_rational(math.sqrt(-2.0 * math.log1p(-p)))
+    q = p - 0.5
+    r = q * q
+    return (
+        (((((_A[0] * r + _A[1]) * r + _A[2]) * r + _A[3]) * r + _A[4]) * r + _A[5])
+        * q
+        / (((((_B[0] * r + _B[1]) * r + _B[2]) * r + _B[3]) * r + _B[4]) * r + 1.0)
+    )
+
+
+@kernel
+def _wrap(x: float, repeat: float) -> float:
+    """Return x modulo the repeat, in [0, repeat)."""
+    wrapped = x - repeat * math.floor(x / repeat)
+    return wrapped if 0.0 <= wrapped < repeat else 0.0
+
+
+@kernel
+def place(shape: int, centre: float, sigma: float, repeat: float, number: float) -> tuple[float, float]:
+    """Return the position in [0, repeat) that a number in (0, 1) names on one axis, and its weight (mean 1).
+
+    Parameters
+    ----------
+    shape : int
+        GAUSSIAN or BOX.
+    centre, sigma, repeat : float
+        Centre and standard deviation of the kernel and length of the repeat, in yarn spacings.
+    number : float
+        Where in the distribution.
+    """
+    if shape == GAUSSIAN:
+        if sigma < _WIDE_GAUSSIAN * repeat:
+            return _wrap(centre + sigma * normal_quantile(number), repeat), 1.0
+        offset = 2.0 * math.pi * (number - 0.5)
+        damping = -2.0 * (math.pi * sigma / repeat) ** 2
+        weight = 1.0
+        if damping > -40.0:
+            for k in range(1, _HARMONICS + 1):
+                weight += 2.0 * math.exp(damping * k * k) * math.cos(k * offset)
+        return _wrap(centre + (number - 0.5) * repeat, repeat), max(weight, 0.0)
+    side = BOX_SIDE * sigma
+    if side < repeat:
+        return _wrap(centre + (number - 0.5) * side, repeat), 1.0
+    # So many whole repeats everywhere, and one more within what is left around the centre (or its opposite).
+    whole = math.floor(side / repeat)
+    rest = side / repeat - whole
+    distance = abs(number - 0.5) * 2.0
+    odd = whole % 2.0 == 1.0
+    near = distance > 1.0 - rest if odd else distance < rest
+    return _wrap(centre + (number - 0.5) * repeat, repeat), (whole + (1.0 if near else 0.0)) * repeat / side

@@ -1,0 +1,30 @@
+"""How kernels are compiled: single-threaded, without the GIL, cached on disk under a name that follows their sources.
+
+numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of this
+package cannot serve a stale kernel. No fast-math: the bytes of a shard must not depend on how a compiler reorders sums.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import numba
+
+_PACKAGE = Path(__file__).parent
+
+
+def _cache_folder() -> Path:
+    """Return the folder for compiled kernels: in the package's own ``__pycache__``, else in the user's cache."""
+    sources = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_PACKAGE.glob("*.py"))))
+    folder = f"kernels-{sources.hexdigest()[:12]}"
+    if os.access(_PACKAGE, os.W_OK):
+        return _PACKAGE / "__pycache__" / folder
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "twillight" / folder
+
+
+numba.config.CACHE_DIR = str(_cache_folder())
+
+kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
+"""Decorator of every compiled function of the ground truth."""

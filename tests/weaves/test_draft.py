@@ -1,0 +1,137 @@
+"""Drafts: drawings, looms, mirror images, and the floats that pass through every cell."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from weaves.draft import LARGEST_REPEAT, Draft, cells
+from weaves.errors import BadInput
+from weaves.plain import plain
+from weaves.twill import twill
+
+matrices = hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=7))
+
+
+def run_by_walking(side, place):
+    """Walk cell by cell from `place` to both ends of its run on a cyclic line."""
+    count = len(side)
+    if all(value == side[0] for value in side):
+        return np.inf, 0.0
+    ahead = next(step for step in range(1, count + 1) if side[(place + step) % count] != side[place]) - 1
+    behind = next(step for step in range(1, count + 1) if side[(place - step) % count] != side[place]) - 1
+    return ahead + behind + 1, (behind - ahead) / 2
+
+
+@given(matrices)
+def test_floats_agree_with_a_walk_along_the_yarns(matrix):
+    found = cells(Draft(matrix))
+    for pick, end in np.ndindex(matrix.shape):
+        warp = run_by_walking(list(matrix[:, end]), pick)
+        weft = run_by_walking(list(matrix[pick]), end)
+        top, under = (warp, weft) if matrix[pick, end] else (weft, warp)
+        assert found.top[pick, end] == (0 if matrix[pick, end] else 1)
+        assert (found.top_length[pick, end], found.top_offset[pick, end]) == top
+        assert (found.under_length[pick, end], found.under_offset[pick, end]) == under
+
+
+def test_floats_of_a_3_1_twill_are_3_long_and_centred():
+    found = cells(twill([3], [1]))
+    warp = found.top == 0
+    assert set(found.top_length[warp]) == {3.0}
+    assert set(found.top_offset[warp]) == {-1.0, 0.0, 1.0}
+    assert set(found.top_length[~warp]) == {1.0}
+
+
+@given(matrices)
+def test_drawing_reads_back(matrix):
+    draft = Draft(matrix)
+    assert Draft.from_rows(draft.rows()) == draft
+    assert draft.text().count("██") == matrix.sum()
+
+
+def test_drawing_has_pick_0_at_the_bottom():
+    draft = Draft.from_rows(["#..", "##."])
+    assert draft.repeat == (3, 2)
+    assert draft.warp_over.tolist() == [[True, True, False], [True, False, False]]
+    assert draft.text() == "██· · \n████· "
+
+
+@given(matrices)
+def test_back_of_the_back_is_the_front(matrix):
+    draft = Draft(matrix)
+    assert draft.mirrored().mirrored() == draft
+    assert not np.array_equal(draft.mirrored().warp_over[:, ::-1], draft.warp_over)
+
+
+def test_back_of_a_right_hand_twill_is_the_complement_seen_from_behind():
+    assert twill([3], [1]).mirrored().canonical() == twill([1], [3]).canonical()
+
+
+@settings(deadline=None)
+@given(matrices, st.integers(-9, 9), st.integers(-9, 9), st.integers(1, 2), st.integers(1, 2))
+def test_canonical_form_ignores_shift_mirror_and_repetition(matrix, ends, picks, times_x, times_y):
+    draft = Draft(matrix)
+    rolled = draft.rolled(ends, picks)
+    same = Draft(np.tile(rolled.warp_over[::-1], (times_y, times_x)))
+    assert same.canonical() == draft.canonical()
+
+
+def test_canonical_form_tells_cloths_apart():
+    assert plain().canonical() != twill([2], [2]).canonical()
+    assert twill([3], [1]).canonical() != twill([1], [3]).canonical()
+
+
+def test_rolled_moves_the_repeat():
+    draft = Draft.from_rows(["...", "#.."])
+    assert draft.rolled(1, 1).rows() == [".#.", "..."]
+
+
+def test_loom_weaves_the_twill_it_is_tied_up_for():
+    tie_up = [[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1], [1, 0, 0, 1]]
+    woven = Draft.from_tie_up([1, 2, 3, 4], tie_up, [1, 2, 3, 4])
+    assert woven.canonical() == twill([2], [2]).canonical()
+
+
+@pytest.mark.parametrize(
+    ("threading", "tie_up", "treadling", "key"),
+    [
+        ([1, 3], [[1, 0], [0, 1]], [1, 2], "threading"),
+        ([1, 2], [[1, 0], [0, 1]], [0], "treadling"),
+        ([], [[1, 0]], [1], "threading"),
+        ([1], [], [1], "tie_up"),
+        ([1], [[1, 0], [1]], [1], "tie_up"),
+    ],
+)
+def test_loom_without_such_a_shaft_is_refused(threading, tie_up, treadling, key):
+    with pytest.raises(BadInput) as refused:
+        Draft.from_tie_up(threading, tie_up, treadling)
+    assert refused.value.key == key
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (LARGEST_REPEAT + 1, 2), (4,), (2, 2, 2)])
+def test_shapes_that_are_no_repeat_are_refused(shape):
+    with pytest.raises(BadInput):
+        Draft(np.zeros(shape, dtype=np.bool_))
+
+
+@given(st.lists(st.text(alphabet="#.x", max_size=4), max_size=4))
+def test_any_drawing_is_woven_or_refused(rows):
+    try:
+        assert Draft.from_rows(rows).rows() == rows
+    except BadInput as refused:
+        assert "\n" not in str(refused)
+
+
+def test_draft_is_a_read_only_copy_and_survives_pickling():
+    matrix = np.eye(3, dtype=np.bool_)
+    draft = Draft(matrix)
+    matrix[0, 0] = False
+    assert draft.warp_over[0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        draft.warp_over[0, 0] = False
+    assert pickle.loads(pickle.dumps(draft)) == draft
+    assert hash(pickle.loads(pickle.dumps(draft))) == hash(draft)

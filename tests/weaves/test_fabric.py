@@ -1,0 +1,122 @@
+"""Fabrics: presets, files, and what their fingerprint sees."""
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from weaves.draft import cells
+from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.yarn import Yarn
+
+unit = st.floats(0, 1)
+colours = st.one_of(
+    st.tuples(unit, unit, unit),
+    st.from_regex(r"#[0-9a-fA-F]{6}", fullmatch=True),
+    st.lists(unit, min_size=2, max_size=4).map(
+        lambda values: {"wavelengths": [400.0 + 50 * i for i in range(len(values))], "values": values}
+    ),
+)
+yarns = st.fixed_dictionaries(
+    {"bend": st.floats(0, 85), "roughness": st.floats(0.01, 1), "twist": st.floats(-89, 89), "diffuse": colours}
+)
+drafts = st.sampled_from(
+    [
+        {"family": "plain"},
+        {"family": "rib", "ends": 3, "picks": 1},
+        {"family": "twill", "over": [3, 1], "under": [1, 2], "direction": "left"},
+        {"family": "herringbone", "over": 2, "under": 2},
+        {"family": "sateen", "ends": 8, "move": 5},
+        {"family": "matrix", "rows": ["#.", ".#"]},
+        {"family": "loom", "threading": [1, 2], "tie_up": [[True, False], [0, 1]], "treadling": [1, 2]},
+    ]
+)
+fabrics = st.builds(
+    lambda source, draft, warp, weft: Fabric.model_validate(
+        {"name": "cloth", "source": source, "draft": draft, "warp": warp, "weft": weft}
+    ),
+    st.text(alphabet=st.characters(exclude_categories=["Cs"]), max_size=30),
+    drafts,
+    yarns,
+    yarns,
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(fabrics)
+def test_a_fabric_reads_back_from_its_own_file(tmp_path_factory, fabric):
+    path = tmp_path_factory.mktemp("fabric") / "cloth.toml"
+    path.write_text(fabric.to_toml(), encoding="utf-8", newline="")
+    assert load_fabric(path) == fabric
+    assert Fabric.model_validate(json.loads(fabric.model_dump_json())) == fabric
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_preset_is_a_cloth_with_a_source(name):
+    fabric = load_fabric(name)
+    assert fabric.name == name
+    assert "chosen here" in fabric.source or "Irawan" in fabric.source
+    # It hangs together: every yarn changes side, and no float is so short that it would be drawn flat.
+    floats = cells(fabric.weave)
+    assert (floats.top_length < float("inf")).all()
+    assert (floats.under_length < float("inf")).all()
+    # Light scattered once and often together stay below all light.
+    for yarn in (fabric.warp, fabric.weft):
+        assert all(0.7 * k_s + k_d <= 1 for k_s, k_d in zip(yarn.specular_rgb, yarn.diffuse_rgb, strict=True))
+    # Warp and weft differ, so that pictures show the weave.
+    difference = [abs(a - b) for a, b in zip(fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb, strict=True)]
+    assert max(difference) > 0.05
+
+
+def test_presets_include_those_the_benchmark_names():
+    assert {
+        "basket",
+        "cotton_twill",
+        "denim",
+        "polyester_lining",
+        "satin_8",
+        "silk_charmeuse",
+        "silk_shantung",
+        "twill_4_4",
+        "wool_gabardine",
+    } <= set(preset_names())
+
+
+def test_published_bend_and_twist_of_the_presets():
+    """Irawan and Marschner's numbers, warp then weft: bend in degrees, twist in degrees."""
+    published = {
+        "polyester_lining": (22, 16, 0),
+        "cotton_twill": (24, 36, -30),
+        "silk_charmeuse": (40, 60, 0),
+        "wool_gabardine": (30, 30, 30),
+        "denim": (12, 38, -30),
+        "silk_shantung": (50, 23, 0),
+    }
+    for name, (warp, weft, twist) in published.items():
+        fabric = load_fabric(name)
+        assert (fabric.warp.bend, fabric.weft.bend, fabric.warp.twist, fabric.weft.twist) == (warp, weft, twist, twist)
+
+
+def test_optics_see_shape_but_not_colour_name_or_source():
+    denim = load_fabric("denim")
+    painted = denim.model_copy(
+        update={"name": "x", "source": "", "warp": denim.warp.model_copy(update={"diffuse": "#ffffff"})}
+    )
+    assert painted.optics() == denim.optics()
+    assert json.loads(json.dumps(denim.optics())) == denim.optics()
+
+
+@pytest.mark.parametrize("key", sorted(set(Yarn.model_fields) - {"specular", "diffuse"}))
+def test_optics_see_every_number_of_a_yarn(key):
+    denim = load_fabric("denim")
+    changed = denim.model_copy(update={"weft": denim.weft.model_copy(update={key: 0.123})})
+    assert changed.optics() != denim.optics()
+
+
+def test_optics_are_the_same_however_the_draft_was_written():
+    denim = load_fabric("denim")
+    drawn = Fabric.model_validate(
+        {**denim.model_dump(), "draft": {"family": "matrix", "rows": [".###", "###.", "##.#", "#.##"]}}
+    )
+    assert drawn.optics() == denim.optics()

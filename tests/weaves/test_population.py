@@ -1,0 +1,89 @@
+"""Random fabrics: reproducible, within their ranges, and never what was excluded."""
+
+import numpy as np
+import pytest
+
+from weaves.fabric import Fabric
+from weaves.population import FamilyName, Population, Ranges, population_fabrics
+from weaves.twill import broken_twill, herringbone, twill
+
+
+def test_fabric_i_depends_on_seed_and_i_alone():
+    few, many = (population_fabrics(Population(count=count, seed=5)) for count in (4, 12))
+    assert many[:4] == few
+    assert population_fabrics(Population(count=4, seed=6)) != few
+    assert [fabric.name for fabric in few] == ["random_000", "random_001", "random_002", "random_003"]
+
+
+def test_known_value():
+    """A change here changes every data set: raise the VERSION of the shards with it."""
+    fabric = population_fabrics(Population(count=1, seed=3))[0]
+    assert fabric.source == "Drawn from seed 3: plain, begun 1 ends and 1 picks further."
+    assert fabric.warp.optics() == {
+        "width": 1.0,
+        "bend": 39.383086,
+        "twist": 0.0,
+        "roughness": 0.129511,
+        "relief": 1.062292,
+        "blend": 0.5,
+    }
+
+
+def test_excluded_drafts_do_not_occur_in_any_disguise():
+    """Of 200 twills some are 4/4, straight, broken or herringbone (checked); with the exclusion, none."""
+    banned = {draft.canonical() for draft in (twill([4], [4]), broken_twill([4], [4]), herringbone([4], [4]))}
+    families: tuple[FamilyName, ...] = ("twill", "broken_twill", "herringbone")
+
+    def occurs(exclude):
+        fabrics = population_fabrics(Population(count=200, seed=1, families=families, exclude=exclude))
+        return any(fabric.weave.canonical() in banned for fabric in fabrics)
+
+    assert occurs(())
+    assert not occurs(("twill 4/4",))
+
+
+@pytest.mark.parametrize("family", Population().families)
+def test_numbers_lie_in_their_ranges(family):
+    ranges = Ranges(
+        roughness_warp=(0.1, 0.2),
+        roughness_weft=(0.3, 0.4),
+        relief=(0.5, 0.6),
+        width=(0.8, 0.9),
+        bend=(7, 9),
+        twist=(5, 6),
+    )
+    population = Population(count=20, seed=2, families=(family,), plain=ranges, twill=ranges, satin=ranges)
+    for fabric in population_fabrics(population):
+        assert Fabric.model_validate(fabric.model_dump()) == fabric
+        assert max(fabric.weave.repeat) <= 16
+        for yarn, roughness in ((fabric.warp, (0.1, 0.2)), (fabric.weft, (0.3, 0.4))):
+            for value, (low, high) in (
+                (yarn.roughness, roughness),
+                (yarn.relief, ranges.relief),
+                (yarn.width, ranges.width),
+                (yarn.bend, ranges.bend),
+                (yarn.twist, ranges.twist),
+            ):
+                assert low <= value <= high
+        assert fabric.warp.bend != fabric.weft.bend
+        assert fabric.warp.twist == fabric.weft.twist
+
+
+def test_square_root_of_roughness_is_uniform():
+    """Mean of U(0.1, 0.7): 0.4; standard error of 400 draws 0.0087; four of them are allowed."""
+    fabrics = population_fabrics(Population(count=400, seed=9, families=("plain",)))
+    roots = np.sqrt([fabric.warp.roughness for fabric in fabrics])
+    assert abs(roots.mean() - 0.4) < 0.035
+    assert roots.min() >= 0.1
+    assert roots.max() <= 0.7
+
+
+def test_families_are_equally_likely():
+    fabrics = population_fabrics(Population(count=400, seed=4, families=("plain", "satin")))
+    plain = sum(fabric.weave.repeat == (2, 2) for fabric in fabrics)
+    assert abs(plain - 200) < 40
+
+
+def test_a_population_without_drafts_is_refused():
+    with pytest.raises(ValueError, match="at least one draft must be left"):
+        Population(count=1, families=("plain",), exclude=("plain",))

@@ -1,0 +1,97 @@
+"""Colours of yarns: written as linear RGB, as sRGB hex, or as a reflectance spectrum; used as linear sRGB.
+
+The conversions are those of colour-science, imported only when a colour is not already linear RGB. Spectra are seen by
+the CIE 1931 2° observer under D65, and colours outside the sRGB gamut are clipped to it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, model_validator
+
+Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
+Rgb = tuple[float, float, float]
+
+EXPECTED = 'a colour is three numbers from 0 to 1 (linear RGB), "#rrggbb" (sRGB), or a spectrum { wavelengths, values }'
+
+
+class Spectrum(BaseModel):
+    """A reflectance spectrum: straight lines between the samples, constant beyond them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    wavelengths: tuple[Annotated[float, Strict(), Field(ge=200, le=2000, allow_inf_nan=False)], ...] = Field(
+        min_length=2, max_length=1000
+    )
+    """In nanometres, rising."""
+    values: tuple[Unit, ...] = Field(min_length=2, max_length=1000)
+    """Reflectance at each wavelength."""
+
+    @model_validator(mode="after")
+    def _sampled(self) -> Spectrum:
+        if len(self.wavelengths) != len(self.values):
+            raise ValueError(f"{len(self.wavelengths)} wavelengths need as many values, not {len(self.values)}")
+        if any(after <= before for before, after in zip(self.wavelengths, self.wavelengths[1:], strict=False)):
+            raise ValueError("wavelengths must rise")
+        return self
+
+
+def _hex(value: str) -> str:
+    """Check the form of an sRGB colour."""
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", value):
+        raise ValueError(EXPECTED)
+    return value
+
+
+def _notation(value: Any) -> str | None:
+    """Tell which of the three notations is meant; None if it is none of them."""
+    if isinstance(value, str):
+        return "hex"
+    if isinstance(value, Spectrum | Mapping):
+        return "spectrum"
+    return "rgb" if isinstance(value, list | tuple) and len(value) == 3 else None
+
+
+Colour = Annotated[
+    Annotated[tuple[Unit, Unit, Unit], Tag("rgb")]
+    | Annotated[str, AfterValidator(_hex), Tag("hex")]
+    | Annotated[Spectrum, Tag("spectrum")],
+    Discriminator(_notation, custom_error_type="colour", custom_error_message=EXPECTED),
+]
+
+
+@lru_cache(maxsize=1024)
+def linear_rgb(colour: Rgb | str | Spectrum) -> Rgb:
+    """Convert a colour to linear sRGB.
+
+    Parameters
+    ----------
+    colour : three floats, str, or Spectrum
+        As `Colour` allows.
+
+    Returns
+    -------
+    three floats in [0, 1]
+    """
+    if isinstance(colour, tuple):
+        return colour
+    import colour as science
+
+    if isinstance(colour, str):
+        rgb = science.models.eotf_sRGB(science.notation.HEX_to_RGB(colour))
+    else:
+        shape = science.SpectralShape(360, 780, 1)
+        reflectance = np.interp(shape.wavelengths, colour.wavelengths, colour.values)
+        seen = science.sd_to_XYZ(
+            science.SpectralDistribution(reflectance, shape.wavelengths),
+            science.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape),
+            science.SDS_ILLUMINANTS["D65"].copy().align(shape),
+        )
+        rgb = science.XYZ_to_sRGB(seen / 100, apply_cctf_encoding=False)
+    red, green, blue = np.clip(rgb, 0, 1).tolist()
+    return red, green, blue

@@ -1,0 +1,236 @@
+"""Drafts: which yarn lies on top at every crossing, one repeat of it.
+
+`warp_over[pick, end]` is True where the warp covers the weft. End i covers x in [i, i + 1), pick j covers y in
+[j, j + 1): pick 0 is the lowest row of a drawn draft, so drawings (rows of text) list the picks from the last to the
+first. A float is a run of cells, cyclic in the repeat, over which one yarn stays on top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
+
+from weaves.errors import BadInput
+
+LARGEST_REPEAT = 128
+"""Most ends, and most picks, of a repeat."""
+
+Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """One repeat of a weave.
+
+    Parameters
+    ----------
+    warp_over : bool (picks, ends)
+        True where the warp is on top; copied and made read-only.
+    name : str
+        As the weaver says it: ``"twill 3/1"``. Equality ignores it.
+
+    Raises
+    ------
+    BadInput
+        If the matrix is empty, not two-dimensional, or larger than `LARGEST_REPEAT`.
+    """
+
+    warp_over: Bools
+    name: str = "draft"
+
+    def __post_init__(self) -> None:
+        matrix = np.array(self.warp_over, dtype=np.bool_, order="C")
+        if matrix.ndim != 2 or not 1 <= min(matrix.shape) <= max(matrix.shape) <= LARGEST_REPEAT:
+            raise BadInput(self.name, "repeat", matrix.shape, f"(picks, ends), each from 1 to {LARGEST_REPEAT}")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "warp_over", matrix)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Draft) and np.array_equal(self.warp_over, other.warp_over)
+
+    def __hash__(self) -> int:
+        return hash((self.warp_over.shape, self.warp_over.tobytes()))
+
+    @property
+    def repeat(self) -> tuple[int, int]:
+        """Ends and picks of the repeat: its extent in x and in y."""
+        picks, ends = self.warp_over.shape
+        return ends, picks
+
+    @classmethod
+    def from_rows(cls, rows: Sequence[str], name: str = "matrix") -> Draft:
+        """Read a drawing, ``#`` for warp over and ``.`` for weft over, the last pick first.
+
+        Raises
+        ------
+        BadInput
+            If a row has other letters or another length than the first.
+        """
+        for row in rows:
+            if not row or len(row) != len(rows[0]) or set(row) - set("#."):
+                raise BadInput(name, "rows", row, "rows of equal length are needed, of # (warp over) and . (weft over)")
+        return cls(np.array([[letter == "#" for letter in row] for row in reversed(rows)], dtype=np.bool_), name)
+
+    @classmethod
+    def from_tie_up(
+        cls,
+        threading: Sequence[int],
+        tie_up: Sequence[Sequence[bool | int]],
+        treadling: Sequence[int],
+        name: str = "loom",
+    ) -> Draft:
+        """Weave what a loom weaves: pick j raises the shafts tied to its treadle, end i rises with its shaft.
+
+        Parameters
+        ----------
+        threading : ints (ends,)
+            Shaft of each end, from 1.
+        tie_up : bools (treadles, shafts)
+            Which shafts each treadle lifts.
+        treadling : ints (picks,)
+            Treadle of each pick, from 1.
+
+        Raises
+        ------
+        BadInput
+            If a shaft or treadle does not exist.
+        """
+        shafts = len(tie_up[0]) if tie_up else 0
+        if not shafts or any(len(treadle) != shafts for treadle in tie_up):
+            raise BadInput(name, "tie_up", tie_up, "one row a treadle is needed, all with one entry a shaft")
+        for key, chosen, most in (("threading", threading, shafts), ("treadling", treadling, len(tie_up))):
+            if not chosen or not all(1 <= number <= most for number in chosen):
+                raise BadInput(name, key, list(chosen), f"numbers from 1 to {most} are needed")
+        lifted = np.array(tie_up, dtype=np.bool_)
+        return cls(lifted[np.array(treadling) - 1][:, np.array(threading) - 1], name)
+
+    def mirrored(self) -> Draft:
+        """Return the back side: seen from behind, left and right swap and the other yarn is on top."""
+        return Draft(~self.warp_over[:, ::-1], f"{self.name}, back")
+
+    def rolled(self, ends: int, picks: int) -> Draft:
+        """Return the same cloth, its repeat begun `ends` further left and `picks` further down."""
+        return Draft(np.roll(self.warp_over, (picks, ends), axis=(0, 1)), self.name)
+
+    def rows(self) -> list[str]:
+        """Return the drawing that `from_rows` reads."""
+        return ["".join("#" if over else "." for over in pick) for pick in self.warp_over[::-1]]
+
+    def text(self) -> str:
+        """Return the drawdown for a terminal: two characters a cell, full for warp over, the last pick first."""
+        return "\n".join(row.replace("#", "██").replace(".", "· ") for row in self.rows())
+
+    def canonical(self) -> tuple[tuple[int, int], bytes]:
+        """Return what all shifts and mirror images of this cloth have in common, and no other cloth."""
+        matrix = _smallest_repeat(self.warp_over)
+        picks, ends = matrix.shape
+        images = (matrix, matrix[::-1], matrix[:, ::-1], matrix[::-1, ::-1])
+        shifted = (np.lib.stride_tricks.sliding_window_view(np.tile(image, (2, 2)), (picks, ends)) for image in images)
+        every = np.concatenate([windows[:picks, :ends].reshape(picks * ends, -1) for windows in shifted])
+        return (ends, picks), bytes(min(np.packbits(every, axis=1).tolist()))
+
+
+class Cells(NamedTuple):
+    """The floats that pass through every cell of a repeat; arrays (picks, ends).
+
+    Attributes
+    ----------
+    top : int8
+        The yarn on top: 0 warp, 1 weft.
+    top_offset, under_offset : float64
+        Cell centre minus centre of the float, along +y for a warp and +x for a weft, in cells.
+    top_length, under_length : float64
+        Cells over which the yarn stays on top (beneath); infinite, with offset 0, if it never changes side.
+    """
+
+    top: npt.NDArray[np.int8]
+    top_offset: Floats
+    top_length: Floats
+    under_offset: Floats
+    under_length: Floats
+
+
+def cells(draft: Draft) -> Cells:
+    """Find the float on top and the float beneath in every cell."""
+    over = draft.warp_over
+    warp_length, warp_offset = _runs(over)
+    weft_length, weft_offset = (runs.T for runs in _runs(over.T))
+    return Cells(
+        top=np.where(over, 0, 1).astype(np.int8),
+        top_offset=np.where(over, warp_offset, weft_offset),
+        top_length=np.where(over, warp_length, weft_length),
+        under_offset=np.where(over, weft_offset, warp_offset),
+        under_length=np.where(over, weft_length, warp_length),
+    )
+
+
+def _runs(side: Bools) -> tuple[Floats, Floats]:
+    """Measure the cyclic runs of equal values down the columns: length, and place from the middle of the run."""
+    length, offset = np.full(side.shape, np.inf), np.zeros(side.shape)
+    count = len(side)
+    for column in range(side.shape[1]):
+        changes = np.flatnonzero(side[:, column] != np.roll(side[:, column], 1))
+        for first, following in zip(changes, np.roll(changes, -1), strict=True):
+            cells_in_run = (following - first) % count
+            index = (first + np.arange(cells_in_run)) % count
+            length[index, column] = cells_in_run
+            offset[index, column] = np.arange(cells_in_run) - (cells_in_run - 1) / 2
+    return length, offset
+
+
+def _smallest_repeat(matrix: Bools) -> Bools:
+    """Cut a matrix to the smallest block that repeats in it."""
+    for axis in (0, 1):
+        size = matrix.shape[axis]
+        period = next(p for p in range(1, size + 1) if size % p == 0 and (np.roll(matrix, p, axis) == matrix).all())
+        matrix = matrix.take(range(period), axis)
+    return matrix
+
+
+class Family(BaseModel):
+    """What a fabric file says of its draft; every weave family is one subclass, chosen by the word `family`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    def build(self) -> Draft:
+        """Weave the draft."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _can_be_woven(self) -> Family:
+        self.build()
+        return self
+
+
+class Matrix(Family):
+    """Any draft, drawn."""
+
+    family: Literal["matrix"] = "matrix"
+    rows: tuple[str, ...] = Field(min_length=1, max_length=LARGEST_REPEAT)
+    """The drawdown as it is seen, last pick first: # for warp over, . for weft over."""
+
+    def build(self) -> Draft:
+        """Weave the drawn draft."""
+        return Draft.from_rows(self.rows)
+
+
+class Loom(Family):
+    """Any draft, as a loom is set up for it."""
+
+    family: Literal["loom"] = "loom"
+    threading: tuple[StrictInt, ...]
+    """Shaft of each end, from 1."""
+    tie_up: tuple[tuple[StrictBool | StrictInt, ...], ...]
+    """One row a treadle: which shafts it lifts (1 or 0)."""
+    treadling: tuple[StrictInt, ...]
+    """Treadle of each pick, from 1."""
+
+    def build(self) -> Draft:
+        """Weave the draft of the loom."""
+        return Draft.from_tie_up(self.threading, self.tie_up, self.treadling)

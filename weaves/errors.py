@@ -1,0 +1,57 @@
+"""The two ways a run can end badly: input that cannot be used, and work that failed.
+
+Both carry one sentence meant for the person at the terminal; the command line prints it without a traceback and exits
+with `exit_code`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
+    """Input that cannot be used; exit code 2.
+
+    Parameters
+    ----------
+    where : str
+        The file or command that holds the value.
+    key : str
+        Dotted path of the key; empty when the whole file is meant.
+    value : object
+        What was found there.
+    allowed : str
+        What would have been accepted, as the end of a sentence.
+    """
+
+    exit_code = 2
+
+    def __init__(self, where: str, key: str, value: object, allowed: str) -> None:
+        self.where, self.key, self.value, self.allowed = where, key, value, allowed
+        subject = f"{where}: {key} = {value!r}" if key else f"{where}: {value}"
+        super().__init__(f"{subject}: {allowed}")
+
+    def __reduce__(self) -> tuple[type[BadInput], tuple[str, str, object, str]]:
+        # Exceptions cross process borders; the default would rebuild this one from its sentence alone.
+        return type(self), (self.where, self.key, self.value, self.allowed)
+
+
+class WorkFailed(RuntimeError):  # noqa: N818 - the name reads as the sentence does
+    """Work that could not be finished though its input was fine; exit code 1."""
+
+    exit_code = 1
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Say which known word was probably meant.
+
+    Returns
+    -------
+    str
+        ``"did you mean 'x'? known: a, b, x"``, without the question when nothing is near.
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    question = f"did you mean {close[0]!r}? " if close else ""
+    return f"{question}known: {', '.join(names)}"

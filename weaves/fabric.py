@@ -1,0 +1,131 @@
+"""Fabrics: a draft, a warp yarn and a weft yarn, read from TOML.
+
+A fabric file has a name, the source of its numbers, and the tables `[draft]`, `[warp]` and `[weft]`; the presets beside
+this module are examples.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
+
+from weaves.draft import Draft, Loom, Matrix
+from weaves.errors import BadInput, nearest
+from weaves.plain import Basket, Plain, Rib
+from weaves.satin import Sateen, Satin
+from weaves.twill import BrokenTwill, Herringbone, Twill
+from weaves.validation import read_toml, validated
+from weaves.yarn import Yarn
+
+PRESETS = Path(__file__).parent / "presets"
+
+Weave = Annotated[
+    Plain | Rib | Basket | Twill | BrokenTwill | Herringbone | Satin | Sateen | Matrix | Loom,
+    Field(discriminator="family"),
+]
+"""The weave families; a file chooses one by `family`, which is also the name of its function."""
+
+
+def _file_name(name: str) -> str:
+    """Check that a name can be part of file names everywhere."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
+        raise ValueError("a name has 1 to 60 letters (without accents), digits, - and _")
+    return name
+
+
+class Fabric(BaseModel):
+    """A woven fabric."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    name: Annotated[str, AfterValidator(_file_name)]
+    """Letters, digits, - and _: it becomes part of file names."""
+    source: str = Field(default="", max_length=2000)
+    """Where the numbers come from."""
+    optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
+    """T of the yarn layer."""
+    draft: Weave
+    """The weave family and its numbers."""
+    warp: Yarn
+    """The yarns along y."""
+    weft: Yarn
+    """The yarns along x."""
+
+    @property
+    def weave(self) -> Draft:
+        """The draft, woven."""
+        return _woven(self.draft)
+
+    def optics(self) -> dict[str, Any]:
+        """Return all that shapes the four components, and nothing else: no name, source or colour.
+
+        Two fabrics with equal optics have the same ground truth, so this is what fingerprints take.
+        """
+        return {
+            "draft": self.weave.rows(),
+            "warp": self.warp.optics(),
+            "weft": self.weft.optics(),
+            "optical_thickness": self.optical_thickness,
+        }
+
+    def to_toml(self) -> str:
+        """Return a file that `load_fabric` reads back as an equal fabric."""
+        tables: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        top = {key: value for key, value in tables.items() if not isinstance(value, dict)}
+        inner = [f"\n[{name}]\n{_lines(table)}" for name, table in tables.items() if isinstance(table, dict)]
+        return "".join([_lines(top), *inner])
+
+
+def preset_names() -> list[str]:
+    """Return the names of the fabrics that come with the package."""
+    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+
+
+def load_fabric(name_or_path: str | Path) -> Fabric:
+    """Read a fabric.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a preset, or path of a TOML file (ending in ``.toml``).
+
+    Raises
+    ------
+    BadInput
+        If there is no such preset or file, or it does not describe a fabric.
+    """
+    if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
+        path = Path(name_or_path)
+        return validated(Fabric, read_toml(path), str(path))
+    if name_or_path not in (known := preset_names()):
+        raise BadInput(
+            "fabric",
+            "name",
+            name_or_path,
+            f"a path ending in .toml or a preset is needed; {nearest(name_or_path, known)}",
+        )
+    path = PRESETS / f"{name_or_path}.toml"
+    return validated(Fabric, read_toml(path), f"preset {name_or_path}")
+
+
+@lru_cache(maxsize=1024)
+def _woven(family: Weave) -> Draft:
+    return family.build()
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    """Write one table as lines of TOML."""
+    return "".join(f"{key} = {_written(value)}\n" for key, value in table.items())
+
+
+def _written(value: Any) -> str:
+    """Write a value: JSON's strings, numbers and arrays are TOML's, but for DEL; a spectrum is an inline table."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_written(item)}" for key, item in value.items()) + " }"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,205 @@
+"""Random fabrics: many drafts and yarns for a network to learn cloth from, instead of a few cloths by heart.
+
+Fabric i of a population is a function of the seed and i alone, so a larger population begins with the smaller one. The
+default ranges of roughness and relief are those of a published generator, quoted as stand-ins for the unknown ones of
+[Chen2024Woven]; bend is chosen here. Roughness is drawn as the square of a uniform number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import cache
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, ValidationError, model_validator
+
+from weaves.draft import Draft, Matrix
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+from weaves.plain import basket, plain, rib
+from weaves.satin import sateen, satin, valid_moves
+from weaves.twill import broken_twill, herringbone, twill
+from weaves.yarn import Number, Yarn
+
+FamilyName = Literal["plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"]
+LONGEST_TWILL = 8
+SATIN_ENDS = (5, 7, 8)
+
+
+def _range_of(key: str) -> Callable[[tuple[float, float]], tuple[float, float]]:
+    """Return a check that a range rises and lies where a yarn's `key` may lie."""
+
+    def check(bounds: tuple[float, float]) -> tuple[float, float]:
+        if bounds[0] > bounds[1]:
+            raise ValueError("a range is [lowest, highest]")
+        for value in bounds:
+            try:
+                Yarn.model_validate({"bend": 0.0, "roughness": 1.0, key: value})
+            except ValidationError as error:
+                raise ValueError(error.errors()[0]["msg"]) from error
+        return bounds
+
+    return check
+
+
+Range = tuple[Number, Number]
+Roughness = Annotated[Range, AfterValidator(_range_of("roughness"))]
+
+
+class Ranges(BaseModel):
+    """From where the numbers of the two yarns are drawn, each yarn for itself; [lowest, highest]."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    roughness_warp: Roughness = (0.01, 0.49)
+    """Roughness of the warp, uniform in its square root."""
+    roughness_weft: Roughness = (0.01, 0.49)
+    """Roughness of the weft, uniform in its square root."""
+    relief: Annotated[Range, AfterValidator(_range_of("relief"))] = (0.2, 2.0)
+    """Scale of the height field."""
+    width: Annotated[Range, AfterValidator(_range_of("width"))] = (1.0, 1.0)
+    """Gap scale; the published generator takes [0.6, 0.9] for plain weaves, [0.85, 0.95] for the others."""
+    bend: Annotated[Range, AfterValidator(_range_of("bend"))] = (10.0, 50.0)
+    """Largest inclination, degrees."""
+    twist: Annotated[Range, AfterValidator(_range_of("twist"))] = (0.0, 0.0)
+    """Fibre angle, degrees; one number for both yarns, as a mill spins them alike."""
+
+
+class Population(BaseModel):
+    """A set of random fabrics."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    count: StrictInt = Field(default=0, ge=0, le=100_000)
+    """Number of fabrics."""
+    seed: StrictInt = Field(default=0, ge=0, lt=2**63)
+    """Which fabrics."""
+    families: tuple[FamilyName, ...] = Field(
+        default=("plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"), min_length=1
+    )
+    """Weave families, equally likely; write one twice to double its share."""
+    exclude: tuple[str, ...] = ()
+    """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
+    plain: Ranges = Ranges()
+    """Ranges of plain, rib and basket weaves."""
+    twill: Ranges = Ranges(
+        roughness_warp=(0.49, 1.0), roughness_weft=(0.49, 1.0), relief=(1.0, 2.0), twist=(-30.0, -30.0)
+    )
+    """Ranges of all twills."""
+    satin: Ranges = Ranges(roughness_warp=(0.04, 0.49), roughness_weft=(0.49, 1.0), relief=(0.2, 1.0))
+    """Ranges of satins and sateens."""
+
+    @model_validator(mode="after")
+    def _drafts_left(self) -> Population:
+        known = [candidate.draft.name for candidates in _catalogue().values() for candidate in candidates]
+        for name in self.exclude:
+            if name not in known:
+                near = get_close_matches(name, known, n=3) or ["plain", "twill 4/4", "satin 8/3"]
+                raise BadInput("population", "exclude", name, f"drafts of a population are called {', '.join(near)} …")
+        if not _allowed(self.families, self.exclude):
+            raise BadInput("population", "exclude", list(self.exclude), "at least one draft must be left")
+        return self
+
+
+def population_fabrics(population: Population) -> list[Fabric]:
+    """Draw the fabrics of a population.
+
+    Returns
+    -------
+    list of Fabric
+        Named ``random_000``, ``random_001`` …, of `population.count` fabrics.
+    """
+    allowed = _allowed(population.families, population.exclude)
+    return [_draw(population, allowed, index) for index in range(population.count)]
+
+
+def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]], index: int) -> Fabric:
+    """Draw fabric `index`, using up random numbers in a fixed order."""
+    random = np.random.default_rng([population.seed, index]).random
+    family, drafts = allowed[int(random() * len(allowed))]
+    draft = drafts[int(random() * len(drafts))]
+    ends, picks = draft.repeat
+    shift = int(random() * ends), int(random() * picks)
+    ranges = _ranges(population, family)
+
+    def between(bounds: Range) -> float:
+        # Six decimals: a number that a person can copy from a manifest.
+        return round(bounds[0] + (bounds[1] - bounds[0]) * random(), 6)
+
+    def spin(roughness: Range, twist: float) -> Yarn:
+        low, high = np.sqrt(roughness).tolist()
+        alpha = min(max(round(between((low, high)) ** 2, 6), roughness[0]), roughness[1])
+        return Yarn(
+            roughness=alpha,
+            relief=between(ranges.relief),
+            width=between(ranges.width),
+            bend=between(ranges.bend),
+            twist=twist,
+        )
+
+    twist = between(ranges.twist)
+    return Fabric(
+        name=f"random_{index:03d}",
+        source=f"Drawn from seed {population.seed}: {draft.name}, begun {shift[0]} ends and {shift[1]} picks further.",
+        draft=Matrix(rows=tuple(draft.rolled(*shift).rows())),
+        warp=spin(ranges.roughness_warp, twist),
+        weft=spin(ranges.roughness_weft, twist),
+    )
+
+
+def _ranges(population: Population, family: FamilyName) -> Ranges:
+    """Choose the ranges of a family."""
+    if family in ("plain", "rib", "basket"):
+        return population.plain
+    return population.satin if family in ("satin", "sateen") else population.twill
+
+
+class Candidate(NamedTuple):
+    """A draft, and the straight twill that it rearranges if it is a broken twill or a herringbone (else itself)."""
+
+    draft: Draft
+    origin: Draft
+
+
+@cache
+def _catalogue() -> dict[FamilyName, list[Candidate]]:
+    """List every draft that a population can hold, by family."""
+    steps = [(n, total - n) for total in range(3, LONGEST_TWILL + 1) for n in range(1, total)]
+    satins = [(ends, move) for ends in SATIN_ENDS for move in valid_moves(ends)]
+    groups = (2, 3, 4)
+    drafts: dict[FamilyName, list[Draft]] = {
+        "plain": [plain()],
+        "rib": [rib(1, group) for group in groups] + [rib(group, 1) for group in groups],
+        "basket": [basket(ends, picks) for ends in groups for picks in groups],
+        "twill": [twill([n], [m], side) for side in ("right", "left") for n, m in steps],
+        "satin": [satin(*numbers) for numbers in satins],
+        "sateen": [sateen(*numbers) for numbers in satins],
+    }
+    catalogue = {
+        family: [Candidate(draft, draft) for draft in family_drafts] for family, family_drafts in drafts.items()
+    }
+    breakable = [(n, m) for n, m in steps if n + m >= 4]
+    catalogue["broken_twill"] = [Candidate(broken_twill([n], [m]), twill([n], [m])) for n, m in breakable]
+    catalogue["herringbone"] = [Candidate(herringbone([n], [m]), twill([n], [m])) for n, m in steps]
+    return catalogue
+
+
+@cache
+def _allowed(families: tuple[FamilyName, ...], exclude: tuple[str, ...]) -> list[tuple[FamilyName, list[Draft]]]:
+    """List the drafts of each family that `exclude` leaves, without families that it empties."""
+    everything = [candidate for candidates in _catalogue().values() for candidate in candidates]
+    banned = {draft.canonical() for draft, _ in everything if draft.name in exclude}
+    left = [
+        (
+            family,
+            [
+                draft
+                for draft, origin in _catalogue()[family]
+                if not banned or banned.isdisjoint({draft.canonical(), origin.canonical()})
+            ],
+        )
+        for family in families
+    ]
+    return [(family, drafts) for family, drafts in left if drafts]

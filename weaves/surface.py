@@ -1,0 +1,194 @@
+"""The surface of a woven repeat: yarn, height, normal and fibre tangent at any point. The oracle of all other code.
+
+Every float is a piece of a torus after [Irawan2012Woven], which makes the cloth a true height field. In the frame of
+the float (x across the yarn, y along it, from its centre), with r = w/2, R = L/(2 sin u_max), k = 1/R:
+
+    sin v = x/r,  sin u = k y/(1 + k r cos v),  height = (sqrt((1 + k r cos v)² - (k y)²) - cos u_max)/k
+    n = (sin v, sin u cos v, cos u cos v)
+    t = (-cos v sin psi, cos u cos psi + sin u sin v sin psi, -sin u cos psi + cos u sin v sin psi),  n·t = 0
+
+The yarn beneath is bent the other way, k < 0: its inner side ends at |y| = (1 + k r cos v) L/2, from where it runs on
+straight, inclined by u_max, to the end of the float. The relief beta scales height and slopes. Written with the
+curvature k instead of the radius R, everything stays finite and exact as the bend goes to 0.
+
+A weft's frame is the warp's turned by 90°: (x, y) -> (y, -x). Fabric axes: pipeline.truth.frames.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from weaves.draft import Cells, cells
+from weaves.fabric import Fabric
+from weaves.yarn import Yarn
+
+WARP: Final = 0
+WEFT: Final = 1
+GAP: Final = 2
+
+Floats = npt.NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """What lies at the asked points, all of one shape.
+
+    Attributes
+    ----------
+    yarn : int8
+        `WARP`, `WEFT`, or `GAP` where no yarn covers the point.
+    under : bool
+        True where the yarn on top is too narrow and the one beneath shows.
+    height : float64
+        In yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends.
+    normal, tangent : float64 (..., 3)
+        Unit ply normal n_p (upward) and unit fibre tangent t; +z and 0 in gaps.
+    """
+
+    yarn: npt.NDArray[np.int8]
+    under: npt.NDArray[np.bool_]
+    height: Floats
+    normal: Floats
+    tangent: Floats
+
+
+def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
+    """Look at the cloth from above.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    x, y : float arrays, broadcast together
+        Points in yarn spacings, finite, anywhere: the repeat goes on without end.
+
+    Returns
+    -------
+    Surface
+        Arrays of the broadcast shape; formulas in the module's docstring.
+    """
+    draft = cells(fabric.weave)
+    picks, ends = draft.top.shape
+    x, y = np.broadcast_arrays(np.mod(np.asarray(x, np.float64), ends), np.mod(np.asarray(y, np.float64), picks))
+    # A tiny negative number is congruent to the repeat itself in floating point.
+    end, pick = np.minimum(x.astype(np.intp), ends - 1), np.minimum(y.astype(np.intp), picks - 1)
+    from_end, from_pick = x - end - 0.5, y - pick - 0.5
+
+    top = draft.top[pick, end]
+    half_width = np.array([fabric.warp.width, fabric.weft.width]) / 2
+    covered = np.stack([np.abs(from_end), np.abs(from_pick)]) <= half_width.reshape(2, *(1,) * x.ndim)
+    on_top = np.where(top == WARP, covered[WARP], covered[WEFT])
+    beneath = np.where(top == WARP, covered[WEFT], covered[WARP]) & ~on_top
+    yarn = np.where(on_top, top, np.where(beneath, 1 - top, GAP)).astype(np.int8)
+
+    height, normal, tangent = np.full(x.shape, -np.inf), np.zeros((*x.shape, 3)), np.zeros((*x.shape, 3))
+    normal[..., 2] = 1.0
+    for family, specification in ((WARP, fabric.warp), (WEFT, fabric.weft)):
+        here = yarn == family
+        length, offset = _float_at(draft, pick[here], end[here], beneath[here])
+        across, along = (from_end, from_pick) if family == WARP else (from_pick, from_end)
+        sign = 1.0 if family == WARP else -1.0
+        height[here], n, t = _torus(specification, length, across[here], sign * (along[here] + offset), beneath[here])
+        normal[here], tangent[here] = (n, t) if family == WARP else (_weft_to_fabric(n), _weft_to_fabric(t))
+    return Surface(yarn, beneath, height, normal, tangent)
+
+
+def surface_maps(fabric: Fabric, texels_per_yarn: int) -> Surface:
+    """Look at the centres of the texels of one repeat.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    texels_per_yarn : int
+        Texels per yarn spacing, >= 1.
+
+    Returns
+    -------
+    Surface
+        Arrays (picks * texels_per_yarn, ends * texels_per_yarn): rows along y, pick 0 in row 0.
+    """
+    ends, picks = fabric.weave.repeat
+    x = (np.arange(ends * texels_per_yarn) + 0.5) / texels_per_yarn
+    y = (np.arange(picks * texels_per_yarn) + 0.5) / texels_per_yarn
+    return surface_at(fabric, x[None, :], y[:, None])
+
+
+def curvature(yarn: Yarn, length: npt.ArrayLike) -> Floats:
+    """Return 1/R = 2 sin u_max / L of floats, and 0 for those drawn flat.
+
+    Flat is what never changes side, and what is too short for its width: w sin u_max >= L.
+
+    Parameters
+    ----------
+    yarn : Yarn
+        The yarn that floats.
+    length : float array
+        Lengths in yarn spacings, may be infinite.
+    """
+    length = np.asarray(length, np.float64)
+    sine = np.sin(np.radians(yarn.bend))
+    return np.where(yarn.width * sine >= length, 0.0, 2 * sine / length)
+
+
+def _float_at(
+    draft: Cells, pick: npt.NDArray[np.intp], end: npt.NDArray[np.intp], under: npt.NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Return length of the visible float, and place of the cell's centre along it."""
+    length = np.where(under, draft.under_length[pick, end], draft.top_length[pick, end])
+    offset = np.where(under, draft.under_offset[pick, end], draft.top_offset[pick, end])
+    return length, offset
+
+
+def _torus(
+    yarn: Yarn, length: Floats, x: Floats, y: Floats, under: npt.NDArray[np.bool_]
+) -> tuple[Floats, Floats, Floats]:
+    """Return height, normal and tangent in the frame of the float."""
+    k = curvature(yarn, length)
+    flat = k == 0
+    bend = np.where(flat, 0.0, np.radians(yarn.bend))
+    half_length = np.where(flat, 0.0, length / 2)
+    k = np.where(under, -k, k)
+
+    # Around the yarn: v. The product keeps cos v exact near the sides.
+    r = yarn.width / 2
+    sin_v = x / r
+    cos_v = np.sqrt((1 - sin_v) * (1 + sin_v))
+    rise = r * cos_v
+
+    # Along the yarn: u. Where the inner side of the bend has ended, the yarn runs on straight.
+    inner = 1 + k * rise
+    bent = np.clip(y, -inner * half_length, inner * half_length)
+    bent = np.where(under, bent, np.where(flat, 0.0, y))
+    sin_u = k * bent / inner
+    cos_u = np.sqrt((1 - sin_u) * (1 + sin_u))
+
+    # The difference of two nearly equal roots, written as a quotient of sums; the straight piece is added.
+    sag = k * (half_length - bent) * (half_length + bent)
+    height = (2 * rise + k * rise**2 + sag) / (inner * cos_u + np.cos(bend))
+    height += (np.abs(y) - np.abs(bent)) * np.tan(bend)
+
+    sin_p, cos_p = np.sin(np.radians(yarn.twist)), np.cos(np.radians(yarn.twist))
+    normal = np.stack([sin_v, sin_u * cos_v, cos_u * cos_v], axis=-1)
+    tangent = np.stack(
+        [
+            -cos_v * sin_p,
+            cos_u * cos_p + sin_u * sin_v * sin_p,
+            -sin_u * cos_p + cos_u * sin_v * sin_p,
+        ],
+        axis=-1,
+    )
+    beta = yarn.relief
+    return beta * height, _unit(normal * (beta, beta, 1.0)), _unit(tangent * (1.0, 1.0, beta))
+
+
+def _weft_to_fabric(vector: Floats) -> Floats:
+    """Turn a vector from the frame of a weft, (y, -x), into that of the fabric."""
+    return np.stack([-vector[..., 1], vector[..., 0], vector[..., 2]], axis=-1)
+
+
+def _unit(vector: Floats) -> Floats:
+    length: Floats = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return vector / length

@@ -1,0 +1,161 @@
+"""Twills: every end repeats its neighbour one pick later, so that floats form diagonals.
+
+An n/m twill takes each end over n picks and under m; steps may follow each other (over 3, under 1, over 1, under 2). A
+right-hand twill rises to the right. A broken twill turns round halfway through the repeat, a herringbone after a whole
+one; both jump half a repeat where they turn, which cuts the floats there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, StrictInt
+
+from weaves.draft import LARGEST_REPEAT, Draft, Family
+from weaves.errors import BadInput
+
+Direction = Literal["right", "left"]
+
+
+def twill(over: Sequence[int], under: Sequence[int], direction: Direction = "right") -> Draft:
+    """Weave a straight twill.
+
+    Parameters
+    ----------
+    over, under : ints
+        Picks that an end passes over, then under, then over …; as many of one as of the other.
+    direction : "right" or "left"
+        Where the diagonal rises to.
+
+    Raises
+    ------
+    BadInput
+        If the steps do not pair up, are below 1, or the repeat is too large.
+    """
+    picks = len(_one_end("twill", over, under))
+    suffix = "" if direction == "right" else " left"
+    return _shifted("twill", over, under, range(picks), direction, suffix)
+
+
+def broken_twill(over: Sequence[int], under: Sequence[int], direction: Direction = "right") -> Draft:
+    """Weave a twill that turns round after half a repeat: the 4-end broken twill takes its ends as 0, 1, 3, 2.
+
+    Raises
+    ------
+    BadInput
+        As `twill`; also below a repeat of 4, where nothing is left to break.
+    """
+    picks = len(_one_end("broken twill", over, under))
+    if picks < 4:
+        raise BadInput(
+            "broken twill", "over", list(over), f"a repeat of at least 4 picks is needed, this one has {picks}"
+        )
+    half = picks // 2
+    suffix = "" if direction == "right" else " left"
+    return _shifted("broken twill", over, under, [*range(half), *range(picks - 1, half - 1, -1)], direction, suffix)
+
+
+def herringbone(over: Sequence[int], under: Sequence[int], width: int | None = None) -> Draft:
+    """Weave stripes of right-hand and left-hand twill.
+
+    Parameters
+    ----------
+    over, under : ints
+        As for `twill`.
+    width : int, optional
+        Ends of a stripe; by default one repeat of the twill.
+
+    Raises
+    ------
+    BadInput
+        As `twill`; also for stripes below 2 ends.
+    """
+    picks = len(_one_end("herringbone", over, under))
+    width = picks if width is None else width
+    if not 2 <= width <= LARGEST_REPEAT // 2:
+        raise BadInput("herringbone", "width", width, f"stripes of 2 to {LARGEST_REPEAT // 2} ends are possible")
+    turn = width - 1 + picks // 2
+    suffix = "" if width == picks else f" width {width}"
+    return _shifted("herringbone", over, under, [*range(width), *range(turn, turn - width, -1)], "right", suffix)
+
+
+def _one_end(name: str, over: Sequence[int], under: Sequence[int]) -> list[bool]:
+    """Follow one end through a repeat: True where it is over the pick."""
+    if len(over) != len(under) or not over:
+        raise BadInput(name, "under", list(under), f"as many steps as over are needed, which has {len(over)}")
+    if min(*over, *under) < 1 or sum(over) + sum(under) > LARGEST_REPEAT:
+        raise BadInput(name, "over", list(over), f"steps of at least 1 pick, {LARGEST_REPEAT} with under, are needed")
+    return [side for up, down in zip(over, under, strict=True) for side in (True,) * up + (False,) * down]
+
+
+def _shifted(
+    kind: str, over: Sequence[int], under: Sequence[int], shifts: Sequence[int], direction: Direction, suffix: str
+) -> Draft:
+    """Lay the same end side by side, end i moved up by `shifts[i]` picks."""
+    end = np.array(_one_end(kind, over, under))
+    pick = np.arange(len(end))[:, None]
+    matrix = end[(pick - np.array(shifts)[None, :]) % len(end)]
+    steps = " ".join(f"{up}/{down}" for up, down in zip(over, under, strict=True))
+    return Draft(matrix if direction == "right" else matrix[:, ::-1], f"{kind} {steps}{suffix}")
+
+
+def _listed(value: Any) -> Any:
+    """Let one step be written without brackets."""
+    return (value,) if isinstance(value, int) else value
+
+
+Steps = Annotated[
+    tuple[Annotated[StrictInt, Field(ge=1, le=64)], ...],
+    BeforeValidator(_listed),
+    Field(min_length=1, max_length=16),
+]
+
+
+class Twill(Family):
+    """A straight twill."""
+
+    family: Literal["twill"] = "twill"
+    over: Steps
+    """Picks each end passes over: one number, or one a step."""
+    under: Steps
+    """Picks it then passes under."""
+    direction: Direction = "right"
+    """Where the diagonal rises to."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return twill(self.over, self.under, self.direction)
+
+
+class BrokenTwill(Family):
+    """A twill that turns round after half a repeat."""
+
+    family: Literal["broken_twill"] = "broken_twill"
+    over: Steps
+    """Picks each end passes over."""
+    under: Steps
+    """Picks it then passes under."""
+    direction: Direction = "right"
+    """Where the first half rises to."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return broken_twill(self.over, self.under, self.direction)
+
+
+class Herringbone(Family):
+    """Stripes of right-hand and left-hand twill."""
+
+    family: Literal["herringbone"] = "herringbone"
+    over: Steps
+    """Picks each end passes over."""
+    under: Steps
+    """Picks it then passes under."""
+    width: StrictInt | None = None
+    """Ends of a stripe; one repeat of the twill if left out."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return herringbone(self.over, self.under, self.width)
