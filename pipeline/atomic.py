@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from weaves.errors import BadInput, WorkFailed
+
+_UNWRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR}
 
 
 @contextmanager
@@ -32,12 +35,13 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.replace(path)
         _sync_folder(path.parent)
     except OSError as error:
-        temporary.unlink(missing_ok=True) if os.access(path.parent, os.W_OK) else None
-        if isinstance(error, PermissionError | NotADirectoryError | FileExistsError) or error.errno == 30:
-            raise BadInput(
-                str(path.parent), "", error.strerror or "not writable", "a folder that can be written is needed"
-            ) from error
+        if error.errno in _UNWRITABLE:
+            reason = error.strerror or "not writable"
+            raise BadInput(str(path.parent), "", reason, "a folder that can be written is needed") from error
         raise WorkFailed(f"{path}: {error.strerror or error}; what was written before is kept") from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def atomic_write(path: Path, content: bytes) -> None:

@@ -115,7 +115,10 @@ def validate(queries: Queries, where: str = "queries") -> None:
             raise BadInput(where, f"{name}_z[{row}]", float(directions[row, 2]), "must be above 0: reflection only")
 
 
-def _columns(queries: Queries) -> tuple[npt.NDArray[np.float64], ...]:
+_Column = npt.NDArray[np.float64]
+
+
+def _columns(queries: Queries) -> tuple[_Column, _Column, _Column, _Column, _Column]:
     """Return the queries in float64, directions renormalised."""
     wi, wo = (d.astype(np.float64) for d in (queries.wi, queries.wo))
     return (

@@ -86,7 +86,7 @@ def height_field(fabric: Fabric) -> HeightField:
             floats[pick, end, side] = row
             if side == TOP or families[1 - family].width < 1.0:
                 crown[pick, end] = max(
-                    crown[pick, end], families[family].relief * _rise(side, row, yarn[family, RADIUS])
+                    float(crown[pick, end]), families[family].relief * _rise(side, row, yarn[family, RADIUS])
                 )
     return HeightField(
         np.ascontiguousarray(table.top), floats, crown, float(crown.max()), yarn, fabric.optical_thickness

@@ -49,7 +49,7 @@ class Answers(NamedTuple):
 
     mean: npt.NDArray[np.float32]
     standard_error: npt.NDArray[np.float32]
-    count: npt.NDArray[np.int32]
+    count: npt.NDArray[np.int32]  # type: ignore[assignment]  # the field's word, though tuples have a count too
 
     def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Answers:
         """Return the answers at `index`."""

@@ -1,0 +1,146 @@
+"""Shards on disk: the same bytes for the same task, every kind of damage named, and the manifest beside them."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from pipeline.fingerprint import file_sha256
+from pipeline.shards.check import check_shard
+from pipeline.shards.generate import ShardTask, generate_shard
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.queries import QueryOptions
+from pipeline.shards.store import read_about, read_shard
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+TASK = ShardTask(
+    fabric=load_fabric("denim"),
+    split="test",
+    start=32,
+    rows=100,
+    seed=3,
+    queries=QueryOptions(),
+    truth=TruthOptions(relative_error=0.1, min_count=64, max_count=128),
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    generate_shard(TASK, tmp_path / "part-a.parquet")
+    return tmp_path
+
+
+def _manifest(folder):
+    path = folder / "part-a.parquet"
+    entry = ShardEntry(file=path.name, fabric="denim", split="test", start=32, rows=100, sha256=file_sha256(path))
+    return Manifest(
+        name="t",
+        fingerprint="0",
+        roles={"seen": ["denim"]},
+        fabrics={"denim": TASK.fabric},
+        about={},
+        shards=[entry],
+    )
+
+
+def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder):
+    generate_shard(TASK, folder / "again.parquet")
+    assert (folder / "again.parquet").read_bytes() == (folder / "part-a.parquet").read_bytes()
+    generate_shard(TASK.model_copy(update={"start": 52, "rows": 10}), folder / "cut.parquet")
+    queries, answers = read_shard(folder / "part-a.parquet")
+    cut_queries, cut_answers = read_shard(folder / "cut.parquet")
+    for whole, part in zip((*queries, *answers), (*cut_queries, *cut_answers), strict=True):
+        np.testing.assert_array_equal(whole[20:30], part)
+
+
+def test_a_shard_explains_itself(folder):
+    about = read_about(folder / "part-a.parquet")
+    assert about["task"]["truth"]["normaliser"] == "visible"
+    schema = pq.read_schema(folder / "part-a.parquet")
+    assert b"signed" in schema.field("wi_z").metadata[b"meaning"]
+    for column in range(pq.read_metadata(folder / "part-a.parquet").num_columns):
+        assert pq.read_metadata(folder / "part-a.parquet").row_group(0).column(column).compression == "ZSTD"
+
+
+def test_identity_follows_optics_and_not_colours():
+    def identity(**changes):
+        warp = TASK.fabric.warp.model_copy(update=changes)
+        return TASK.model_copy(update={"fabric": TASK.fabric.model_copy(update={"warp": warp})}).identity()
+
+    assert identity(diffuse="#112233") == TASK.identity()
+    assert identity(roughness=0.33) != TASK.identity()
+    assert TASK.model_copy(update={"start": 0}).identity() != TASK.identity()
+
+
+def test_splits_and_fabrics_ask_different_questions(folder):
+    generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
+    first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
+    assert not np.intersect1d(first.u, second.u).size
+
+
+def test_damage_is_named(folder):
+    path, manifest = folder / "part-a.parquet", _manifest(folder)
+    entry = manifest.shards[0]
+    assert check_shard(folder, entry, manifest) == []
+    sound = path.read_bytes()
+
+    # A flipped byte in the middle of a page: the checksum of the page sees it.
+    for position in range(300, len(sound) - 4000, 701):
+        path.write_bytes(sound[:position] + bytes([sound[position] ^ 1]) + sound[position + 1 :])
+        assert any("SHA-256" in fault for fault in check_shard(folder, entry, manifest))
+
+    path.write_bytes(sound[: len(sound) // 2])
+    with pytest.raises(BadInput, match="not a whole Parquet file"):
+        read_shard(path)
+    path.unlink()
+    with pytest.raises(BadInput, match="does not exist"):
+        read_shard(path)
+    assert "does not exist" in check_shard(folder, entry, manifest)[0]
+
+
+def test_a_flipped_byte_of_data_does_not_read_silently(folder):
+    path = folder / "part-a.parquet"
+    sound, rows = path.read_bytes(), read_shard(path)
+    column = pq.read_metadata(path).row_group(0).column(3)
+    position = column.data_page_offset + column.total_compressed_size - 20
+    path.write_bytes(sound[:position] + bytes([sound[position] ^ 4]) + sound[position + 1 :])
+    with pytest.raises(BadInput):
+        read_shard(path)
+    path.write_bytes(sound)
+    np.testing.assert_array_equal(read_shard(path)[0].sigma, rows[0].sigma)
+
+
+def test_manifest_round_trip_reads_rows_in_stream_order(folder):
+    generate_shard(TASK.model_copy(update={"start": 0, "rows": 32}), folder / "part-b.parquet")
+    manifest = _manifest(folder)
+    first = ShardEntry(
+        file="part-b.parquet",
+        fabric="denim",
+        split="test",
+        start=0,
+        rows=32,
+        sha256=file_sha256(folder / "part-b.parquet"),
+    )
+    manifest.model_copy(update={"shards": [*manifest.shards, first]}).save(folder)
+    loaded = Manifest.load(folder)
+    assert [entry.start for entry in loaded.shards] == [0, 32]
+    queries, answers = loaded.read(folder, "denim", "test")
+    np.testing.assert_array_equal(queries.u[:32], read_shard(folder / "part-b.parquet")[0].u)
+    assert answers.mean.shape == (132, 4)
+    before = (folder / "manifest.json").read_bytes()
+    loaded.save(folder)
+    assert (folder / "manifest.json").read_bytes() == before
+    with pytest.raises(BadInput, match="no rows"):
+        loaded.read(folder, "denim", "train")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"name": "x"})])
+def test_a_broken_manifest_is_one_sentence(tmp_path, text):
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(BadInput, match="not a manifest"):
+        Manifest.load(tmp_path)
+    with pytest.raises(BadInput, match="does not exist"):
+        Manifest.load(tmp_path / "nowhere")
