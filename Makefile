@@ -1,0 +1,43 @@
+# Every target sets the virtual environment up and calls one verb of `twillight`; for example `make plan RECIPE=full`.
+# `make report` runs the whole recipe up to the page.
+
+RECIPE ?= quick
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/installed
+
+.PHONY: report run list plan generate check train bench status test test-slow lint clean
+
+report run: $(READY)
+	@$(BIN)/twillight run $(RECIPE)
+
+list: $(READY)
+	@$(BIN)/twillight list
+
+plan generate check train bench status: $(READY)
+	@$(BIN)/twillight $@ $(RECIPE)
+
+test: lint
+	$(BIN)/python -m pytest -m "not slow"
+
+test-slow: $(READY)
+	$(BIN)/python -m pytest -m slow
+
+lint: $(READY)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+# Nothing is installed again until the pinned versions or the package's own description change.
+$(READY): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Twillight needs Python 3.11 or newer: say which with make PYTHON=/path/to/python3"; exit 1; }
+	@echo "installing the pinned packages into .venv (once)"
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/pip install --quiet --disable-pip-version-check --requirement requirements.txt
+	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# Products in out/ stay.
+clean:
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find weaves pipeline reports jobs tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""When and where it runs: recipes, plans, the ledger, execution and the command line."""

@@ -1,0 +1,195 @@
+"""The command line: one verb a stage, in the order of work.
+
+Whatever goes wrong is one sentence: exit code 2 for input that cannot be used, 1 for work that failed, 130 for Ctrl-C.
+Verbs import what they need when they run, so that help is instant.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, CycloptsError, Parameter
+
+from weaves.errors import BadInput, WorkFailed
+
+app = App(
+    name="twillight",
+    help="Woven cloth at every scale, from a weave draft to the light it returns: "
+    "ground truth, neural models, and a table of what each way of rendering costs and gets wrong.",
+    version_flags=(),
+    group_commands="Verbs, in the order of work",
+    default_parameter=Parameter(negative=()),
+)
+
+RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
+Out = Annotated[Path, Parameter(help="Folder of all products.")]
+Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; without one, this machine works.")]
+Workers = Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one a core.")]
+
+OUT = Path("out")
+
+
+@app.command(name="list", sort_key=0)
+def list_() -> None:
+    """List the fabrics and the recipes that come with the package."""
+    from rich.console import Console
+
+    from jobs.recipe import load_recipe, recipe_names
+    from jobs.tables import fabrics_table, recipes_table
+    from weaves.fabric import load_fabric, preset_names
+
+    console = Console()
+    console.print(fabrics_table([load_fabric(name) for name in preset_names()]))
+    console.print()
+    console.print(recipes_table([load_recipe(name) for name in recipe_names()]))
+
+
+@app.command(sort_key=1)
+def show(
+    fabric: Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")],
+    *,
+    out: Annotated[Path | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
+) -> None:
+    """Show a fabric: its drawdown and its yarns."""
+    from rich.console import Console
+
+    from jobs.tables import fabric_page
+    from weaves.fabric import load_fabric
+
+    cloth = load_fabric(fabric)
+    Console().print(fabric_page(cloth))
+
+
+@app.command(sort_key=2)
+def plan(recipe: RecipeName) -> None:
+    """Show the tasks of a recipe with their rows, bytes and estimated time; nothing is computed."""
+    from rich.console import Console
+
+    from jobs.plan import plan as tasks_of
+    from jobs.recipe import load_recipe
+    from jobs.tables import plan_table
+
+    Console().print(plan_table(tasks_of(load_recipe(recipe))))
+
+
+@app.command(sort_key=3)
+def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+    """Compute the ground truth: the shards of a recipe's data set."""
+    from jobs.work import work
+
+    work(recipe, ["generate"], out, scheduler, workers)
+
+
+@app.command(sort_key=4)
+def check(recipe: Annotated[str, Parameter(help="Recipe, or folder of a data set.")], *, out: Out = OUT) -> int:
+    """Read every finished shard again: hashes, schema, ranges, finite values."""
+    from jobs.checking import check_dataset, dataset_folder
+
+    faults = check_dataset(dataset_folder(recipe, out))
+    for fault in faults:
+        _tell(fault)
+    return BadInput.exit_code if faults else 0
+
+
+@app.command(sort_key=5)
+def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+    """Train the models of a recipe on its data set."""
+    from jobs.work import work
+
+    work(recipe, ["train"], out, scheduler, workers)
+
+
+@app.command(sort_key=6)
+def bench(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+    """Measure error, aliasing and time of every method."""
+    from jobs.work import work
+
+    work(recipe, ["bench"], out, scheduler, workers)
+
+
+@app.command(sort_key=7)
+def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+    """Write the page: pictures, tables and plots of everything measured."""
+    from jobs.work import work
+
+    work(recipe, ["report"], out, scheduler, workers)
+
+
+@app.command(sort_key=8)
+def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+    """Generate, train, bench and report, skipping what is done."""
+    from jobs.task import STAGES
+    from jobs.work import work
+
+    work(recipe, STAGES, out, scheduler, workers)
+
+
+@app.command(sort_key=9)
+def status(recipe: RecipeName, *, out: Out = OUT) -> None:
+    """Show what is done, what failed and why, and what is missing."""
+    from rich.console import Console
+
+    from jobs.ledger import Ledger
+    from jobs.plan import plan as tasks_of
+    from jobs.recipe import load_recipe
+    from jobs.tables import status_table
+
+    Console().print(status_table(tasks_of(load_recipe(recipe)), Ledger(out)))
+
+
+def main(tokens: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    tokens = sys.argv[1:] if tokens is None else tokens
+    try:
+        answer = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+        return answer if isinstance(answer, int) else 0
+    except CycloptsError as error:
+        return _end(f"twillight: {' '.join(str(error).split())}", 2)
+    except (BadInput, WorkFailed) as error:
+        return _end(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        return _end("stopped; what was finished is kept, and the same command goes on from there", 130)
+    except BrokenPipeError:
+        # Whoever read the output has seen enough, such as `head`.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        path = _save_crash(tokens, traceback.format_exc())
+        return _end(f"{type(error).__name__}: this is a bug in twillight; please report it with {path}", 1)
+
+
+def _end(sentence: str, code: int) -> int:
+    _tell(sentence)
+    return code
+
+
+def _tell(sentence: str) -> None:
+    print(sentence, file=sys.stderr, flush=True)
+
+
+def _save_crash(tokens: Sequence[str], trace: str) -> Path:
+    """Save a traceback in the output folder, or, when that cannot be written, in the system's temporary folder."""
+    options = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
+    options += [value for option, value in pairwise(tokens) if option == "--out"]
+    name = f"crash-{hashlib.sha256(trace.encode()).hexdigest()[:8]}.txt"
+    for folder in (Path(options[0]) if options else OUT, Path(tempfile.gettempdir())):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(f"twillight {' '.join(tokens)}\n\n{trace}", encoding="utf-8")
+        except OSError:
+            continue
+        return folder / name
+    return Path(name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,250 @@
+"""The benchmark's tasks: the truth's pictures, one task a method and fabric, and the timing of all methods together.
+
+The truth of a picture depends on fabric and view alone, so every recipe and every model shares it. Colours enter here:
+errors and pictures are of light, not of components.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from jobs.dataset import SECONDS_A_POINT, Shard, fingerprint_of, folder_of, points_a_row
+from jobs.recipe import ModelRecipe, Recipe
+from jobs.task import Task, identity
+from pipeline.fingerprint import fingerprint
+from pipeline.models.options import VERSIONS, PointSampledOptions
+from pipeline.shards.version import VERSION as TRUTH_VERSION
+from pipeline.truth.options import TruthOptions
+from reports.options import VERSION as BENCH_VERSION
+from weaves.fabric import Fabric
+
+SECONDS_A_PREDICTION: Final = {"woven": 3e-6, "neumip": 1.5e-6}
+"""One query answered by a trained model, on one core of a server of 2021."""
+_TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A named fabric, its role, and the tasks whose products its measurements read."""
+
+    fabric: Fabric
+    role: str
+    test: tuple[str, ...]
+    pictures: Mapping[str, Task]
+    frames: Task
+
+    @property
+    def truth(self) -> dict[str, str]:
+        """Paths of the truth's pictures by scene, and of its frames."""
+        return {name: task.products[0] for name, task in (*self.pictures.items(), ("frames", self.frames))}
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Ids of the tasks that any measurement of this fabric needs."""
+        return (*self.test, *(task.id for task in self.pictures.values()), self.frames.id)
+
+
+def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]]) -> Iterator[Task]:
+    """Yield the tasks of the benchmark.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        What to measure.
+    parts : sequence of Shard
+        The data set.
+    trained : mapping
+        For each model's name its trainings by fabric; the key of a general model's only training is empty.
+    """
+    subjects = [_subject(recipe, fabric, "seen", parts) for fabric in recipe.seen]
+    subjects += [_subject(recipe, fabric, "unseen", parts) for fabric in recipe.unseen]
+    for subject in subjects:
+        yield from (*subject.pictures.values(), subject.frames)
+    for subject in subjects:
+        yield _truth_task(recipe, subject, parts)
+        for model in recipe.models:
+            trainings = trained.get(model.options.name, {})
+            training = trainings.get("" if "" in trainings else subject.fabric.name)
+            yield _method_task(recipe, model, subject, parts, [training] if training else [])
+    yield _timing_task(recipe, subjects, parts, trained)
+
+
+def _subject(recipe: Recipe, fabric: Fabric, role: str, parts: Sequence[Shard]) -> Subject:
+    """Return a fabric with the tasks of its truth."""
+    bench, look = recipe.bench, _look(fabric)
+    common: dict[str, Any] = {"versions": [TRUTH_VERSION, BENCH_VERSION], "fabric": look, "seed": bench.seed}
+    view = bench.view.model_dump(mode="json")
+
+    def task(kind: str, spec: Mapping[str, Any], pixels: int, truth: TruthOptions) -> Task:
+        name = f"truth-{fabric.name}-{kind}"
+        return Task(
+            "bench",
+            "truth of the pictures",
+            f"truth of {fabric.name}, {kind}",
+            spec,
+            (f"records/{name}-{identity('bench', spec)[:8]}.exr",),
+            cost=pixels * SECONDS_A_POINT * points_a_row(truth),
+            size=pixels * 28,
+            setting={"make": kind, "fabric": fabric.model_dump(mode="json"), "options": bench.model_dump(mode="json")},
+        )
+
+    pictures: dict[str, Task] = {}
+    for scene in bench.scenes:
+        width, height = size = bench.size(scene)
+        asked: dict[str, Any] = {
+            "scene": scene,
+            "size": size,
+            "view": view,
+            "truth": bench.truth.model_dump(mode="json"),
+        }
+        pictures[scene] = task(scene, common | asked, width * height, bench.truth)
+    width, height = bench.frame_size
+    asked = {
+        "frames": bench.frames,
+        "size": bench.frame_size,
+        "view": view,
+        "truth": bench.frame_truth.model_dump(mode="json"),
+    }
+    frames = task("frames", common | asked, width * height * bench.frames, bench.frame_truth)
+    test = tuple(
+        part.task.id for part in parts if part.question.fabric.name == fabric.name and part.question.split == "test"
+    )
+    return Subject(fabric, role, test, pictures, frames)
+
+
+def _truth_task(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> Task:
+    """Return the measurements of the truth itself: its noise, and what moves in its frames."""
+    name = subject.fabric.name
+    spec = {"measure": "truth", **_asked(recipe, subject, parts)}
+    return Task(
+        "bench",
+        "truth",
+        f"truth on {name}",
+        spec,
+        _records(f"truth-{name}-{identity('bench', spec)[:8]}"),
+        subject.needs,
+        cost=0.3,
+        size=4000,
+        setting={"make": "truth", **_setting(recipe, subject, parts)},
+    )
+
+
+def _method_task(
+    recipe: Recipe, model: ModelRecipe, subject: Subject, parts: Sequence[Shard], trainings: Sequence[Task]
+) -> Task:
+    """Return the measurements of a method on a fabric: errors, pictures, aliasing."""
+    options, bench, name = model.options, recipe.bench, subject.fabric.name
+    spec = {
+        "measure": VERSIONS[options.model],
+        "options": options.model_dump(mode="json"),
+        "models": [training.id for training in trainings],
+        **_asked(recipe, subject, parts),
+    }
+    stem = f"{options.name}-{name}-{identity('bench', spec)[:8]}"
+    shown = [""]
+    points = 0
+    if isinstance(options, PointSampledOptions):
+        # All counts are measured; pictures are made of those that the recipe wants to see.
+        shown, points = [f"k{count}" for count in options.counts if count in bench.picture_counts], sum(options.counts)
+    pictures = {
+        setting: {scene: f"records/{stem}-{setting}{'-' * bool(setting)}{scene}.exr" for scene in bench.scenes}
+        for setting in shown
+    }
+    pixels = sum(width * height for width, height in map(bench.size, bench.scenes))
+    queries = bench.frames * bench.frame_size[0] * bench.frame_size[1] + recipe.dataset.rows.test + pixels
+    return Task(
+        "bench",
+        options.name,
+        f"{options.name} on {name}",
+        spec,
+        (*_records(stem), *(path for scenes in pictures.values() for path in scenes.values())),
+        (*subject.needs, *(training.id for training in trainings)),
+        cost=1.0 + queries * SECONDS_A_PREDICTION.get(options.model, points * SECONDS_A_POINT),
+        size=len(shown) * pixels * 10,
+        setting={
+            "make": "method",
+            "model": options.model_dump(mode="json"),
+            "models": [str(Path(training.products[0]).parent) for training in trainings],
+            "pictures": pictures,
+            **_setting(recipe, subject, parts),
+        },
+    )
+
+
+def _timing_task(
+    recipe: Recipe, subjects: Sequence[Subject], parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]]
+) -> Task:
+    """Return the timing of all methods side by side; nothing else may run meanwhile."""
+    bench = recipe.bench
+    trainings = [task for tasks in trained.values() for task in tasks.values()]
+    test = tuple(key for subject in subjects for key in subject.test)
+    spec = {
+        "measure": "timing",
+        "version": BENCH_VERSION,
+        "dataset": fingerprint_of(parts),
+        "options": bench.model_dump(mode="json", include={"rows", *_TIMED}),
+        "models": [[VERSIONS[model.options.model], model.options.model_dump(mode="json")] for model in recipe.models],
+        "trainings": [task.id for task in trainings],
+    }
+    return Task(
+        "bench",
+        "timing",
+        "timing of all methods",
+        spec,
+        _records(f"timing-{identity('bench', spec)[:8]}"),
+        (*test, *(task.id for task in trainings)),
+        cost=20.0,
+        size=8000,
+        setting={
+            "make": "timing",
+            "dataset": folder_of(parts),
+            "options": bench.model_dump(mode="json"),
+            "models": [
+                {
+                    "options": model.options.model_dump(mode="json"),
+                    "folders": [
+                        str(Path(task.products[0]).parent) for task in trained.get(model.options.name, {}).values()
+                    ],
+                }
+                for model in recipe.models
+            ],
+        },
+        alone=True,
+    )
+
+
+def _look(fabric: Fabric) -> dict[str, Any]:
+    """Return all of a fabric that shapes its pictures: its optics and colours, and its name, which seeds them."""
+    colours = fabric.model_dump(mode="json", include={"warp": {"specular", "diffuse"}, "weft": {"specular", "diffuse"}})
+    return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
+
+
+def _asked(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str, Any]:
+    """Return what every measurement of a fabric depends on."""
+    return {
+        "version": BENCH_VERSION,
+        "dataset": fingerprint_of(parts),
+        "bench": recipe.bench.model_dump(mode="json", exclude=_TIMED),
+        "fabric": _look(subject.fabric),
+        "role": subject.role,
+        "truth": fingerprint(subject.needs),
+    }
+
+
+def _setting(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str, Any]:
+    """Return what every measurement of a fabric needs to run."""
+    return {
+        "dataset": folder_of(parts),
+        "fabric": subject.fabric.name,
+        "role": subject.role,
+        "truth": subject.truth,
+        "options": recipe.bench.model_dump(mode="json"),
+    }
+
+
+def _records(stem: str) -> tuple[str, str]:
+    """Return the files of a task's records and of the machine they were measured on."""
+    return f"records/{stem}.json", f"records/{stem}.machine.json"

@@ -1,0 +1,80 @@
+"""How the benchmark's tasks (`jobs.measurements`) are done: what they read, which measurement, where its records go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from jobs.task import Task
+from pipeline.models.method import Method
+from pipeline.models.options import ModelOptions
+from pipeline.models.registry import load_methods
+from pipeline.shards.manifest import Manifest
+from reports.bench import measure_errors, measure_timing, measure_truth
+from reports.frames import measure_aliasing, measure_truth_frames, render_frames
+from reports.options import BenchOptions
+from reports.pictures import render_method, render_truth
+from reports.record import Provenance, Record, this_machine, write_records
+from weaves.fabric import Fabric
+
+Progress = Callable[[float], None]
+
+
+def picture(task: Task, out: Path, progress: Progress) -> None:
+    """Render the truth's picture of a scene."""
+    fabric = Fabric.model_validate(task.setting["fabric"])
+    render_truth(fabric, task.setting["make"], _options(task), out / task.products[0])
+
+
+def frames(task: Task, out: Path, progress: Progress) -> None:
+    """Render the truth's frames."""
+    render_frames(Fabric.model_validate(task.setting["fabric"]), _options(task), out / task.products[0])
+
+
+def truth(task: Task, out: Path, progress: Progress) -> None:
+    """Measure the truth on one fabric."""
+    setting, options, folder = task.setting, _options(task), out / task.setting["dataset"]
+    manifest, name, role = Manifest.load(folder), setting["fabric"], setting["role"]
+    provenance = Provenance(dataset=manifest.fingerprint)
+    records = measure_truth(manifest, folder, name, role, options, provenance)
+    records += measure_truth_frames(manifest.fabrics[name], role, options, out / setting["truth"]["frames"], provenance)
+    write_records(out / task.products[0], records, this_machine(1))
+
+
+def method(task: Task, out: Path, progress: Progress) -> None:
+    """Measure a method on one fabric: errors, pictures, aliasing."""
+    setting, options, folder = task.setting, _options(task), out / task.setting["dataset"]
+    manifest, name, role = Manifest.load(folder), setting["fabric"], setting["role"]
+    fabric = manifest.fabrics[name]
+    provenance = Provenance(dataset=manifest.fingerprint, model=" ".join(task.spec["models"]))
+    records: list[Record] = []
+    methods = _methods(setting["model"], setting["models"], out)
+    for index, one in enumerate(methods):
+        records += measure_errors(one, manifest, folder, name, role, options, provenance)
+        records += measure_aliasing(one, fabric, role, options, out / setting["truth"]["frames"], provenance)
+        for scene, path in setting["pictures"].get(one.setting.replace(" = ", ""), {}).items():
+            reference = out / setting["truth"][scene]
+            records += render_method(one, fabric, role, scene, options, reference, out / path, provenance)
+        progress((index + 1) / len(methods))
+    write_records(out / task.products[0], records, this_machine(1))
+
+
+def timing(task: Task, out: Path, progress: Progress) -> None:
+    """Time all methods side by side."""
+    options, folder = _options(task), out / task.setting["dataset"]
+    manifest = Manifest.load(folder)
+    methods = [one for model in task.setting["models"] for one in _methods(model["options"], model["folders"], out)]
+    records = measure_timing(methods, manifest, folder, options, Provenance(dataset=manifest.fingerprint))
+    write_records(out / task.products[0], records, this_machine(options.threads))
+
+
+def _options(task: Task) -> BenchOptions:
+    return BenchOptions.model_validate(task.setting["options"])
+
+
+def _methods(options: Mapping[str, Any], folders: list[str], out: Path) -> list[Method]:
+    """Load the methods that a model's options describe."""
+    return load_methods(TypeAdapter[Any](ModelOptions).validate_python(options), [out / folder for folder in folders])

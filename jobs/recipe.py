@@ -1,0 +1,227 @@
+"""Recipes: which fabrics, how many rows, which models, which measurements; TOML in, a frozen Recipe out.
+
+Three kinds of fabrics: `seen` ones are named, trained on and measured; members of the `population` are drawn at random
+and only trained on; `unseen` ones are only measured. An unseen fabric has training rows too when a model of a single
+material (`neumip`) is in the recipe, and no other model ever reads them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
+
+from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions
+from pipeline.shards.queries import QueryOptions
+from pipeline.training.options import TrainingOptions
+from pipeline.truth.options import TruthOptions
+from reports.options import BenchOptions
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.population import Population, population_fabrics
+from weaves.validation import read_toml, validated
+
+RECIPES = Path(__file__).parent / "recipes"
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+class Rows(_Section):
+    """Queries for each fabric."""
+
+    train: StrictInt = Field(ge=1, le=10**10)
+    """For training, each named fabric."""
+    population: StrictInt = Field(default=0, ge=0, le=10**10)
+    """For training, each member of the population."""
+    validation: StrictInt = Field(default=2048, ge=1, le=10**10)
+    """For the figures on model cards, each named fabric."""
+    test: StrictInt = Field(default=8192, ge=1, le=10**10)
+    """For the benchmark, each named fabric; no model ever reads them."""
+
+
+class DatasetOptions(_Section):
+    """What is computed once, for all models."""
+
+    seen: tuple[StrictStr, ...] = Field(min_length=1)
+    """Fabrics to train on and measure: preset names, or paths to TOML files relative to the recipe."""
+    unseen: tuple[StrictStr, ...] = ()
+    """Fabrics that general models are measured on and never trained on."""
+    population: Population = Population()
+    """Random fabrics, only trained on."""
+    rows: Rows
+    """Queries for each fabric."""
+    shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)
+    """Most rows of one shard, which is one task."""
+    seed: StrictInt = Field(default=0, ge=0, lt=2**63)
+    """Seed of all queries and points."""
+    queries: QueryOptions = QueryOptions()
+    """Distribution of the queries."""
+    truth: TruthOptions = TruthOptions()
+    """How they are answered."""
+    training_truth: TruthOptions | None = None
+    """How training rows are answered; left out: as all others. A training averages noise away that a measurement must
+    not have, so that for the same time many coarse rows teach more than few fine ones."""
+
+    def truth_of(self, split: str) -> TruthOptions:
+        """Return how the rows of a split are answered."""
+        return self.training_truth or self.truth if split == "train" else self.truth
+
+
+class ModelRecipe(_Section):
+    """A model and how it is trained; in TOML the options stand beside the table ``training``."""
+
+    options: ModelOptions
+    """The design."""
+    training: TrainingOptions = TrainingOptions()
+    """How it is trained."""
+
+    @property
+    def of_one_material(self) -> bool:
+        """Whether a trained model knows a single fabric."""
+        return isinstance(self.options, NeumipOptions)
+
+    @property
+    def learns(self) -> bool:
+        """Whether there is anything to train."""
+        return not isinstance(self.options, PointSampledOptions)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _split(cls, table: Any) -> Any:
+        if not isinstance(table, Mapping):
+            return table
+        options = {key: value for key, value in table.items() if key != "training"}
+        return {"options": options} | ({"training": table["training"]} if "training" in table else {})
+
+    @model_validator(mode="after")
+    def _nothing_idle(self) -> ModelRecipe:
+        if not self.learns and "training" in self.model_fields_set:
+            raise ValueError(f"{self.options.model} has nothing to train: leave [models.training] out")
+        return self
+
+
+class _File(_Section):
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
+    about: str = Field(default="", max_length=200)
+    dataset: DatasetOptions
+    models: tuple[ModelRecipe, ...] = Field(default=(), max_length=32)
+    bench: BenchOptions = BenchOptions()
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A whole piece of work, validated, with its fabrics loaded.
+
+    Attributes
+    ----------
+    name, about : str
+        Names the data set and the page; a sentence for `twillight list`.
+    dataset : DatasetOptions
+        Rows, queries and truth.
+    models : tuple of ModelRecipe
+        Designs and trainings.
+    bench : BenchOptions
+        Measurements.
+    seen, population, unseen : tuple of Fabric
+        The fabrics in the order of the recipe.
+    """
+
+    name: str
+    about: str
+    dataset: DatasetOptions
+    models: tuple[ModelRecipe, ...]
+    bench: BenchOptions
+    seen: tuple[Fabric, ...]
+    population: tuple[Fabric, ...]
+    unseen: tuple[Fabric, ...]
+
+    @property
+    def fabrics(self) -> tuple[Fabric, ...]:
+        """All fabrics."""
+        return self.seen + self.population + self.unseen
+
+
+def recipe_names() -> list[str]:
+    """Return the names of the recipes that come with the package."""
+    return sorted(path.stem for path in RECIPES.glob("*.toml"))
+
+
+def load_recipe(name_or_path: str | Path) -> Recipe:
+    """Read a recipe.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
+
+    Raises
+    ------
+    BadInput
+        If there is no such recipe, or anything in it or in its fabrics cannot be used.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        if str(name_or_path) not in (known := recipe_names()):
+            allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
+            raise BadInput("recipe", "name", str(name_or_path), allowed)
+        path = RECIPES / f"{name_or_path}.toml"
+    where = str(path)
+    file = validated(_File, read_toml(path), where)
+    dataset = file.dataset
+    recipe = Recipe(
+        file.name,
+        file.about,
+        dataset,
+        file.models,
+        file.bench,
+        seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
+        population=tuple(population_fabrics(dataset.population)),
+        unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
+    )
+    _refuse_contradictions(recipe, where)
+    return recipe
+
+
+def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
+    """Load the fabrics that a recipe names."""
+    for index, name in enumerate(names):
+        known = preset_names()
+        if name in known:
+            yield load_fabric(name)
+        elif name.endswith(".toml") and "\0" not in name and (path := recipe.parent / name).is_file():
+            yield load_fabric(path)
+        else:
+            allowed = f"a preset or the path of a .toml file beside the recipe is needed; {nearest(name, known)}"
+            raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
+
+
+def _refuse_contradictions(recipe: Recipe, where: str) -> None:
+    """Refuse sections that do not fit together."""
+    for key, names in (
+        ("dataset", [fabric.name for fabric in recipe.fabrics]),
+        ("models", [model.options.name for model in recipe.models]),
+    ):
+        for name in names:
+            if names.count(name) > 1:
+                raise BadInput(where, key, name, "names must differ, because files are called by them")
+    if recipe.population and not recipe.dataset.rows.population:
+        raise BadInput(where, "dataset.rows.population", 0, "must be > 0 when dataset.population.count is")
+    unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen}
+    for member in recipe.population:
+        if fabric := unseen.get(member.weave.canonical()):
+            allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
+            raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
+    truth, training_truth = recipe.dataset.truth, recipe.dataset.truth_of("train")
+    for name in ("footprint", "frame", "normaliser", "geometry"):
+        if (value := getattr(training_truth, name)) != getattr(truth, name):
+            allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
+            raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
+    for index, model in enumerate(recipe.models):
+        if isinstance(model.options, PointSampledOptions) and model.options.footprint != truth.footprint:
+            key = f"models.{index}.footprint"
+            raise BadInput(where, key, model.options.footprint, f"must be that of dataset.truth, {truth.footprint!r}")

@@ -1,0 +1,56 @@
+"""One verb's work on a recipe: plan, hold the output folder, execute, keep the manifest in step, tell what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from jobs.dataset import ManifestFile, shards
+from jobs.executor import execute
+from jobs.ledger import Ledger
+from jobs.plan import plan
+from jobs.recipe import load_recipe
+from jobs.stages import compile_kernels, run
+from jobs.tables import summary_table
+from jobs.task import Stage
+from weaves.errors import WorkFailed
+
+
+def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, workers: int) -> None:
+    """Do what is not done yet of some stages of a recipe and print a summary.
+
+    Raises
+    ------
+    BadInput
+        If the recipe, the folder or the scheduler cannot be used.
+    WorkFailed
+        If any task failed; the others were done nevertheless.
+    """
+    recipe = load_recipe(recipe_name)
+    tasks = plan(recipe)
+    console = Console()
+    ledger = Ledger(out)
+    with ledger.held():
+        manifest = ManifestFile(recipe, shards(recipe), ledger)
+        summary = execute(
+            tasks,
+            out,
+            run,
+            stages=stages,
+            scheduler=scheduler,
+            workers=workers,
+            prepare=compile_kernels if {"generate", "bench"}.intersection(stages) else None,
+            recorded=manifest.add,
+        )
+    chosen = [task for task in tasks if task.stage in stages]
+    if not summary.ran and not summary.failed:
+        console.print(f"nothing to do: {len(chosen)} tasks done")
+    else:
+        console.print(summary_table(chosen, {task.id: ledger.seconds(task) for task in summary.ran}))
+    if summary.failed:
+        first, *others = summary.failed
+        more = f"; {len(others)} more failed" if others else ""
+        waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
+        raise WorkFailed(f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}`")

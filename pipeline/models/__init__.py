@@ -1,0 +1,1 @@
+"""One file per published model, named as the recipes name it."""

@@ -1,0 +1,129 @@
+"""What a benchmark asks of any way of answering queries, and what the training loop asks of a network.
+
+A Method answers queries about a fabric; arrays are NumPy. A Network is the part of a trained method that learns; it
+sees batches of torch tensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+CHUNK = 16_384
+"""Rows inferred at a time: activations stay in the cache."""
+
+
+@runtime_checkable
+class Method(Protocol):
+    """A way of answering queries."""
+
+    @property
+    def name(self) -> str:
+        """Name of the method, as the recipe names it."""
+
+    @property
+    def setting(self) -> str:
+        """What tells variants of one method apart, such as ``"k = 2"``; may be empty."""
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Tell whether the method can answer for this fabric."""
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Do once what a renderer does when a fabric is loaded; not timed."""
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries: float32 (N, 4), non-negative and finite; `seed` feeds random methods only."""
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes a renderer keeps to answer for this fabric."""
+
+
+class Batch(NamedTuple):
+    """Queries and answers of a training step: F fabrics, n queries each.
+
+    Attributes
+    ----------
+    fabric : int64 (F,)
+        Index into the fabrics the network was built for.
+    u, v, sigma : float32 (F, n)
+        Footprint, in yarn spacings.
+    wi, wo : float32 (F, n, 3)
+        Directions.
+    target : float32 (F, n, 4)
+        Components.
+    """
+
+    fabric: Tensor
+    u: Tensor
+    v: Tensor
+    sigma: Tensor
+    wi: Tensor
+    wo: Tensor
+    target: Tensor
+
+
+class Network(Protocol):
+    """A torch module that the training loop can train; the module's file says what it learns."""
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the loss of a batch; `random` is a pure function of seed and step."""
+
+    def start_at(self, target: Tensor) -> None:
+        """Set the last bias to the mean of targets (M, 4): a leaky ReLU can stall far from it."""
+
+    def schedule(self, progress: float) -> None:
+        """Adjust what changes over the training, at `progress` in [0, 1)."""
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return the optimiser's parameter groups with their peak learning rates."""
+
+    def architecture(self) -> dict[str, Any]:
+        """Describe layers and parameter counts for the model card."""
+
+
+def in_chunks(
+    queries: Queries, answer: Callable[[Tensor, Tensor, Tensor, Tensor, Tensor], Tensor], device: torch.device
+) -> npt.NDArray[np.float32]:
+    """Answer queries CHUNK rows at a time, without gradients.
+
+    Parameters
+    ----------
+    queries : Queries
+        N questions.
+    answer : callable
+        Takes float32 tensors u, v, sigma (rows,), wi, wo (rows, 3) on `device`; returns (rows, 4).
+    device : torch.device
+        Where `answer` computes.
+
+    Returns
+    -------
+    float32 (N, 4)
+    """
+    result = np.empty((len(queries.u), 4), np.float32)
+    with torch.inference_mode():
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
+            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in queries]
+            result[rows] = answer(*tensors).numpy(force=True)
+    return result
+
+
+def in_repeat(queries: Queries, repeat: tuple[int, int]) -> Queries:
+    """Return the queries with centres as shares of the repeat, in [0, 1).
+
+    Reduced in float64: float32 shares of a far centre would have lost the position within the repeat.
+    """
+    shares = []
+    for position, period in zip((queries.u, queries.v), repeat, strict=True):
+        share = (np.mod(position.astype(np.float64), period) / period).astype(np.float32)
+        shares.append(np.where(share < 1.0, share, np.float32(0.0)))  # rounding to float32 can reach 1
+    return queries._replace(u=shares[0], v=shares[1])

@@ -1,0 +1,90 @@
+"""The models by name: each is the file of that name, imported when it is asked for.
+
+A model's file offers ``restore(options, trained) -> list of Method`` and, if it learns, ``build(options, fabrics) ->
+Network``, where `trained` pairs each model card with its weights.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import safetensors.torch
+from pydantic import TypeAdapter, ValidationError
+from safetensors import SafetensorError
+from torch import Tensor
+
+from pipeline.models.method import Method
+from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
+from weaves.errors import BadInput, nearest
+
+MODELS = ("woven", "neumip", "point_sampled")
+WEIGHTS, CARD = "model.safetensors", "card.json"
+
+
+def module_of(model: str) -> ModuleType:
+    """Import the file of a model; BadInput, with the nearest name, if there is none."""
+    if model not in MODELS:
+        raise BadInput("models", "model", model, nearest(model, MODELS))
+    return import_module(f"pipeline.models.{model}")
+
+
+def load_methods(
+    options: WovenOptions | NeumipOptions | PointSampledOptions, folders: Sequence[Path] = ()
+) -> list[Method]:
+    """Return the methods that options describe.
+
+    Parameters
+    ----------
+    options : model options
+        The design; must be the one that the folders were trained with.
+    folders : sequence of Path
+        Trained models: one for `woven`, one a fabric for `neumip`, none for `point_sampled`.
+
+    Returns
+    -------
+    list of Method
+        One method; for `point_sampled` one a number of points.
+
+    Raises
+    ------
+    BadInput
+        If a folder holds no model, a broken one, or one of another design.
+    """
+    trained = [_read(folder, options) for folder in folders]
+    methods: list[Method] = module_of(options.model).restore(options, trained)
+    return methods
+
+
+def load_model(folder: Path) -> list[Method]:
+    """Return the methods of one trained folder, options read from its card."""
+    card = _read_card(folder)
+    try:
+        options: Any = TypeAdapter(ModelOptions).validate_python(card.get("options"))
+    except ValidationError as error:
+        raise BadInput(str(folder / CARD), "options", card.get("options"), "not the options of a model") from error
+    return load_methods(options, [folder])
+
+
+def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    card = _read_card(folder)
+    if card.get("options") != options.model_dump(mode="json"):
+        raise BadInput(str(folder / CARD), "options", card.get("options"), "trained with other options; train it again")
+    try:
+        return card, safetensors.torch.load_file(folder / WEIGHTS)
+    except (FileNotFoundError, SafetensorError) as error:
+        raise BadInput(str(folder / WEIGHTS), "", "missing or damaged", "train the model again") from error
+
+
+def _read_card(folder: Path) -> dict[str, Any]:
+    try:
+        card = json.loads((folder / CARD).read_bytes())
+    except (FileNotFoundError, ValueError) as error:
+        raise BadInput(str(folder / CARD), "", "missing or damaged", "train the model first") from error
+    if not isinstance(card, dict):
+        raise BadInput(str(folder / CARD), "", "not a model card", "train the model first")
+    return card

@@ -1,0 +1,1 @@
+"""Views of cloth as queries, and queries as pictures."""

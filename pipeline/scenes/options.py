@@ -1,0 +1,47 @@
+"""Every choice of the two views, as named options; nothing heavy is imported here."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Scene = Literal["sphere", "plane"]
+"""The views: cloth on a sphere, and on a plane running to the horizon."""
+
+
+class ViewOptions(BaseModel):
+    """Camera, light and scale of the views."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    footprint: Literal["geometric_mean", "major"] = "major"
+    """Axis of the projected pixel that the round footprint takes: the `major` one blurs at grazing views but never
+    aliases, so that the truth can judge aliasing; the `geometric_mean` of both keeps the pixel's area, is sharper, and
+    shows moire of its own towards the horizon."""
+    pixel_sigma: float = Field(default=0.5, gt=0, le=4)
+    """Standard deviation of the pixel's Gaussian, in pixels."""
+    largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
+    """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
+    sphere_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
+    """Pixels a yarn spacing takes at the centre of the sphere."""
+    plane_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
+    """Pixels a yarn spacing takes across the bottom row of the plane."""
+    horizon: float = Field(default=0.1, ge=0, le=0.9)
+    """Height of the picture above the plane's horizon, as a share."""
+    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
+    """Views more grazing than this, in degrees to the normal, show no cloth: there the truth needs too many points."""
+    field_of_view: float = Field(default=50.0, gt=1, le=120)
+    """Angle the plane's picture spans from left to right, in degrees."""
+    turn: float = Field(default=24.0, ge=-180, le=180)
+    """Angle from the picture's horizontal to the weft, in degrees."""
+    sphere_light: tuple[float, float] = (32.0, 132.0)
+    """Light on the sphere, in degrees: angle to the camera's direction, azimuth in the picture from the right."""
+    plane_light: tuple[float, float] = (48.0, 62.0)
+    """Light on the plane, in degrees: angle to the plane's normal, azimuth from the right towards the horizon."""
+    irradiance: float = Field(default=3.141592653589793, gt=0, le=1000)
+    """Irradiance of the directional light on a surface facing it; pi shows a white diffuse surface as 1."""
+    step: float = Field(default=0.375, gt=0, le=1)
+    """How far the surface moves from frame to frame, in pixels (centre of the sphere, bottom row of the plane)."""
+    heading: float = Field(default=37.0, ge=-180, le=180)
+    """Direction of that motion, as an angle from the weft, in degrees."""

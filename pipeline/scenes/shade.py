@@ -1,0 +1,52 @@
+"""From components to pictures: colour is applied last, so editing it costs nothing.
+
+f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft already contains the incident cosine
+(pipeline.truth.frames): under a directional light of irradiance E a pixel's radiance is E f_P.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.gbuffer import GBuffer
+from weaves.fabric import Fabric
+
+
+def colours(fabric: Fabric) -> npt.NDArray[np.float64]:
+    """Return the linear RGB colours of the components in the order of `frames.COMPONENTS`, (4, 3)."""
+    return np.array(
+        [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb],
+        dtype=np.float64,
+    )
+
+
+def shade(fabric: Fabric, components: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the patch BSDF in linear RGB, (N, 3).
+
+    Parameters
+    ----------
+    fabric : Fabric
+        Whose colours are applied.
+    components : array_like (N, 4)
+        S_warp, S_weft, C_warp, C_weft with unit colour.
+    """
+    return np.asarray(np.asarray(components, dtype=np.float64) @ colours(fabric))
+
+
+def compose(gbuffer: GBuffer, rgb: npt.ArrayLike, background: float = 0.0) -> npt.NDArray[np.float32]:
+    """Return the picture of a view in linear RGB, (H, W, 3).
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        The view.
+    rgb : array_like (N, 3)
+        Patch BSDF of its N lit pixels.
+    background : float
+        Value of the pixels that show no cloth.
+    """
+    picture = np.full((*gbuffer.mask.shape, 3), background, dtype=np.float32)
+    picture[gbuffer.mask] = 0.0
+    picture[gbuffer.lit] = gbuffer.irradiance * np.asarray(rgb)
+    return picture

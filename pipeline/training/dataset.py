@@ -1,0 +1,160 @@
+"""Training rows and their order.
+
+All training rows of all fabrics lie in one memory-mapped float32 table, fabric after fabric. Which rows a step sees
+is a pure function of (seed, step): fabrics are visited in rounds, each a new permutation of them; visit r of a fabric
+takes the r-th slice of its rows, permuted anew in every epoch. A training that goes on after an interruption
+therefore sees the rows it would have seen.
+
+    example   3 fabrics, 2 a step: rounds (2 0 1)(0 1 2)... give the steps (2 0), (1 0), (1 2), ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from pipeline.atomic import atomic_path
+from pipeline.models.method import Batch
+from pipeline.shards.manifest import Manifest
+from pipeline.truth.query import Answers, Queries
+
+COLUMNS = 13
+"""u, v, sigma, wi (3), wo (3), components (4)."""
+
+_ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
+
+
+class Rows:
+    """A table of rows, fabric after fabric.
+
+    Parameters
+    ----------
+    table : float32 (rows, COLUMNS)
+        May be memory-mapped.
+    counts : sequence of int
+        Rows of each fabric, all at least 1.
+    """
+
+    def __init__(self, table: npt.NDArray[np.float32], counts: Sequence[int]) -> None:
+        self.table, self.counts = table, list(counts)
+        self.starts = np.concatenate([[0], np.cumsum(self.counts)])
+
+
+def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> Rows:
+    """Return the training rows of fabrics, mapped from `cache`, which is written first if it is not there.
+
+    Parameters
+    ----------
+    manifest, folder : Manifest, Path
+        The data set.
+    fabrics : sequence of str
+        Names; their order numbers them.
+    cache : Path
+        A ``.npy`` file; the caller names it after what it holds and deletes it in the end.
+    """
+    counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
+    if not cache.exists():
+        with atomic_path(cache) as temporary:
+            shape = (sum(counts), COLUMNS)
+            table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
+            start = 0
+            for name, count in zip(fabrics, counts, strict=True):
+                table[start : start + count] = as_table(*manifest.read(folder, name, "train"))
+                start += count
+            table.flush()
+    return Rows(np.load(cache, mmap_mode="r"), counts)
+
+
+def as_table(queries: Queries, answers: Answers) -> npt.NDArray[np.float32]:
+    """Return queries and answers side by side, float32 (N, COLUMNS)."""
+    centre = np.stack([queries.u, queries.v, queries.sigma], axis=-1)
+    return np.concatenate([centre, queries.wi, queries.wo, answers.mean], axis=-1).astype(np.float32)
+
+
+class Order:
+    """Which rows each step sees: a pure function of (seed, step).
+
+    Parameters
+    ----------
+    counts : sequence of int
+        Rows of each fabric.
+    batch : int
+        Rows a step.
+    fabrics : int
+        Fabrics a step; no more than there are.
+    seed : int
+        Seed of the order.
+    """
+
+    def __init__(self, counts: Sequence[int], batch: int, fabrics: int, seed: int) -> None:
+        self.counts = list(counts)
+        self.fabrics = min(fabrics, len(self.counts), batch)
+        self.each = batch // self.fabrics
+        self._seed = seed
+        self._epochs: dict[int, tuple[int, npt.NDArray[np.int64]]] = {}  # the last permutation of each fabric
+
+    def step(self, step: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Return the fabrics (F,) of a step and their rows (F, n), counted within each fabric."""
+        total = len(self.counts)
+        visits = [divmod(place, total) for place in range(step * self.fabrics, (step + 1) * self.fabrics)]
+        turns = {turn: self._permutation(total, _ROUND, turn, 0) for turn in {turn for turn, _ in visits}}
+        chosen = np.array([turns[turn][place] for turn, place in visits])
+        rows = [self._slice(int(fabric), turn) for fabric, (turn, _) in zip(chosen, visits, strict=True)]
+        return chosen, np.stack(rows)
+
+    def random(self, step: int) -> np.random.Generator:
+        """Return the generator of everything else that is random in a step."""
+        return self._generator(_STEP, step, 0)
+
+    def _slice(self, fabric: int, visit: int) -> npt.NDArray[np.int64]:
+        """Return the rows of a fabric's `visit`; a fabric with fewer rows than wanted repeats them."""
+        count = self.counts[fabric]
+        slices = max(count // self.each, 1)
+        epoch, part = divmod(visit, slices)
+        if self._epochs.get(fabric, (-1,))[0] != epoch:
+            self._epochs[fabric] = epoch, self._permutation(count, _EPOCH, epoch, fabric)
+        permutation = self._epochs[fabric][1]
+        return np.resize(permutation[part * self.each : (part + 1) * self.each], self.each)
+
+    def _permutation(self, count: int, purpose: int, index: int, of: int) -> npt.NDArray[np.int64]:
+        return self._generator(purpose, index, of).permutation(count)
+
+    def _generator(self, purpose: int, index: int, of: int) -> np.random.Generator:
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, purpose, index, of))))
+
+
+class Batches:
+    """Batches of a training as tensors on one device.
+
+    Parameters
+    ----------
+    rows : Rows
+        The table.
+    order : Order
+        Its order.
+    device : torch.device
+        Where the batches go; a GPU holds the whole table if it takes less than half of the free memory.
+    """
+
+    def __init__(self, rows: Rows, order: Order, device: torch.device) -> None:
+        self.rows, self.order, self.device = rows, order, device
+        self._resident: Tensor | None = None
+        if device.type == "cuda" and rows.table.nbytes < torch.cuda.mem_get_info(device)[0] // 2:
+            self._resident = torch.from_numpy(np.array(rows.table)).to(device)
+
+    def step(self, step: int) -> Batch:
+        """Return the batch of a step."""
+        fabrics, rows = self.order.step(step)
+        index = rows + self.rows.starts[fabrics][:, None]
+        if self._resident is not None:
+            table = self._resident[torch.from_numpy(index).to(self.device)]
+        else:
+            table = torch.from_numpy(self.rows.table[index]).to(self.device)
+        u, v, sigma = table[..., :3].unbind(dim=-1)
+        fabric = torch.from_numpy(fabrics).to(self.device)
+        return Batch(fabric, u, v, sigma, table[..., 3:6], table[..., 6:9], table[..., 9:])

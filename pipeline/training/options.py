@@ -1,0 +1,49 @@
+"""How a model is trained: everything that shapes the resulting bytes, and where it runs.
+
+The learning rate warms up linearly and then falls to zero along half a cosine. Nothing heavy is imported here.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class TrainingOptions(BaseModel):
+    """One training run; `device` and `threads` choose where, the rest decides the numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    steps: int = Field(default=6000, ge=1, le=10_000_000)
+    """Optimiser steps."""
+    batch: int = Field(default=4096, ge=1, le=2**22)
+    """Queries a step, over all fabrics of the step."""
+    fabrics: int = Field(default=8, ge=1, le=4096)
+    """Fabrics a step; a model of many fabrics encodes each once and asks it batch / fabrics queries."""
+    learning_rate: float = Field(default=2e-3, gt=0, le=1)
+    """Peak learning rate of AdamW."""
+    warm_up: float = Field(default=0.03, ge=0, le=0.5)
+    """Share of the steps in which the rate rises linearly."""
+    weight_decay: float = Field(default=0.0, ge=0, le=1)
+    """Decoupled weight decay of AdamW."""
+    gradient_clip: float = Field(default=1.0, gt=0, le=1e6)
+    """Largest Euclidean norm of the gradient."""
+    average: float = Field(default=0.0, ge=0, lt=1)
+    """Decay of the exponential moving average of the weights that is kept in the end; 0 keeps the last weights."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Seed of the initial weights and of the order of the queries."""
+    threads: int = Field(default=1, ge=1, le=1024)
+    """Threads torch may use; sums are split among them, so the last bits depend on it."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """Where the training runs; `auto` takes a GPU when there is one. Only the CPU promises the same bits."""
+    checkpoint_every: int = Field(default=500, ge=1)
+    """Steps between checkpoints, from which an interrupted training goes on."""
+    curve_points: int = Field(default=40, ge=1, le=10_000)
+    """Points of the loss curve on the model card."""
+    validation_rows: int = Field(default=16_384, ge=1)
+    """Most held-out queries used for the figures on the model card."""
+
+
+VERSION = 1
+"""Raised by hand when the loop's numbers change; part of the fingerprint of every trained model."""

@@ -1,0 +1,1 @@
+"""How good, how fast, how stable: measurements, Records and the page."""

@@ -1,0 +1,62 @@
+"""What a benchmark measures and how finely; nothing heavy is imported here.
+
+`VERSION` is raised by hand whenever a measurement's numbers change for the same inputs; it enters the fingerprint of
+every benchmark task and every Record.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from pipeline.scenes.options import Scene, ViewOptions
+from pipeline.truth.options import TruthOptions
+
+VERSION: Final = 1
+"""Version of the measurements' numbers."""
+
+Side = Annotated[int, Field(ge=16, le=4096)]
+"""Side of a picture in pixels."""
+
+
+class BenchOptions(BaseModel):
+    """One benchmark: errors on held-out queries, pictures, aliasing, timing."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    scenes: Annotated[tuple[Scene, ...], Field(min_length=1, max_length=2)] = ("sphere", "plane")
+    """Views that every fabric is shown in."""
+    sphere_size: tuple[Side, Side] = (192, 192)
+    """Width and height of the sphere's picture, in pixels."""
+    plane_size: tuple[Side, Side] = (272, 192)
+    """Width and height of the plane's picture, in pixels."""
+    view: ViewOptions = ViewOptions()
+    """Camera, light and scale."""
+    truth: TruthOptions = TruthOptions(relative_error=0.05, min_count=256, max_count=512)
+    """How true the pictures of the truth are; their noise is subtracted from every figure. Below 256 points a pixel
+    may miss one family of yarns altogether, and its standard error with it."""
+    frame_truth: TruthOptions = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
+    """The same for the frames of the truth."""
+    picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
+    """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
+    rows: int = Field(default=16_384, ge=64)
+    """Most held-out queries a fabric used for the errors."""
+    frames: int = Field(default=8, ge=3, le=1024)
+    """Frames of the moving plane, for aliasing."""
+    frame_size: tuple[Side, Side] = (96, 72)
+    """Width and height of those frames, in pixels."""
+    timing_rows: int = Field(default=16_384, ge=64)
+    """Queries in one timed call."""
+    timing_repeats: int = Field(default=25, ge=20, le=10_000)
+    """Timed calls of each method, interleaved with those of the others."""
+    warm_up: int = Field(default=3, ge=1, le=1000)
+    """Calls of each method before the clock counts."""
+    threads: int = Field(default=1, ge=1, le=1024)
+    """Threads each timed method may use."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Seed of the truth of the pictures and of the random points of the baseline."""
+
+    def size(self, scene: Scene) -> tuple[int, int]:
+        """Return width and height of a scene's picture, in pixels."""
+        return self.sphere_size if scene == "sphere" else self.plane_size

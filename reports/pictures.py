@@ -1,0 +1,97 @@
+"""Pictures of the views, by the truth and by methods, and the error of the latter.
+
+A picture is a linear OpenEXR: R, G, B under the light of the view, A = 1 where there is cloth; the truth's holds the
+standard error of each colour beside them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.fingerprint import fingerprint
+from pipeline.scenes.gbuffer import GBuffer, view
+from pipeline.scenes.options import Scene
+from pipeline.scenes.shade import colours, compose, shade
+from pipeline.truth.estimator import estimate
+from reports.exr import read_exr, write_exr
+from reports.metrics import colour_noise, squared_error
+from reports.options import BenchOptions
+from reports.record import TRUTH, Provenance, Record, Role
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+RGB: Final = ("R", "G", "B")
+"""Channels of the colour."""
+ERROR: Final = ("error.R", "error.G", "error.B")
+"""Channels of its standard error."""
+
+
+def render_truth(fabric: Fabric, scene: Scene, options: BenchOptions, path: Path) -> None:
+    """Write the truth's picture of a scene to `path`."""
+    gbuffer = view(scene, *options.size(scene), options=options.view)
+    seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
+    answers = estimate(fabric, gbuffer.queries(fabric.weave.repeat), options.truth, seed)
+    noise = compose(gbuffer, colour_noise(answers, colours(fabric)))
+    picture = compose(gbuffer, shade(fabric, answers.mean))
+    _write(path, gbuffer, picture, {"fabric": fabric.name, "scene": scene, "method": TRUTH}, noise)
+
+
+def render_method(
+    method: Method,
+    fabric: Fabric,
+    role: Role,
+    scene: Scene,
+    options: BenchOptions,
+    truth: Path,
+    path: Path,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Write a method's picture of a scene and measure its MSE over the lit pixels.
+
+    Parameters
+    ----------
+    method : Method
+        Must cover the fabric.
+    truth : Path
+        The picture that `render_truth` wrote with the same options.
+    path : Path
+        Where the method's picture goes.
+    """
+    gbuffer = view(scene, *options.size(scene), options=options.view)
+    seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)
+    method.prepare(fabric)
+    picture = compose(gbuffer, shade(fabric, method.predict(fabric, gbuffer.queries(fabric.weave.repeat), seed)))
+    about = {"fabric": fabric.name, "scene": scene, "method": method.name, "setting": method.setting}
+    _write(path, gbuffer, picture, about)
+    reference = read_exr(truth)
+    lit = gbuffer.lit
+    error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit])
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric.name,
+        role=role,
+        scene=scene,
+        provenance=provenance or Provenance(),
+    )
+    return subject.of_error(error)
+
+
+def _write(
+    path: Path,
+    gbuffer: GBuffer,
+    picture: npt.NDArray[np.float32],
+    about: dict[str, str],
+    noise: npt.NDArray[np.float32] | None = None,
+) -> None:
+    channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
+    channels["A"] = gbuffer.mask.astype(np.float32)
+    if noise is not None:
+        channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
+    write_exr(path, channels, {**about, "irradiance": gbuffer.irradiance})

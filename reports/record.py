@@ -1,0 +1,236 @@
+"""Record: one measured number and where it comes from; as JSON files, and as a pandas table.
+
+A file ``NAME.json`` holds the records of one task and nothing that differs between two runs of the same work, so that
+its bytes are a function of the work (times excepted, which are what they are). The machine, the versions of the
+packages and the date lie beside it in ``NAME.machine.json``, written first: records exist only together with it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final, Literal
+
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from pipeline.atomic import atomic_write
+from reports.metrics import Error
+from reports.options import VERSION
+from weaves.errors import BadInput
+
+PACKAGES: Final = ("numpy", "scipy", "numba", "torch", "pyarrow", "pandas", "OpenEXR", "matplotlib")
+"""Packages whose versions are noted."""
+
+TRUTH: Final = "truth"
+"""Name of the reference, where methods are named."""
+
+Role = Literal["seen", "unseen"]
+"""Whether general models saw the fabric in training."""
+
+Metric = Literal[
+    "mse",
+    "mse_measured",
+    "truth_noise",
+    "colour_rrmse",
+    "rrmse_specular_warp",
+    "rrmse_specular_weft",
+    "rrmse_diffuse_warp",
+    "rrmse_diffuse_weft",
+    "truth_relative_error",
+    "flicker",
+    "motion",
+    "excess_energy",
+    "spectrum",
+    "time",
+    "bytes_stored",
+]
+"""Everything that is measured; `reports.page` defines each in a sentence."""
+
+
+class Provenance(BaseModel):
+    """What was measured: names and fingerprints that are the same for a task's records."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    recipe: str = ""
+    """Name of the recipe."""
+    recipe_fingerprint: str = ""
+    """Of the whole recipe."""
+    dataset: str = ""
+    """Fingerprint of the data set."""
+    model: str = ""
+    """Fingerprint of the trained model; empty where nothing is trained."""
+    version: int = VERSION
+    """VERSION of the benchmark stage."""
+
+
+class Record(BaseModel):
+    """One measurement."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    method: str
+    """Name of the method as the recipe names it; ``truth`` for the reference itself."""
+    setting: str = ""
+    """What tells variants of one method apart, such as ``k = 2``."""
+    fabric: str = ""
+    """Name of the fabric; empty where several are meant together."""
+    role: Role | Literal[""] = ""
+    """Whether general models saw the fabric in training."""
+    scene: Literal["queries", "sphere", "plane", ""] = ""
+    """`queries`: held-out queries; otherwise the view."""
+    metric: Metric = "mse"
+    """What was measured."""
+    value: float = 0.0
+    """The number; the median for times."""
+    standard_error: float | None = None
+    """Of `value`."""
+    low: float | None = None
+    """Lower end of the 95 % interval; the first quartile for times."""
+    high: float | None = None
+    """Upper end of the 95 % interval; the third quartile for times."""
+    count: int = 1
+    """Queries, pixels, frames or repeats behind it."""
+    unit: str = "1"
+    """Unit of `value`."""
+    curve: tuple[tuple[float, float], ...] = ()
+    """Points of a curve, where one number does not say it all."""
+    provenance: Provenance = Provenance()
+    """What was measured."""
+
+    def of(
+        self,
+        metric: Metric,
+        value: float,
+        count: int,
+        *,
+        unit: str = "1",
+        standard_error: float | None = None,
+        low: float | None = None,
+        high: float | None = None,
+        curve: tuple[tuple[float, float], ...] = (),
+    ) -> Record:
+        """Return another number measured on the same subject."""
+        number = {"metric": metric, "value": value, "count": count, "unit": unit, "curve": curve}
+        bounds = {"standard_error": standard_error, "low": low, "high": high}
+        return Record.model_validate(self.model_dump() | number | bounds)
+
+    def of_error(self, error: Error) -> list[Record]:
+        """Return the three numbers of a mean squared error."""
+        return [
+            self.of(
+                "mse", error.value, error.count, standard_error=error.standard_error, low=error.low, high=error.high
+            ),
+            self.of("mse_measured", error.measured, error.count),
+            self.of("truth_noise", error.noise, error.count),
+        ]
+
+
+_RECORDS: Final = TypeAdapter(list[Record])
+
+
+class Machine(BaseModel):
+    """Where and when it was measured."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    cpu: str
+    """Model of the processor."""
+    cores: int
+    """Cores this process may use."""
+    threads: int
+    """Threads a method could use."""
+    system: str
+    """Operating system and architecture."""
+    python: str
+    """Version of Python."""
+    packages: dict[str, str]
+    """Versions of the packages."""
+    date: str
+    """UTC, ISO 8601."""
+
+
+def this_machine(threads: int) -> Machine:
+    """Describe the machine this runs on; `threads` is what methods were allowed."""
+    return Machine(
+        cpu=_cpu(),
+        cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        threads=threads,
+        system=f"{platform.system()} {platform.machine()}",
+        python=platform.python_version(),
+        packages={name: found for name in PACKAGES if (found := _version(name))},
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+
+
+def write_records(path: Path, records: Sequence[Record], machine: Machine) -> None:
+    """Write a task's records to `path` (``NAME.json``) and the machine beside it."""
+    atomic_write(machine_path(path), machine.model_dump_json(indent=1).encode() + b"\n")
+    lines = ",\n".join(json.dumps(_compact(record)) for record in records)
+    atomic_write(path, f"[\n{lines}\n]\n".encode())
+
+
+def machine_path(path: Path) -> Path:
+    """Return the file that holds the machine of the records in `path`."""
+    return path.with_name(f"{path.stem}.machine.json")
+
+
+def read_records(paths: Iterable[Path]) -> list[Record]:
+    """Read records from files, in the order of the files; BadInput names the first that holds none."""
+    records: list[Record] = []
+    for path in paths:
+        try:
+            records += _RECORDS.validate_json(path.read_bytes())
+        except FileNotFoundError as error:
+            raise BadInput(str(path), "", "does not exist", "records are needed; run the benchmark first") from error
+        except ValidationError as error:
+            raise BadInput(str(path), "", "holds no records", "run the benchmark again") from error
+    return records
+
+
+def read_machine(path: Path) -> Machine:
+    """Read the machine of the records in `path`; BadInput if it is missing or broken."""
+    beside = machine_path(path)
+    try:
+        return Machine.model_validate_json(beside.read_bytes())
+    except (FileNotFoundError, ValidationError) as error:
+        raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
+
+
+def to_table(records: Iterable[Record]) -> pd.DataFrame:
+    """Return one row a record, provenance as columns of its own, curves left out."""
+    rows = []
+    for record in records:
+        row = record.model_dump(exclude={"curve", "provenance"})
+        rows.append(row | record.provenance.model_dump())
+    columns = [name for name in Record.model_fields if name not in ("curve", "provenance")]
+    table = pd.DataFrame(rows, columns=[*columns, *Provenance.model_fields])
+    return table.astype({"standard_error": "float64", "low": "float64", "high": "float64"})
+
+
+def _compact(record: Record) -> dict[str, object]:
+    """Return what differs from the defaults, and always the metric and the value."""
+    return {"metric": record.metric, "value": record.value, **record.model_dump(mode="json", exclude_defaults=True)}
+
+
+def _cpu() -> str:
+    """Return the processor's model name, as Linux tells it."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""

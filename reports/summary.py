@@ -1,0 +1,162 @@
+"""Records condensed: one row a method, over all fabrics of a role.
+
+Means over fabrics weigh every fabric alike, as one picture of all of them would. A ratio compares a method with point
+sampling at 2 points on the very fabrics that the method covers; its interval is that of `reports.metrics.ratio`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from reports.metrics import ratio
+from reports.record import TRUTH, Record, to_table
+
+BASELINE: Final = "k = 2"
+"""Setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
+
+PAPER: Final = (4.1, 0.83)
+"""How much lower the published network's MSE is, and its time relative to the baseline's [Chen2024Woven]."""
+
+COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
+
+_KEYS: Final = ["method", "setting"]
+
+
+def error_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return errors on held-out queries, one row a method and role.
+
+    Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
+    mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
+    over the method's); colour_rrmse and the four rrmse_<component> (means over fabrics).
+    """
+    wide = _wide(records, "queries")
+    rows = []
+    for (method, setting, role), group in wide.groupby([*_KEYS, "role"], sort=False):
+        mse, spread = _mean_error(group)
+        base, base_spread = _mean_error(_baseline(wide, role, set(group["fabric"])))
+        found = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
+        row = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
+        row |= {"queries": int(group["count"].sum()), "mse": mse, "standard_error": spread}
+        row |= {"low": mse - 1.96 * spread, "high": mse + 1.96 * spread}
+        measured, noise = (float(group[name].mean()) for name in ("mse_measured", "truth_noise"))
+        row |= {"mse_measured": measured, "truth_noise": noise}
+        row["noise_share"] = noise / measured if measured > 0 else math.nan
+        row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
+        relative = ["colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+        row |= {name: group[name].mean() if name in group else math.nan for name in relative}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the MSE on held-out queries, one row a fabric and one column a method (``method setting``)."""
+    table = to_table(records)
+    table = table[(table["metric"] == "mse") & (table["scene"] == "queries")]
+    labels = (table["method"] + " " + table["setting"]).str.strip()
+    wide = table.assign(label=labels).pivot(index=["role", "fabric"], columns="label", values="value")
+    order = list(dict.fromkeys(labels))
+    keys = list(dict.fromkeys(zip(table["role"], table["fabric"], strict=True)))
+    return wide.reindex(index=keys, columns=order).reset_index().rename_axis(columns=None)
+
+
+def picture_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the MSE of the pictures: columns method, setting, fabric, scene, mse, mse_measured, truth_noise."""
+    parts = [_wide(records, scene) for scene in ("sphere", "plane")]
+    table = pd.concat([part[part["mse"].notna()] for part in parts if "mse" in part], ignore_index=True)
+    columns = [*_KEYS, "role", "fabric", "scene", "mse", "mse_measured", "truth_noise"]
+    return table.reindex(columns=columns)
+
+
+def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return flicker and excess energy: one row a method and role, means over fabrics, and over how many."""
+    wide = _wide(records, "plane")
+    if "flicker" not in wide:
+        return pd.DataFrame(columns=[*_KEYS, "role", "fabrics", "flicker", "excess_energy"])
+    wide = wide[wide["flicker"].notna()]
+    groups = wide.groupby([*_KEYS, "role"], sort=False)
+    table = groups.agg(fabrics=("fabric", "size"), flicker=("flicker", "mean"), excess_energy=("excess_energy", "mean"))
+    return table.reset_index()
+
+
+def timing_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the cost of a query: median and quartiles in nanoseconds, bytes stored, time over that of 2 points."""
+    table = to_table(records)
+    times = table[table["metric"] == "time"].set_index(_KEYS)
+    stored = table[table["metric"] == "bytes_stored"].set_index(_KEYS)["value"].rename("bytes_stored")
+    result = times[["value", "low", "high", "count"]].rename(
+        columns={"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
+    )
+    result = result.join(stored).reset_index()
+    base = result.loc[result["setting"] == BASELINE, "median_ns"]
+    result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
+    return result
+
+
+def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float, float]]]:
+    """Return the power spectrum of each method and of the truth, averaged over fabrics."""
+    curves: dict[tuple[str, str], list[np.ndarray[tuple[int, int], np.dtype[np.float64]]]] = {}
+    for record in records:
+        if record.metric == "spectrum":
+            curves.setdefault((record.method, record.setting), []).append(np.array(record.curve))
+    return {
+        key: [(float(k), float(p)) for k, p in np.mean(found, axis=0)]
+        for key, found in curves.items()
+        if len({len(curve) for curve in found}) == 1
+    }
+
+
+def summary_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the whole benchmark as one row a method, for the terminal.
+
+    Index: method and setting. Columns, where measured: MSE and ratio to 2 points on seen and unseen fabrics, flicker,
+    nanoseconds a query and their ratio to 2 points, bytes stored.
+    """
+    parts = []
+    errors = error_table(records)
+    for role in ("seen", "unseen"):
+        part = errors[errors["role"] == role].set_index(_KEYS)[["mse", "ratio"]] if len(errors) else pd.DataFrame()
+        if len(part):
+            parts.append(part.rename(columns={"mse": f"MSE {role}", "ratio": f"× lower, {role}"}))
+    aliasing = aliasing_table(records)
+    if len(aliasing):
+        parts.append(aliasing.groupby(_KEYS, sort=False)[["flicker"]].mean())
+    timing = timing_table(records)
+    timing = timing[timing["method"] != TRUTH]
+    if len(timing):
+        columns = {"median_ns": "ns/query", "time_ratio": "× time", "bytes_stored": "bytes"}
+        parts.append(timing.set_index(_KEYS)[list(columns)].rename(columns=columns))
+    return pd.concat(parts, axis=1) if parts else pd.DataFrame()
+
+
+def _wide(records: Sequence[Record], scene: str) -> pd.DataFrame:
+    """Return one row a method and fabric with a column for each metric of a scene; the truth's own left out."""
+    table = to_table(records)
+    table = table[(table["scene"] == scene) & (table["method"] != TRUTH) & (table["fabric"] != "")]
+    index = [*_KEYS, "role", "fabric", "scene"]
+    if table.empty:
+        return pd.DataFrame(columns=[*index, "count", "mse_error"])
+    order = list(dict.fromkeys(table[index].itertuples(index=False, name=None)))
+    wide = table.pivot(index=index, columns="metric", values="value").reindex(order)
+    mse = table[table["metric"] == "mse"].set_index(index)
+    wide["count"] = mse["count"]
+    wide["mse_error"] = mse["standard_error"]
+    return wide.reset_index().rename_axis(columns=None)
+
+
+def _mean_error(group: pd.DataFrame) -> tuple[float, float]:
+    """Return the mean MSE over fabrics and its standard error, that of independent queries a fabric."""
+    if group.empty:
+        return math.nan, math.nan
+    errors = group["mse_error"].fillna(0.0).to_numpy(dtype=np.float64)
+    return float(group["mse"].mean()), float(np.sqrt(np.square(errors).sum()) / len(group))
+
+
+def _baseline(wide: pd.DataFrame, role: object, fabrics: set[str]) -> pd.DataFrame:
+    """Return the baseline's rows; empty unless it was measured on every one of the fabrics."""
+    rows = wide[(wide["setting"] == BASELINE) & (wide["role"] == role) & wide["fabric"].isin(fabrics)]
+    return rows if set(rows["fabric"]) == fabrics else rows.iloc[:0]

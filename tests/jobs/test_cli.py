@@ -1,0 +1,142 @@
+"""Exit codes and sentences: whatever is wrong, one line tells it and no traceback is shown."""
+
+import numpy as np
+import pytest
+
+import jobs.cli
+from jobs.cli import main
+from pipeline.fingerprint import file_sha256
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.store import write_shard
+from pipeline.truth.query import Answers
+from weaves.errors import WorkFailed
+from weaves.fabric import load_fabric
+
+
+@pytest.fixture
+def twillight(capsys, monkeypatch, tmp_path):
+    """Run the command line in a folder of its own; return exit code, output and complaint."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*tokens):
+        code = main(tokens)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def complaint(answer, code=2):
+    """Return the one sentence of a run that ended badly."""
+    assert answer[0] == code, answer
+    assert answer[2].count("\n") == 1 and "Traceback" not in answer[2]
+    return answer[2]
+
+
+def test_help_lists_the_verbs_in_the_order_of_work(twillight):
+    code, text, _ = twillight("--help")
+    verbs = [line.split()[1] for line in text.splitlines() if line.startswith("│") and line.split()[1].isalpha()]
+    order = ["list", "show", "plan", "generate", "check", "train", "bench", "report", "run", "status"]
+    assert code == 0 and [verb for verb in verbs if verb in order] == order
+
+
+def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
+    assert "denim" in twillight("list")[1] and "quick" in twillight("list")[1]
+    code, text, _ = twillight("show", "denim")
+    assert code == 0 and "· ██████" in text and "roughness  0.55" in text
+    assert "about" in twillight("plan", "smoke")[1]
+    code, text, _ = twillight("status", "smoke")
+    assert code == 0 and "generate     0       0       14" in text
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("tokens", "words"),
+    [
+        (["plna", "quick"], ["plna", 'Did you mean "plan"']),
+        (["generate", "quick", "--workrs", "2"], ["--workrs", "Did you mean --workers"]),
+        (["generate", "quick", "--workers", "two"], ["two"]),
+        (["plan"], ["recipe"]),
+        (["plan", "quik"], ["'quik'", "did you mean 'quick'"]),
+        (["plan", "missing.toml"], ["missing.toml", "no such file"]),
+        (["plan", "broken.toml"], ["broken.toml", "line 1"]),
+        (["show", "denin"], ["'denin'", "did you mean 'denim'"]),
+        (["show", "nan.toml"], ["nan.toml", "warp.bend = nan", "finite"]),
+        (["show", "satin.toml"], ["satin.toml", "draft.move = 3"]),
+        (["check", "smoke"], ["manifest.json", "does not exist"]),
+        (["check", "."], ["manifest.json", "does not exist"]),
+        (["generate", "smoke", "--out", "nan.toml"], ["nan.toml", "a folder that can be written"]),
+        (["generate", "smoke", "--scheduler", "tcp//nowhere"], ["tcp//nowhere", "no dask scheduler"]),
+    ],
+)
+def test_bad_input_ends_with_one_sentence_and_code_2(twillight, tmp_path, tokens, words):
+    (tmp_path / "broken.toml").write_text("name = \n")
+    fabric = (
+        'name = "x"\n[draft]\n{draft}\n[warp]\nbend = {bend}\nroughness = 0.3\n[weft]\nbend = 20\nroughness = 0.3\n'
+    )
+    (tmp_path / "nan.toml").write_text(fabric.format(draft='family = "plain"', bend="nan"))
+    (tmp_path / "satin.toml").write_text(fabric.format(draft='family = "satin"\nends = 6\nmove = 3', bend="20"))
+    sentence = complaint(twillight(*tokens))
+    for word in words:
+        assert word in sentence, sentence
+
+
+def test_work_left_out_is_failed_work(twillight):
+    assert "run `twillight generate` first" in complaint(twillight("train", "smoke"), code=1)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "the same command goes on"),
+        (WorkFailed("the loss diverged"), 1, "the loss diverged"),
+        (ZeroDivisionError("by zero"), 1, "this is a bug in twillight"),
+    ],
+)
+def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code, words):
+    def burst(*arguments, **options):
+        raise error
+
+    monkeypatch.setattr(jobs.cli, "app", burst)
+    assert words in complaint(twillight("run", "quick", "--out", "products"), code)
+    crashes = list((tmp_path / "products").glob("crash-*.txt"))
+    assert len(crashes) == isinstance(error, ZeroDivisionError)
+    for crash in crashes:
+        assert "twillight run quick" in crash.read_text() and "Traceback" in crash.read_text()
+
+
+@pytest.fixture
+def dataset(tmp_path):
+    """A data set of one shard with made-up answers."""
+    folder = tmp_path / "data"
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 100)
+    answers = Answers(np.ones((100, 4), np.float32), np.ones((100, 4), np.float32) / 100, np.full(100, 64, np.int32))
+    write_shard(folder / "part-a.parquet", "denim", queries, answers, {})
+    entry = ShardEntry(
+        file="part-a.parquet",
+        fabric="denim",
+        split="test",
+        start=0,
+        rows=100,
+        sha256=file_sha256(folder / "part-a.parquet"),
+    )
+    Manifest(
+        name="made up", fingerprint="0", roles={"seen": ["denim"]}, fabrics={"denim": fabric}, about={}, shards=[entry]
+    ).save(folder)
+    return folder
+
+
+def test_check_finds_a_sound_data_set_sound(twillight, dataset):
+    code, text, _ = twillight("check", str(dataset))
+    assert code == 0 and "1 shards with 100 rows are sound" in text
+
+
+def test_check_tells_of_a_shard_cut_in_half(twillight, dataset):
+    shard = dataset / "part-a.parquet"
+    shard.write_bytes(shard.read_bytes()[: shard.stat().st_size // 2])
+    code, _, told = twillight("check", str(dataset))
+    assert code == 2 and "Traceback" not in told
+    assert all("part-a.parquet" in line for line in told.splitlines()) and "whole" in told

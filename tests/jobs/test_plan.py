@@ -1,0 +1,123 @@
+import pytest
+
+from jobs.plan import plan
+from jobs.recipe import load_recipe
+
+
+def ids(tasks, stage, word=""):
+    return [task.id for task in tasks if task.stage == stage and word in task.title]
+
+
+@pytest.fixture
+def tasks(files):
+    return plan(load_recipe(files.write()))
+
+
+def edited(files, old, new):
+    return plan(load_recipe(files.exchange(old, new).write()))
+
+
+def test_every_row_once_in_tasks_of_shard_rows(tasks):
+    rows = {}
+    for task in tasks:
+        if task.stage == "generate":
+            key = task.spec["name"], task.spec["split"]
+            assert task.spec["start"] == rows.get(key, 0)
+            rows[key] = task.spec["start"] + task.rows
+            assert task.rows <= 1000
+    named = {(name, split): count for name in ("denim", "own", "twill_4_4") for split, count in SPLITS.items()}
+    assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
+
+
+SPLITS = {"train": 2500, "validation": 100, "test": 500}
+
+
+def test_plans_are_pure_and_in_order_of_need(files, tasks):
+    assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.path))]
+    assert len({task.id for task in tasks}) == len(tasks)
+    before = set()
+    for task in tasks:
+        assert before.issuperset(task.needs)
+        before.add(task.id)
+
+
+def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
+    unseen, test = set(ids(tasks, "generate", "twill_4_4")), set(ids(tasks, "generate", " test "))
+    for task in tasks:
+        if task.stage == "train":
+            assert test.isdisjoint(task.needs)
+            assert unseen.isdisjoint(task.needs) == (task.title != "neumip on twill_4_4")
+            assert ("twill_4_4" in task.spec["fabrics"]) == (task.title == "neumip on twill_4_4")
+    woven = next(task for task in tasks if task.title.startswith("woven"))
+    assert woven.spec["fabrics"] == ["denim", "own", "random_000", "random_001", "random_002"]
+
+
+def test_without_a_model_of_one_material_the_unseen_fabric_has_no_training_rows(files):
+    tasks = edited(files, '[[models]]\nmodel = "neumip"\n', "")
+    assert {task.spec["split"] for task in tasks if "twill_4_4" in task.title} == {"test"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name = "tiny"', 'name = "another"'),
+        ('diffuse = "#804020"', 'diffuse = "#0000ff"'),
+        ('source = "made up"', 'source = "measured"'),
+        ('seen = ["denim", "own.toml"]', 'seen = ["own.toml", "denim"]'),
+        ("frames = 4", "frames = 5"),
+        ("steps = 10", "steps = 11"),
+    ],
+    ids=["recipe name", "colour", "source", "order", "bench", "training"],
+)
+def test_what_does_not_shape_a_shard_does_not_change_its_identity(files, tasks, old, new):
+    assert set(ids(edited(files, old, new), "generate")) == set(ids(tasks, "generate"))
+
+
+def test_a_roughness_changes_the_shards_of_its_fabric_alone(files, tasks):
+    after = edited(files, "roughness = 0.3", "roughness = 0.31")
+    assert set(ids(after, "generate", "own")).isdisjoint(ids(tasks, "generate", "own"))
+    for other in ("denim", "random", "twill_4_4"):
+        assert ids(after, "generate", other) == ids(tasks, "generate", other)
+    assert ids(after, "train", "neumip on denim") == ids(tasks, "train", "neumip on denim")
+    for model in ("neumip on own", "woven"):
+        assert ids(after, "train", model) != ids(tasks, "train", model)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("seed = 3", "seed = 4"),
+        ("sigma = [0.05, 8.0]", "sigma = [0.05, 9.0]"),
+        ("relative_error = 0.05", "relative_error = 0.04"),
+    ],
+)
+def test_what_shapes_every_shard_changes_every_identity(files, tasks, old, new):
+    assert set(ids(edited(files, old, new), "generate")).isdisjoint(ids(tasks, "generate"))
+
+
+def test_a_coarser_truth_for_training_leaves_the_other_rows_alone(files, tasks):
+    after = edited(
+        files,
+        '[[models]]\nmodel = "woven"',
+        '[dataset.training_truth]\nrelative_error = 0.1\n[[models]]\nmodel = "woven"',
+    )
+    assert set(ids(after, "generate", " train ")).isdisjoint(ids(tasks, "generate", " train "))
+    for split in (" validation ", " test "):
+        assert ids(after, "generate", split) == ids(tasks, "generate", split)
+
+
+def test_more_rows_keep_the_shards_that_are_full(files, tasks):
+    after = edited(files, "train = 2500", "train = 4500")
+    before, later = (set(ids(plan_, "generate", "denim train")) for plan_ in (tasks, after))
+    assert len(before & later) == 2 and len(later) == 5
+
+
+def test_where_and_how_often_a_training_is_saved_is_not_its_identity(files, tasks):
+    after = edited(files, "steps = 10", 'steps = 10\ndevice = "cpu"\ncheckpoint_every = 7')
+    assert ids(after, "train") == ids(tasks, "train")
+    assert ids(edited(files, "latent = 32", "latent = 16"), "train", "woven") != ids(tasks, "train", "woven")
+
+
+def test_the_full_plan_is_paper_sized():
+    tasks = plan(load_recipe("full"))
+    assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000

@@ -1,0 +1,51 @@
+import subprocess
+import sys
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.training.options import TrainingOptions
+
+MODEL = TypeAdapter(ModelOptions)
+
+
+def test_model_tells_the_options_apart():
+    kinds = {"woven": WovenOptions, "neumip": NeumipOptions, "point_sampled": PointSampledOptions}
+    for model, kind in kinds.items():
+        assert type(MODEL.validate_python({"model": model})) is kind
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"model": "wovenn"},
+        {"model": "woven", "latnet": 64},
+        {"model": "woven", "log_k": 0},
+        {"model": "woven", "log_k": float("nan")},
+        {"model": "woven", "specular_weight": 0, "diffuse_weight": 0},
+        {"model": "woven", "map_texels": 65},
+        {"model": "woven", "name": "../woven"},
+        {"model": "neumip", "texels_per_yarn": 0},
+        {"model": "neumip", "blur_halving": 0},
+        {"model": "point_sampled", "counts": []},
+        {"model": "point_sampled", "counts": [2, 0]},
+        {"model": "point_sampled", "footprint": "disc"},
+    ],
+)
+def test_bad_model_options_are_refused(table):
+    with pytest.raises(ValidationError):
+        MODEL.validate_python(table)
+
+
+@pytest.mark.parametrize(
+    "table", [{"steps": 0}, {"batch": 0}, {"learning_rate": -1e-3}, {"device": "tpu"}, {"warm_up": 0.9}, {"epochs": 3}]
+)
+def test_bad_training_options_are_refused(table):
+    with pytest.raises(ValidationError):
+        TrainingOptions.model_validate(table)
+
+
+def test_options_need_no_heavy_library():
+    code = "import sys, pipeline.models.options, pipeline.training.options; print('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from pipeline.scenes.gbuffer import view
+from pipeline.scenes.options import ViewOptions
+from pipeline.scenes.shade import colours, compose, shade
+from weaves.fabric import load_fabric
+
+
+def test_shade_applies_each_colour_to_its_component():
+    """One component at a time gives back its own colour; an asymmetric fabric sees warp and weft swapped."""
+    fabric = load_fabric("denim")
+    rgb = shade(fabric, np.eye(4, dtype=np.float32))
+    expected = [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb]
+    assert rgb == pytest.approx(np.array(expected))
+    assert colours(fabric) == pytest.approx(np.array(expected))
+    assert fabric.warp.diffuse_rgb != fabric.weft.diffuse_rgb
+
+
+def test_compose_scales_by_the_irradiance_and_leaves_the_rest():
+    gbuffer = view("sphere", 40, 40, options=ViewOptions(irradiance=2.0, sphere_light=(75.0, 0.0)))
+    rgb = np.arange(3 * len(gbuffer.u), dtype=np.float64).reshape(-1, 3)
+    picture = compose(gbuffer, rgb, background=0.5)
+    assert picture.shape == (40, 40, 3)
+    assert picture.dtype == np.float32
+    assert picture[gbuffer.lit] == pytest.approx(2.0 * rgb)
+    assert (picture[gbuffer.mask & ~gbuffer.lit] == 0).all()
+    assert (picture[~gbuffer.mask] == 0.5).all()

@@ -1,0 +1,29 @@
+import subprocess
+import sys
+
+import pytest
+from pydantic import ValidationError
+
+from reports.options import BenchOptions
+
+
+def test_sizes_belong_to_their_scenes():
+    options = BenchOptions(sphere_size=(20, 30), plane_size=(40, 50))
+    assert options.size("sphere") == (20, 30)
+    assert options.size("plane") == (40, 50)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"timing_repeats": 19}, {"frames": 2}, {"scenes": ()}, {"scenes": ("sofa",)}, {"sphere_size": (0, 8)}, {"x": 1}],
+)
+def test_what_cannot_be_measured_is_refused(change):
+    with pytest.raises(ValidationError):
+        BenchOptions.model_validate(change)
+
+
+def test_options_load_nothing_heavy():
+    heavy = ("numpy", "numba", "torch", "matplotlib", "pandas", "OpenEXR")
+    code = f"import sys, reports.options; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
