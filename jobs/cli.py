@@ -25,6 +25,7 @@ app = App(
     help="Woven cloth at every scale, from a weave draft to the light it returns: "
     "ground truth, neural models, and a table of what each way of rendering costs and gets wrong.",
     version_flags=(),
+    suppress_keyboard_interrupt=False,
     group_commands="Verbs, in the order of work",
     default_parameter=Parameter(negative=()),
 )
@@ -65,7 +66,12 @@ def show(
     from weaves.fabric import load_fabric
 
     cloth = load_fabric(fabric)
-    Console().print(fabric_page(cloth))
+    console = Console()
+    console.print(fabric_page(cloth))
+    if out is not None:
+        from jobs.pictures import write_pictures
+
+        console.print(*write_pictures(cloth, out), sep="\n", soft_wrap=True)
 
 
 @app.command(sort_key=2)

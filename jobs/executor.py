@@ -213,6 +213,7 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
     os.environ.setdefault(
         "DASK_LOGGING__DISTRIBUTED", "critical"
     )  # inherited by workers; dask tells every shutdown as a warning
+    import dask.config
     from distributed import Client, LocalCluster
 
     if scheduler:
@@ -224,7 +225,8 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
             yield client
         return
     resource_tracker.ensure_running()  # when it is started later, it lets Ctrl-C through again
-    with _interrupts_held():
+    # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
+    with _interrupts_held(), dask.config.set({"distributed.nanny.pre-spawn-environ": _ONE_THREAD}):
         cluster = LocalCluster(  # type: ignore[no-untyped-call]
             n_workers=workers,
             threads_per_worker=1,
@@ -234,7 +236,6 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
             silence_logs=logging.CRITICAL,
-            env=_ONE_THREAD,
         )
         client = Client(cluster)  # type: ignore[no-untyped-call]
     try:

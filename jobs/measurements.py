@@ -148,9 +148,13 @@ def _method_task(
     points = 0
     if isinstance(options, PointSampledOptions):
         # All counts are measured; pictures are made of those that the recipe wants to see.
-        shown, points = [f"k{count}" for count in options.counts if count in bench.picture_counts], sum(options.counts)
+        shown = [f"k = {count}" for count in options.counts if count in bench.picture_counts]
+        points = sum(options.counts)
     pictures = {
-        setting: {scene: f"records/{stem}-{setting}{'-' * bool(setting)}{scene}.exr" for scene in bench.scenes}
+        setting: {
+            scene: "records/" + "-".join(filter(None, (stem, setting.replace(" = ", ""), scene))) + ".exr"
+            for scene in bench.scenes
+        }
         for setting in shown
     }
     pixels = sum(width * height for width, height in map(bench.size, bench.scenes))

@@ -1,4 +1,4 @@
-"""How the benchmark's tasks (`jobs.measurements`) are done: what they read, which measurement, where its records go."""
+"""How the tasks of benchmark and report are done: what they read, which measurement or page, where it goes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from pipeline.shards.manifest import Manifest
 from reports.bench import measure_errors, measure_timing, measure_truth
 from reports.frames import measure_aliasing, measure_truth_frames, render_frames
 from reports.options import BenchOptions
+from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
-from reports.record import Provenance, Record, this_machine, write_records
+from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from weaves.fabric import Fabric
 
 Progress = Callable[[float], None]
@@ -55,7 +56,7 @@ def method(task: Task, out: Path, progress: Progress) -> None:
     for index, one in enumerate(methods):
         records += measure_errors(one, manifest, folder, name, role, options, provenance)
         records += measure_aliasing(one, fabric, role, options, out / setting["truth"]["frames"], provenance)
-        for scene, path in setting["pictures"].get(one.setting.replace(" = ", ""), {}).items():
+        for scene, path in setting["pictures"].get(one.setting, {}).items():
             reference = out / setting["truth"][scene]
             records += render_method(one, fabric, role, scene, options, reference, out / path, provenance)
         progress((index + 1) / len(methods))
@@ -69,6 +70,30 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     methods = [one for model in task.setting["models"] for one in _methods(model["options"], model["folders"], out)]
     records = measure_timing(methods, manifest, folder, options, Provenance(dataset=manifest.fingerprint))
     write_records(out / task.products[0], records, this_machine(options.threads))
+
+
+def page(task: Task, out: Path, progress: Progress) -> None:
+    """Write the page of a recipe."""
+    setting = task.setting
+    records = read_records(out / path for path in setting["records"])
+    # What is measured is the same whoever asks; whose page this is enters here.
+    asked = {"recipe": task.spec["recipe"], "recipe_fingerprint": task.id}
+    records = [
+        record.model_copy(update={"provenance": record.provenance.model_copy(update=asked)}) for record in records
+    ]
+    content = PageInput(
+        recipe=task.spec["recipe"],
+        about=task.spec["about"],
+        fingerprint=task.id,
+        dataset=setting["dataset"],
+        fabrics=[(Fabric.model_validate(fabric), role) for fabric, role in setting["fabrics"]],
+        models=[ModelNote(**note) for note in setting["models"]],
+        options=_options(task),
+        records=records,
+        machine=read_machine(out / setting["timing"]),
+        pictures=[PictureFile(**(file | {"path": out / file["path"]})) for file in setting["pictures"]],
+    )
+    write_page((out / task.products[0]).parent, content, progress)
 
 
 def _options(task: Task) -> BenchOptions:

@@ -6,16 +6,17 @@ models by their options and the shards they read, benchmarks by the models, the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from jobs.dataset import Shard, folder_of, shards
+from jobs.dataset import Shard, fingerprint_of, folder_of, shards
 from jobs.measurements import bench_tasks
 from jobs.recipe import ModelRecipe, Recipe
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
 from pipeline.models.options import VERSIONS
 from pipeline.training.options import VERSION as TRAINING_VERSION
+from reports.options import VERSION as BENCH_VERSION
 
 SECONDS_A_QUERY: Final = {"woven": 4.5e-6, "neumip": 3e-6}
 """Forward and backward pass of one query, on one core of a server of 2021."""
@@ -26,7 +27,8 @@ def plan(recipe: Recipe) -> list[Task]:
     parts = shards(recipe)
     trained = {model.options.name: train_tasks(recipe, model, parts) for model in recipe.models if model.learns}
     trainings = [task for tasks in trained.values() for task in tasks.values()]
-    return [*(part.task for part in parts), *trainings, *bench_tasks(recipe, parts, trained)]
+    benches = list(bench_tasks(recipe, parts, trained))
+    return [*(part.task for part in parts), *trainings, *benches, _report_task(recipe, parts, trained, benches)]
 
 
 def train_tasks(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Task]:
@@ -36,6 +38,63 @@ def train_tasks(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> d
     else:
         groups = {"": [fabric.name for fabric in (*recipe.seen, *recipe.population)]}
     return {alone_on: _train_task(model, names, alone_on, parts) for alone_on, names in groups.items()}
+
+
+def _report_task(
+    recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]], benches: Sequence[Task]
+) -> Task:
+    """Return the task that writes the page of all measurements."""
+    pictures = []
+    for task in benches:
+        make, fabric = task.setting["make"], task.setting.get("fabric", "")
+        if make in recipe.bench.scenes:
+            truth = {"fabric": fabric["name"], "scene": make, "method": "truth", "setting": ""}
+            pictures.append(truth | {"path": task.products[0]})
+        for setting, scenes in task.setting.get("pictures", {}).items():
+            method = {"fabric": fabric, "method": task.setting["model"]["model"], "setting": setting}
+            pictures += [method | {"scene": scene, "path": path} for scene, path in scenes.items()]
+    fabrics = [(fabric, "seen") for fabric in recipe.seen] + [(fabric, "unseen") for fabric in recipe.unseen]
+    return Task(
+        "report",
+        "page",
+        f"page of {recipe.name}",
+        {
+            "version": BENCH_VERSION,
+            "recipe": recipe.name,
+            "about": recipe.about,
+            "measured": [task.id for task in benches],
+            "fabrics": [[fabric.name, fabric.source] for fabric, _ in fabrics],
+        },
+        (f"report/{recipe.name}/index.html",),
+        tuple(task.id for task in benches),
+        cost=15.0,
+        size=10_000_000,
+        setting={
+            "dataset": f"{recipe.name}, {fingerprint_of(parts)}",
+            "fabrics": [(fabric.model_dump(mode="json"), role) for fabric, role in fabrics],
+            "models": [_note(model, trained.get(model.options.name, {})) for model in recipe.models],
+            "options": recipe.bench.model_dump(mode="json"),
+            "records": [task.products[0] for task in benches if task.products[0].endswith(".json")],
+            "timing": benches[-1].products[0],
+            "pictures": pictures,
+        },
+    )
+
+
+def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
+    """Return what the page says of a model."""
+    options, training = model.options, model.training
+    about = "nothing is trained"
+    if trainings:
+        first = next(iter(trainings.values()))
+        what = "each fabric by itself" if model.of_one_material else f"{len(first.spec['fabrics'])} fabrics at once"
+        about = f"{what}, {training.steps:,} steps of {training.batch:,} queries"
+    return {
+        "name": options.model,
+        "about": about,
+        "fingerprint": " ".join(task.id for task in trainings.values()),
+        "per_material": model.of_one_material,
+    }
 
 
 def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Sequence[Shard]) -> Task:

@@ -60,6 +60,12 @@ def _bench(task: Task, out: Path, progress: Progress) -> None:
     }.get(task.setting["make"], measuring.picture)(task, out, progress)
 
 
+def _report(task: Task, out: Path, progress: Progress) -> None:
+    from jobs.measuring import page
+
+    page(task, out, progress)
+
+
 def model_options(table: Mapping[str, Any]) -> Any:
     """Return the option class that a model's table describes."""
     from pydantic import TypeAdapter
@@ -73,4 +79,5 @@ RUNNERS: Final[dict[Stage, Callable[[Task, Path, Progress], None]]] = {
     "generate": _generate,
     "train": _train,
     "bench": _bench,
+    "report": _report,
 }

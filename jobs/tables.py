@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -96,6 +97,15 @@ def summary_table(tasks: Sequence[Task], ran: Mapping[str, float]) -> Table:
     return table
 
 
+def methods_table(frame: Any) -> Table:
+    """Show a benchmark condensed to one row a method (a DataFrame from `reports.summary.summary_table`)."""
+    names = list(frame.columns)
+    table = _table("method", *names, right=names)
+    for (method, setting), *values in frame.itertuples():
+        table.add_row(f"{method} {setting}".strip(), *(_number(value) for value in values))
+    return table
+
+
 def duration(seconds: float) -> str:
     """Write a time as a person would say it."""
     if seconds < 120:
@@ -121,6 +131,13 @@ def _size(count: float) -> str:
             return f"{count:.3g} {unit}"
         count /= 1000
     return f"{count:.3g} TB"
+
+
+def _number(value: float) -> str:
+    """Write a measured number with three digits; a missing one as a dash."""
+    if value != value:
+        return "–"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 def _value(value: object) -> str:

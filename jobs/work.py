@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -13,7 +14,7 @@ from jobs.ledger import Ledger
 from jobs.plan import plan
 from jobs.recipe import load_recipe
 from jobs.stages import compile_kernels, run
-from jobs.tables import summary_table
+from jobs.tables import methods_table, summary_table
 from jobs.task import Stage
 from weaves.errors import WorkFailed
 
@@ -49,8 +50,21 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
         console.print(f"nothing to do: {len(chosen)} tasks done")
     else:
         console.print(summary_table(chosen, {task.id: ledger.seconds(task) for task in summary.ran}))
+    page = next(task for task in tasks if task.stage == "report")
+    if "report" in stages and ledger.state(page) == "done":
+        console.print()
+        console.print(methods_table(summary_of([out / path for path in page.setting["records"]])))
+        console.print(f"\nthe page: {(out / page.products[0]).resolve()}", soft_wrap=True)
     if summary.failed:
         first, *others = summary.failed
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
         raise WorkFailed(f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}`")
+
+
+def summary_of(records: Sequence[Path]) -> Any:
+    """Return the benchmark's summary, one row a method, from the files of its records."""
+    from reports.record import read_records
+    from reports.summary import summary_table as condensed
+
+    return condensed(read_records(records))

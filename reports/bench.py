@@ -72,8 +72,10 @@ def measure_errors(
         provenance=provenance or Provenance(),
     )
     records = subject.of_error(colour_error(values, truth, colours(cloth)))
-    relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS)}
+    relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
     relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
+    black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
+    records.append(subject.of("zero_answers", float(black.mean()), len(black)))
     # A component that is nowhere seen has no relative error.
     records += [subject.of(name, e.relative_rmse, e.count) for name, e in relative.items() if e.mean > 0]
     return records

@@ -6,19 +6,20 @@ A method has one colour everywhere. Filled marks are fabrics seen in training, o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullFormatter, NullLocator
 
 from reports.aliasing import HALF_NYQUIST
 from reports.record import TRUTH
 from reports.style import Scheme, display, new_figure
-from reports.summary import BASELINE, PAPER
+from reports.summary import BASELINE, PAPER, rows
 
 _ROLES: Final = ("seen", "unseen")
 
@@ -42,7 +43,7 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
             single = _values(fabrics, role, method, setting)
             axes.scatter(single, np.full(len(single), row), s=16, color=colours[method], alpha=0.3, linewidths=0)
             found = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
-            for mean in _rows(found):
+            for mean in rows(found):
                 _mark(axes, mean.mse, row, colours[method], role, xerr=_bounds(mean.mse, mean.low, mean.high))
         noise = table.loc[table["role"] == role, "truth_noise"].mean()
         axes.axvline(noise, color=scheme.muted, linewidth=0.9, linestyle=(0, (4, 3)))
@@ -73,18 +74,21 @@ def error_against_time(scheme: Scheme, table: pd.DataFrame, timing: pd.DataFrame
     for axes, role in zip(panels, roles, strict=True):
         joined = table[table["role"] == role].merge(timing, on=["method", "setting"])
         joined = joined[joined["mse"] > 0]
-        points = list(zip(joined["median_ns"], joined["mse"], strict=True))
-        front = sorted(p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points))
+        costs = list(zip(joined["median_ns"], joined["mse"], strict=True))
+        front = sorted(p for p in costs if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in costs))
         axes.plot(*zip(*front, strict=True), color=scheme.muted, linewidth=1.0, zorder=1) if front else None
-        for row in _rows(joined):
+        for row in rows(joined):
             spread = _bounds(row.median_ns, row.first_quartile_ns, row.third_quartile_ns)
             _mark(axes, row.median_ns, row.mse, colours[row.method], role, xerr=spread)
-            label = row.setting.removeprefix("k = ") if row.setting.startswith("k = ") else display(row.method)
+            points = row.setting.startswith("k = ")
             axes.annotate(
-                label, (row.median_ns, row.mse), xytext=(7, 5), textcoords="offset points", fontsize=9,
-                color=colours[row.method],
+                row.setting.removeprefix("k = ") if points else display(row.method, row.setting),
+                (row.median_ns, row.mse), xytext=(-8, -8) if points else (6, 6), textcoords="offset points",
+                ha="right" if points else "left", va="top" if points else "bottom", fontsize=9,
+                fontweight="normal" if points else "bold", color=colours[row.method],
+                path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)],
             )  # fmt: skip
-        for row in _rows(joined[joined["setting"] == BASELINE]):
+        for row in rows(joined[joined["setting"] == BASELINE]):
             _paper_arrow(axes, scheme, row.median_ns, row.mse)
         axes.set(
             title=f"{role.capitalize()} fabrics", xlabel="time of a query, ns (one process, side by side)",
@@ -106,7 +110,7 @@ def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
         threshold = 10 ** math.floor(math.log10(smallest)) if math.isfinite(smallest) else 1e-6
         axes.set_xscale("symlog", linthresh=max(threshold, 1e-5))
         axes.axvline(0, color=scheme.muted, linewidth=1.0)
-        for found in _rows(table):
+        for found in rows(table):
             row = methods.index((found.method, found.setting))
             value = getattr(found, column)
             axes.plot([0, value], [row, row], color=colours[found.method], linewidth=1.6, alpha=0.35)
@@ -127,19 +131,22 @@ def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[floa
         "counted as aliasing where it exceeds the truth", (HALF_NYQUIST, 0.98), xytext=(6, 0),
         xycoords=("data", "axes fraction"), textcoords="offset points", va="top", fontsize=8, color=scheme.muted,
     )  # fmt: skip
+    labels = []
     for (method, setting), curve in sorted(curves.items(), key=lambda item: item[0][0] == TRUTH):
         points = np.array([point for point in curve if point[1] > 0])
         if not len(points):
             continue
         is_truth = method == TRUTH
         axes.plot(*points.T, color=colours[method], linewidth=2.6 if is_truth else 1.3, alpha=1 if is_truth else 0.85)
-        axes.annotate(
-            setting.removeprefix("k = ") or display(method), tuple(points[-1]), xytext=(5, 0),
-            textcoords="offset points", va="center", fontsize=8.5, color=colours[method],
-            fontweight="bold" if is_truth else "normal",
-        )  # fmt: skip
+        labels.append((points[-1][1], setting.removeprefix("k = ") or display(method), method))
+    # Labels stand at the ends of their curves, moved up where they would touch.
+    lowest, step = 0.0, (max(end for end, _, _ in labels) / min(end for end, _, _ in labels)) ** (1 / 22)
+    for end, label, method in sorted(labels):
+        lowest = max(end, lowest * step)
+        weight = "bold" if method == TRUTH else "normal"
+        axes.annotate(label, (0.505, lowest), va="center", fontsize=8.5, color=colours[method], fontweight=weight)
     axes.set(
-        xlim=(0, 0.56), yscale="log", xlabel="frequency, cycles a pixel",
+        xlim=(0, 0.55), yscale="log", xlabel="frequency, cycles a pixel",
         ylabel="power over the truth's squared mean", xticks=[0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5],
     )  # fmt: skip
     axes.yaxis.set_minor_formatter(NullFormatter())
@@ -151,7 +158,7 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     methods = _methods(table)
     figure, (axes,) = new_figure(9.2, 1.0 + 0.3 * len(methods))
     colours = scheme.colours(table["method"])
-    for row, found in enumerate(_rows(table)):
+    for row, found in enumerate(rows(table)):
         colour = colours[found.method]
         spread = _bounds(found.median_ns, found.first_quartile_ns, found.third_quartile_ns)
         _mark(axes, found.median_ns, row, colour, "seen", xerr=spread)
@@ -164,11 +171,6 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     axes.grid(axis="y", visible=False)
     _name_rows(axes, methods)
     return figure
-
-
-def _rows(table: pd.DataFrame) -> Iterator[Any]:
-    """Iterate over rows as tuples named by the columns."""
-    return iter(table.itertuples())
 
 
 def _methods(table: pd.DataFrame) -> list[tuple[str, str]]:

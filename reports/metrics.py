@@ -84,7 +84,7 @@ def squared_error(
     return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
 
 
-def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats) -> Error:
+def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resamples: int = 500) -> Error:
     """Return the mean squared error in colour.
 
     Parameters
@@ -95,9 +95,11 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats) -> Er
         The truth's.
     colours : float64 (4, channels)
         Colour of each component: `pipeline.scenes.shade.colours`, or `COLOUR_WEIGHTS`.
+    resamples : int
+        As in `squared_error`.
     """
     truth = answers.mean.astype(np.float64) @ colours
-    return squared_error(np.asarray(values, np.float64) @ colours, truth, colour_noise(answers, colours))
+    return squared_error(np.asarray(values, np.float64) @ colours, truth, colour_noise(answers, colours), resamples)
 
 
 def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:

@@ -29,7 +29,7 @@ class BenchOptions(BaseModel):
     """Views that every fabric is shown in."""
     sphere_size: tuple[Side, Side] = (192, 192)
     """Width and height of the sphere's picture, in pixels."""
-    plane_size: tuple[Side, Side] = (272, 192)
+    plane_size: tuple[Side, Side] = (240, 160)
     """Width and height of the plane's picture, in pixels."""
     view: ViewOptions = ViewOptions()
     """Camera, light and scale."""
@@ -42,11 +42,11 @@ class BenchOptions(BaseModel):
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
     rows: int = Field(default=16_384, ge=64)
     """Most held-out queries a fabric used for the errors."""
-    frames: int = Field(default=8, ge=3, le=1024)
+    frames: int = Field(default=6, ge=3, le=1024)
     """Frames of the moving plane, for aliasing."""
-    frame_size: tuple[Side, Side] = (96, 72)
+    frame_size: tuple[Side, Side] = (80, 60)
     """Width and height of those frames, in pixels."""
-    timing_rows: int = Field(default=16_384, ge=64)
+    timing_rows: int = Field(default=8192, ge=64)
     """Queries in one timed call."""
     timing_repeats: int = Field(default=25, ge=20, le=10_000)
     """Timed calls of each method, interleaved with those of the others."""

@@ -71,7 +71,7 @@ def render_method(
     _write(path, gbuffer, picture, about)
     reference = read_exr(truth)
     lit = gbuffer.lit
-    error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit])
+    error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit], resamples=0)
     subject = Record(
         method=method.name,
         setting=method.setting,

@@ -42,6 +42,7 @@ Metric = Literal[
     "rrmse_specular_weft",
     "rrmse_diffuse_warp",
     "rrmse_diffuse_weft",
+    "zero_answers",
     "truth_relative_error",
     "flicker",
     "motion",

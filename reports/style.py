@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from reports.record import TRUTH
 
 DPI: Final = 200
+NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def display(method: str, setting: str = "") -> str:
     """Return what a person calls a method."""
     known = {"neumip": "NeuMIP", "point_sampled": "points"}
     name = known.get(method, method.replace("_", " "))
-    return f"{name}, {setting}" if setting else name
+    return f"{name}, {setting.replace(' ', NO_BREAK)}" if setting else name
 
 
 def render(plot: Callable[..., Figure], scheme: Scheme, *data: Any) -> bytes:

@@ -7,8 +7,8 @@ sampling at 2 points on the very fabrics that the method covers; its interval is
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -32,10 +32,10 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
     mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
-    over the method's); colour_rrmse and the four rrmse_<component> (means over fabrics).
+    over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics).
     """
     wide = _wide(records, "queries")
-    rows = []
+    result = []
     for (method, setting, role), group in wide.groupby([*_KEYS, "role"], sort=False):
         mse, spread = _mean_error(group)
         base, base_spread = _mean_error(_baseline(wide, role, set(group["fabric"])))
@@ -47,10 +47,10 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
         row |= {"mse_measured": measured, "truth_noise": noise}
         row["noise_share"] = noise / measured if measured > 0 else math.nan
         row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
-        relative = ["colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+        relative = ["zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
         row |= {name: group[name].mean() if name in group else math.nan for name in relative}
-        rows.append(row)
-    return pd.DataFrame(rows)
+        result.append(row)
+    return pd.DataFrame(result)
 
 
 def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -66,10 +66,11 @@ def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
 
 def picture_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the MSE of the pictures: columns method, setting, fabric, scene, mse, mse_measured, truth_noise."""
-    parts = [_wide(records, scene) for scene in ("sphere", "plane")]
-    table = pd.concat([part[part["mse"].notna()] for part in parts if "mse" in part], ignore_index=True)
     columns = [*_KEYS, "role", "fabric", "scene", "mse", "mse_measured", "truth_noise"]
-    return table.reindex(columns=columns)
+    found = [part for part in (_wide(records, scene) for scene in ("sphere", "plane")) if "mse" in part]
+    if not found:
+        return pd.DataFrame(columns=columns)
+    return pd.concat([part[part["mse"].notna()] for part in found], ignore_index=True).reindex(columns=columns)
 
 
 def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -131,6 +132,11 @@ def summary_table(records: Sequence[Record]) -> pd.DataFrame:
         columns = {"median_ns": "ns/query", "time_ratio": "× time", "bytes_stored": "bytes"}
         parts.append(timing.set_index(_KEYS)[list(columns)].rename(columns=columns))
     return pd.concat(parts, axis=1) if parts else pd.DataFrame()
+
+
+def rows(table: pd.DataFrame) -> Iterator[Any]:
+    """Iterate over the rows of a table as tuples named by its columns."""
+    return iter(table.itertuples())
 
 
 def _wide(records: Sequence[Record], scene: str) -> pd.DataFrame:

@@ -17,8 +17,11 @@ from torch import Tensor
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-CHUNK = 16_384
-"""Rows inferred at a time: activations stay in the cache."""
+CHUNK = 4096
+"""Rows inferred at a time on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
+
+GPU_CHUNK = 2**18
+"""Rows inferred at a time on a GPU."""
 
 
 @runtime_checkable
@@ -92,7 +95,7 @@ class Network(Protocol):
 def in_chunks(
     queries: Queries, answer: Callable[[Tensor, Tensor, Tensor, Tensor, Tensor], Tensor], device: torch.device
 ) -> npt.NDArray[np.float32]:
-    """Answer queries CHUNK rows at a time, without gradients.
+    """Answer queries some rows at a time, without gradients.
 
     Parameters
     ----------
@@ -108,9 +111,10 @@ def in_chunks(
     float32 (N, 4)
     """
     result = np.empty((len(queries.u), 4), np.float32)
+    chunk = CHUNK if device.type == "cpu" else GPU_CHUNK
     with torch.inference_mode():
-        for start in range(0, len(result), CHUNK):
-            rows = slice(start, start + CHUNK)
+        for start in range(0, len(result), chunk):
+            rows = slice(start, start + chunk)
             # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
             tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in queries]
             result[rows] = answer(*tensors).numpy(force=True)

@@ -34,12 +34,13 @@ class WovenOptions(_Options):
     """Length of the material latent."""
     hidden: int = Field(default=128, ge=8, le=1024)
     """Width of the decoder's hidden layers; with latent 64 and 8 bins, 128 gives the published 86,660 parameters."""
-    map_texels: Literal[16, 32, 64, 128] = 64
+    map_texels: Literal[16, 32, 64, 128] = 32
     """Side of the square normal and tangent maps, which hold one repeat; the paper does not say."""
     encoder_channels: int = Field(default=16, ge=4, le=128)
     """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
-    one_blob: Literal["plain", "periodic"] = "periodic"
-    """How centres are encoded: `plain` as published, `periodic` wraps u and v at the repeat's edge."""
+    one_blob: Literal["plain", "periodic", "local"] = "local"
+    """How centres enter: `plain` as published; `periodic` wraps u and v at the repeat's edge; `local` encodes u and v
+    within their yarn and sees a picture of the repeat from the place asked about (an own change: see the model)."""
     bins: int = Field(default=8, ge=2, le=64)
     """One-blob bins for each of u, v and size; the published 24 values are 3 x 8."""
     smallest_size: float = Field(default=0.005, gt=0, le=0.1)
@@ -48,19 +49,23 @@ class WovenOptions(_Options):
     """Footprint, in repeats, at which the encoded size is 1; a Gaussian of one repeat already averages all of it."""
     spatial_fusion: bool = True
     """Merge latent and patch before the directions (the published design); otherwise all enter together."""
-    log_k: float = Field(default=10.0, gt=0, le=1e4)
+    log_k: float = Field(default=3.0, gt=0, le=1e4)
     """k of the specular space g(x) = ln(k x + 1)."""
     specular_weight: float = Field(default=1.0, ge=0, le=1e4)
     """Weight of the specular squared error, taken in log space."""
-    diffuse_weight: float = Field(default=10.0, ge=0, le=1e4)
+    diffuse_weight: float = Field(default=2.0, ge=0, le=1e4)
     """Weight of the diffuse squared error; equal weights starve it."""
+    standard: bool = True
+    """Bring every fabric into standard position first, so that mirror images need not be learnt."""
     roll: bool = True
-    """Roll maps by whole texels and shift u and v alike in training: cloth has no origin, and it costs no truth."""
+    """Begin the repeat at a random yarn in every training step: cloth has no origin, and no ground truth is spent."""
 
     @model_validator(mode="after")
     def _something_to_learn(self) -> WovenOptions:
         if self.specular_weight == 0 and self.diffuse_weight == 0:
             raise ValueError("specular_weight and diffuse_weight must not both be 0")
+        if self.one_blob == "local" and not self.spatial_fusion:
+            raise ValueError("one_blob = 'local' needs spatial_fusion")
         return self
 
 
@@ -89,11 +94,11 @@ class NeumipOptions(_Options):
     """Share of the training after which the offset texture is held fixed (published: 10,000 of 30,000 iterations)."""
     texture_rate: float = Field(default=10.0, gt=0, le=1000)
     """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""
-    log_k: float = Field(default=10.0, gt=0, le=1e4)
+    log_k: float = Field(default=3.0, gt=0, le=1e4)
     """k of the specular space g(x) = ln(k x + 1)."""
     specular_weight: float = Field(default=1.0, ge=0, le=1e4)
     """Weight of the specular squared error, taken in log space."""
-    diffuse_weight: float = Field(default=10.0, ge=0, le=1e4)
+    diffuse_weight: float = Field(default=2.0, ge=0, le=1e4)
     """Weight of the diffuse squared error."""
 
 

@@ -4,23 +4,30 @@ An encoder reads a fabric's normal and tangent maps over one repeat, and four pa
 it runs once a fabric. A decoder reads the latent, the patch P = (u, v, size) as one-blobs, and the directions, and
 answers with the four components, the specular ones in log space:
 
-    encoder   maps 6 x 64 x 64 -> residual convolutions, padded around the repeat -> 64
+    encoder   maps 6 x side x side -> residual convolutions, padded around the repeat -> 64
               + (alpha, beta) of both yarns -> 128 -> residual -> 64
     fusion    latent 64 + one-blob(P) 24 -> 128 -> 128 -> 64
     angular   + wi xyz + wo xy = 69 -> 128 -> residual -> 64 -> 4
 
 A residual block is two fully connected layers with the skip added before the last activation; a leaky ReLU follows
 every layer, the last one too. The paper's figure shows one layer less in the fusion, but its count of 86,660
-parameters is met exactly by one more layer 128 -> 128, placed here in the fusion. Own choices, for want of published
-ones: all of the encoder's maps part, the size's scale, and the training trick `roll` (see WovenOptions).
+parameters is met exactly by one more layer 128 -> 128, placed here in the fusion. Not published, so chosen here: the
+encoder of the maps (smaller than theirs, to be trained in minutes), the scale of the size, the training on all mirror
+images.
+
+OWN CHANGE, `one_blob = "local"`: as published, the decoder has to learn products of latent and place, and learns them
+so slowly that small footprints come out as the repeat's average. Here the encoder also gives a picture of the repeat,
+8 x 8 numbers, and the first layer sees it from the place asked about: its 128 filters are correlated with the picture
+around the repeat, and read at (u, v) through the footprint's own one-blobs. Both are the same for all queries of a
+fabric, so that this costs a query one product of 64 x 128 in place of the latent's, which moves into the bias. The 24
+one-blobs tell the place within the yarn. The decoder has 8,192 parameters more, the latent 64 numbers.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,10 +36,11 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.encodings import encoded_size, one_blob
+from pipeline.models.encodings import encoded_size, one_blob, periodic_blob
 from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, in_chunks, in_repeat
 from pipeline.models.options import WovenOptions
+from pipeline.models.placement import SYMMETRIES, Placement, placement, standard
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
@@ -40,6 +48,8 @@ from weaves.surface import surface_at
 _SLOPE = 0.01
 _PARAMETERS = 4
 _DIRECTIONS = 5
+_FUSED = 64
+_SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 
 def _activate(x: Tensor) -> Tensor:
@@ -71,50 +81,89 @@ class _MapBlock(nn.Module):
 
 
 class _Encoder(nn.Module):
-    """Maps (F, 6, side, side) and parameters (F, 4) to latents (F, latent)."""
+    """Maps (F, 6, side, side) and parameters (F, 4) to latents (F, latent), a picture appended if it is `local`."""
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
         channels = [6] + [options.encoder_channels * factor for factor in (1, 2, 4, 4)]
-        self.maps = nn.Sequential(*(_MapBlock(a, b) for a, b in itertools.pairwise(channels)))
-        flat = channels[-1] * (options.map_texels // 16) ** 2
+        self.maps = nn.ModuleList(_MapBlock(a, b) for a, b in itertools.pairwise(channels))
+        self.local, self.bins = options.one_blob == "local", options.bins
+        flat = channels[-1] if self.local else channels[-1] * (options.map_texels // 16) ** 2
         self.flat = nn.Linear(flat, options.latent)
         self.join = nn.Linear(options.latent + _PARAMETERS, options.hidden)
         self.mix = _Residual(options.hidden)
         self.last = nn.Linear(options.hidden, options.latent)
+        if self.local:
+            # Taken where the maps are as fine as the picture, or the next coarser.
+            self.depth = min(max((options.map_texels // options.bins).bit_length() - 1, 1), len(self.maps))
+            wide = channels[self.depth]
+            convolution = nn.Conv2d(wide, wide, 3, padding=1, padding_mode="circular")
+            self.picture = nn.Sequential(convolution, nn.LeakyReLU(_SLOPE), nn.Conv2d(wide, 1, 1))
 
     def forward(self, maps: Tensor, parameters: Tensor) -> Tensor:
-        x = _activate(self.flat(self.maps(maps).flatten(1)))
-        x = self.mix(_activate(self.join(torch.cat([x, parameters], dim=-1))))
-        return _activate(self.last(x))
+        finer = [maps]
+        for block in self.maps:
+            finer.append(block(finer[-1]))
+        # What lies where is the picture's part, if there is one; the rest is then the same wherever the repeat begins.
+        x = finer[-1].mean(dim=(2, 3)) if self.local else finer[-1].flatten(1)
+        x = _activate(self.join(torch.cat([_activate(self.flat(x)), parameters], dim=-1)))
+        x = _activate(self.last(self.mix(x)))
+        if self.local:
+            picture = functional.adaptive_avg_pool2d(self.picture(finer[self.depth]), self.bins)
+            x = torch.cat([x, _activate(picture.flatten(1))], dim=-1)
+        return x
 
 
 class _Decoder(nn.Module):
-    """Latents (F, latent), one-blobs (F, n, 3 bins), wi and wo (F, n, 3) to network space (F, n, 4)."""
+    """Latents and patches to network space: the published 86,660 parameters at the default widths."""
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
-        hidden, blobs = options.hidden, 3 * options.bins
-        self.fused = options.spatial_fusion
+        hidden, patch = options.hidden, 3 * options.bins
         self.latent = options.latent
-        first_in = options.latent + blobs + (0 if self.fused else _DIRECTIONS)
-        self.first = nn.Linear(first_in, hidden)
-        self.fusion = (
-            nn.ModuleList([nn.Linear(hidden, hidden), nn.Linear(hidden, 64), nn.Linear(64 + _DIRECTIONS, hidden)])
-            if self.fused
-            else nn.ModuleList()
-        )
+        self.first = nn.Linear(options.latent + patch + (0 if options.spatial_fusion else _DIRECTIONS), hidden)
+        self.filters: nn.Linear | None = None
+        if options.one_blob == "local":
+            self.filters = nn.Linear(options.bins**2, hidden, bias=False)
+            step = torch.arange(options.bins)
+            around = (step.unsqueeze(-1) + step) % options.bins
+            seen = around[:, None, :, None] * options.bins + around[None, :, None, :]
+            self.register_buffer("seen", seen.flatten(2).flatten(0, 1), persistent=False)
+            self.seen: Tensor
+        self.fusion: nn.ModuleList | None = None
+        if options.spatial_fusion:
+            layers = [nn.Linear(hidden, hidden), nn.Linear(hidden, _FUSED), nn.Linear(_FUSED + _DIRECTIONS, hidden)]
+            self.fusion = nn.ModuleList(layers)
         self.mix = _Residual(hidden)
-        self.narrow = nn.Linear(hidden, 64)
-        self.last = nn.Linear(64, 4)
+        self.narrow = nn.Linear(hidden, _FUSED)
+        self.last = nn.Linear(_FUSED, 4)
 
-    def forward(self, latent: Tensor, blobs: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
+    def forward(self, latent: Tensor, where: Tensor | None, patch: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
+        """Answer in network space, (F, n, 4).
+
+        Parameters
+        ----------
+        latent : Tensor (F, latent or latent + bins^2)
+            From the encoder.
+        where : Tensor (F, n, bins^2) or None
+            The footprint's share of every entry of the picture.
+        patch : Tensor (F, n, 3 bins)
+            One-blobs.
+        wi, wo : Tensor (F, n, 3)
+            Directions.
+        """
         directions = torch.cat([wi, wo[..., :2]], dim=-1)
-        patch = blobs if self.fused else torch.cat([blobs, directions], dim=-1)
-        # The latent is the same for all queries of a fabric: its part of the first layer is computed once.
-        of_fabric = functional.linear(latent, self.first.weight[:, : self.latent], self.first.bias)
-        x = _activate(functional.linear(patch, self.first.weight[:, self.latent :]) + of_fabric.unsqueeze(1))
-        if self.fused:
+        if self.fusion is None:
+            patch = torch.cat([patch, directions], dim=-1)
+        # What all queries of a fabric share is multiplied once.
+        weight = self.first.weight
+        x = functional.linear(patch, weight[:, self.latent :])
+        x = x + functional.linear(latent[:, : self.latent], weight[:, : self.latent], self.first.bias).unsqueeze(1)
+        if self.filters is not None:
+            responses = self.filters(latent[:, self.latent :][:, self.seen])
+            x = torch.baddbmm(x, where, responses)
+        x = _activate(x)
+        if self.fusion is not None:
             deeper, narrow, angular = self.fusion
             x = _activate(narrow(_activate(deeper(x))))
             x = _activate(angular(torch.cat([x, directions], dim=-1)))
@@ -122,15 +171,69 @@ class _Decoder(nn.Module):
         return _activate(self.last(x))
 
 
+class Cloth(NamedTuple):
+    """What the network reads of F fabrics, in standard position.
+
+    Attributes
+    ----------
+    maps : Tensor (F, 6, side, side)
+        Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x.
+    parameters : Tensor (F, 4)
+        alpha_warp, alpha_weft, beta_warp, beta_weft.
+    placement : Placement
+        How queries about the fabrics get there.
+    """
+
+    maps: Tensor
+    parameters: Tensor
+    placement: Placement
+
+    def take(self, index: Tensor) -> Cloth:
+        """Return the fabrics at `index`."""
+        return Cloth(self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement)))
+
+    def begun(self, shares: npt.NDArray[np.float64]) -> Cloth:
+        """Return the same cloth, each repeat begun elsewhere: `shares` (F, 2) of it to the left and downwards.
+
+        Queries follow exactly, maps to the nearest texel.
+        """
+        texels = np.rint(shares * self.maps.shape[-1]).astype(np.int64).tolist()
+        maps = [
+            torch.roll(one, (down, right), dims=(1, 2)) for one, (right, down) in zip(self.maps, texels, strict=True)
+        ]
+        start = self.placement.start - torch.from_numpy(shares.astype(np.float32)).to(self.maps.device)
+        return Cloth(torch.stack(maps), self.parameters, self.placement._replace(start=start))
+
+    def to(self, device: torch.device) -> Cloth:
+        """Return the same on a device."""
+        parts = (part.to(device) for part in self.placement)
+        return Cloth(self.maps.to(device), self.parameters.to(device), Placement(*parts))
+
+
+def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions) -> Cloth:
+    """Look at the surfaces of at least one fabric."""
+    centre = (np.arange(options.map_texels) + 0.5) / options.map_texels
+    maps, parameters, placements = [], [], []
+    for fabric in fabrics:
+        seen, symmetry, start = standard(fabric) if options.standard else (fabric, SYMMETRIES[0], (0, 0))
+        ends, picks = seen.weave.repeat
+        surface = surface_at(seen, centre[None, :] * ends, centre[:, None] * picks)
+        maps.append(np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1))
+        parameters.append([seen.warp.roughness, seen.weft.roughness, seen.warp.relief, seen.weft.relief])
+        placements.append(placement(fabric, symmetry, start))
+    together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
+    return Cloth(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
+
+
 class WovenNetwork(nn.Module):
-    """Encoder and decoder, with the maps of the fabrics it is trained on.
+    """Encoder and decoder, with the cloth it is trained on.
 
     Parameters
     ----------
     options : WovenOptions
         The design.
     fabrics : sequence of Fabric
-        Training fabrics, addressed by index in batches; empty for inference.
+        Training fabrics, addressed by index in batches; none for inference.
     """
 
     def __init__(self, options: WovenOptions, fabrics: Sequence[Fabric] = ()) -> None:
@@ -141,45 +244,66 @@ class WovenNetwork(nn.Module):
             if isinstance(layer, nn.Linear | nn.Conv2d) and layer.bias is not None:
                 nn.init.kaiming_normal_(layer.weight, a=_SLOPE)
                 nn.init.zeros_(layer.bias)
-        inputs = [encoder_inputs(fabric, options.map_texels) for fabric in fabrics]
-        maps = np.stack([maps for maps, _ in inputs]) if inputs else np.zeros((0, 6, 1, 1), np.float32)
-        parameters = np.stack([row for _, row in inputs]) if inputs else np.zeros((0, _PARAMETERS), np.float32)
-        repeats = np.array([fabric.weave.repeat for fabric in fabrics], np.float32).reshape(-1, 2)
-        for name, array in (("maps", maps), ("parameters_of", parameters), ("repeats", repeats)):
-            self.register_buffer(name, torch.from_numpy(array), persistent=False)
-        self.maps: Tensor
-        self.parameters_of: Tensor
-        self.repeats: Tensor
+        self._cloth = read_cloth(fabrics, options) if fabrics else None
 
-    def encode(self, maps: Tensor, parameters: Tensor) -> Tensor:
-        """Return the latents (F, latent) of maps (F, 6, side, side) and parameters (F, 4)."""
-        latents: Tensor = self.encoder(maps, parameters)
+    def encode(self, cloth: Cloth) -> Tensor:
+        """Return the latents (F, latent)."""
+        latents: Tensor = self.encoder(cloth.maps, cloth.parameters)
         return latents
 
-    def decode(self, latent: Tensor, u: Tensor, v: Tensor, size: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-        """Answer in network space (F, n, 4); u, v, size (F, n) are shares of the repeat."""
-        options = self.options
-        size = encoded_size(size, options.smallest_size, options.largest_size)
-        periodic = options.one_blob == "periodic"
-        blobs = [one_blob(x, options.bins, wraps) for x, wraps in ((u, periodic), (v, periodic), (size, False))]
-        output: Tensor = self.decoder(latent, torch.cat(blobs, dim=-1), wi, wo)
+    def decode(
+        self, latent: Tensor, placement: Placement, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor
+    ) -> Tensor:
+        """Answer in network space, for fabrics in standard position.
+
+        Parameters
+        ----------
+        latent : Tensor (F, latent)
+            From `encode`.
+        placement : Placement
+            Of the F fabrics.
+        u, v : Tensor (F, n)
+            Centres as shares of each fabric's own repeat.
+        sigma : Tensor (F, n)
+            Footprints, in yarn spacings.
+        wi, wo : Tensor (F, n, 3)
+            Directions.
+
+        Returns
+        -------
+        Tensor (F, n, 4)
+            Of the fabric in standard position: `placement.swap` gives the fabric's own.
+        """
+        u, v, wi, wo = placement.move(u, v, wi, wo)
+        options, bins, extent = self.options, self.options.bins, placement.repeat
+        size = sigma / extent.prod(dim=-1, keepdim=True).sqrt()
+        size = one_blob(encoded_size(size, options.smallest_size, options.largest_size), bins)
+        where: Tensor | None = None
+        if options.one_blob == "plain":
+            blobs = [one_blob(u, bins), one_blob(v, bins)]
+        elif options.one_blob == "periodic":
+            blobs = [periodic_blob(u, 1.0 / bins, bins), periodic_blob(v, 1.0 / bins, bins)]
+        else:
+            sharp, places = (_SHARPNESS / bins) ** 2, ((u, extent[:, :1]), (v, extent[:, 1:]))
+            column, row = (periodic_blob(x, (sharp + (sigma / period) ** 2).sqrt(), bins) for x, period in places)
+            where = (row.unsqueeze(-1) * column.unsqueeze(-2)).flatten(-2)
+            spread = (sharp + sigma.square()).sqrt()
+            blobs = [bins * periodic_blob(x * period, spread, bins) for x, period in places]
+        output: Tensor = self.decoder(latent, where, torch.cat([*blobs, size], dim=-1), wi, wo)
         return output
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""
-        options = self.options
-        maps, repeats = self.maps[batch.fabric], self.repeats[batch.fabric]
-        u, v = batch.u / repeats[:, :1], batch.v / repeats[:, 1:]
+        assert self._cloth is not None
+        self._cloth = self._cloth.to(batch.u.device)
+        cloth, options = self._cloth.take(batch.fabric), self.options
         if options.roll:
-            side = maps.shape[-1]
-            shifts = random.integers(side, size=(len(maps), 2))
-            maps = rolled(maps, shifts)
-            turn = torch.from_numpy(shifts.astype(np.float32) / side).to(u.device)
-            u, v = u + turn[:, :1], v + turn[:, 1:]
-        latent = self.encode(maps, self.parameters_of[batch.fabric])
-        size = batch.sigma / repeats.prod(dim=-1, keepdim=True).sqrt()
-        output = self.decode(latent, u - u.floor(), v - v.floor(), size, batch.wi, batch.wo)
-        target = to_network(batch.target, options.log_k)
+            repeat = cloth.placement.repeat.cpu().numpy().astype(np.float64)
+            cloth = cloth.begun(random.integers(repeat.astype(np.int64)) / repeat)
+        own = cloth.placement.own_repeat()
+        u, v = batch.u / own[:, :1], batch.v / own[:, 1:]
+        output = self.decode(self.encode(cloth), cloth.placement, u, v, batch.sigma, batch.wi, batch.wo)
+        target = to_network(cloth.placement.swap(batch.target), options.log_k)
         return weighted_error(output, target, options.specular_weight, options.diffuse_weight)
 
     def start_at(self, target: Tensor) -> None:
@@ -205,32 +329,6 @@ class WovenNetwork(nn.Module):
         return {"parameters": counts | {"total": sum(counts.values())}, "layers": layers}
 
 
-def encoder_inputs(fabric: Fabric, texels: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Return what the encoder reads of a fabric.
-
-    Returns
-    -------
-    maps : float32 (6, texels, texels)
-        Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x.
-    parameters : float32 (4,)
-        alpha_warp, alpha_weft, beta_warp, beta_weft.
-    """
-    ends, picks = fabric.weave.repeat
-    centre = (np.arange(texels) + 0.5) / texels
-    x, y = np.meshgrid(centre * ends, centre * picks)
-    surface = surface_at(fabric, x, y)
-    maps = np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1)
-    warp, weft = fabric.warp, fabric.weft
-    parameters = [warp.roughness, weft.roughness, warp.relief, weft.relief]
-    return np.ascontiguousarray(maps, np.float32), np.array(parameters, np.float32)
-
-
-def rolled(maps: Tensor, shifts: npt.NDArray[np.int64]) -> Tensor:
-    """Roll each map (F, C, rows, columns) by its own (columns, rows), towards larger x and y."""
-    pairs = zip(maps, shifts, strict=True)
-    return torch.stack([torch.roll(one, (int(down), int(right)), dims=(1, 2)) for one, (right, down) in pairs])
-
-
 class Woven:
     """A trained network that answers for any fabric; it encodes each once.
 
@@ -246,7 +344,7 @@ class Woven:
         self.name, self.setting = network.options.name, ""
         self._device = device or torch.device("cpu")
         self._network = network.eval().to(self._device)
-        self._latents: dict[str, Tensor] = {}
+        self._encoded: dict[str, tuple[Tensor, Placement]] = {}
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be encoded."""
@@ -254,16 +352,16 @@ class Woven:
 
     def prepare(self, fabric: Fabric) -> None:
         """Encode the fabric, once."""
-        self._latent(fabric)
+        self._encode(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used."""
-        latent, network = self._latent(fabric), self._network
-        side = math.sqrt(math.prod(fabric.weave.repeat))
+        network = self._network
+        latent, place = self._encode(fabric)
 
-        def answer(u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-            output = network.decode(latent, *(column.unsqueeze(0) for column in (u, v, sigma / side, wi, wo)))
-            return to_components(output[0], network.options.log_k)
+        def answer(*columns: Tensor) -> Tensor:
+            output = network.decode(latent, place, *(column.unsqueeze(0) for column in columns))
+            return to_components(place.swap(output)[0], network.options.log_k)
 
         return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
 
@@ -271,14 +369,13 @@ class Woven:
         """Return the bytes of the decoder and of the fabric's latent; the encoder is not needed to render."""
         return 4 * (sum(weight.numel() for weight in self._network.decoder.parameters()) + self._network.options.latent)
 
-    def _latent(self, fabric: Fabric) -> Tensor:
+    def _encode(self, fabric: Fabric) -> tuple[Tensor, Placement]:
         key = fingerprint(fabric.optics())
-        if key not in self._latents:
-            maps, parameters = encoder_inputs(fabric, self._network.options.map_texels)
+        if key not in self._encoded:
             with torch.inference_mode():
-                inputs = (torch.from_numpy(array).unsqueeze(0).to(self._device) for array in (maps, parameters))
-                self._latents[key] = self._network.encode(*inputs)
-        return self._latents[key]
+                cloth = read_cloth([fabric], self._network.options).to(self._device)
+                self._encoded[key] = self._network.encode(cloth), cloth.placement
+        return self._encoded[key]
 
 
 def build(options: WovenOptions, fabrics: Sequence[Fabric]) -> WovenNetwork:

@@ -27,10 +27,11 @@ class ViewOptions(BaseModel):
     """Pixels a yarn spacing takes at the centre of the sphere."""
     plane_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
     """Pixels a yarn spacing takes across the bottom row of the plane."""
-    horizon: float = Field(default=0.1, ge=0, le=0.9)
+    horizon: float = Field(default=0.02, ge=0, le=0.9)
     """Height of the picture above the plane's horizon, as a share."""
     largest_angle: float = Field(default=88.0, gt=0, le=89.9)
-    """Views more grazing than this, in degrees to the normal, show no cloth: there the truth needs too many points."""
+    """Views more grazing than this, in degrees to the normal, show no cloth: there the truth needs too many points. The
+    plane ends with the last whole row."""
     field_of_view: float = Field(default=50.0, gt=1, le=120)
     """Angle the plane's picture spans from left to right, in degrees."""
     turn: float = Field(default=24.0, ge=-180, le=180)

@@ -27,7 +27,7 @@ relative_error = 0.05
 
 [[models]]
 model = "woven"
-latent = 32
+hidden = 32
 [models.training]
 steps = 10
 

@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-import jobs.cli
+import jobs.work
 from jobs.cli import main
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import write_shard
 from pipeline.truth.query import Answers
+from reports.exr import read_exr
 from weaves.errors import WorkFailed
 from weaves.fabric import load_fabric
+from weaves.surface import surface_at
 
 
 @pytest.fixture
@@ -50,6 +52,17 @@ def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
     code, text, _ = twillight("status", "smoke")
     assert code == 0 and "generate     0       0       14" in text
     assert not list(tmp_path.iterdir())
+
+
+def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
+    code, text, _ = twillight("show", "denim", "--out", "shown")
+    names = ["denim-drawdown.png", "denim-height.png", "denim-normals.png", "denim-maps.exr"]
+    assert code == 0 and all(name in text for name in names)
+    assert sorted(path.name for path in (tmp_path / "shown").iterdir()) == sorted(names)
+    maps = read_exr(tmp_path / "shown" / "denim-maps.exr")
+    geometry = surface_at(load_fabric("denim"), np.array([1.5 / 64]), np.array([2.5 / 64]))
+    assert maps.channels["height"][-3, 1] == pytest.approx(geometry.height[0], abs=1e-6)
+    assert maps.stack("normal.X", "normal.Y", "normal.Z")[-3, 1] == pytest.approx(geometry.normal[0], abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +112,7 @@ def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code
     def burst(*arguments, **options):
         raise error
 
-    monkeypatch.setattr(jobs.cli, "app", burst)
+    monkeypatch.setattr(jobs.work, "work", burst)
     assert words in complaint(twillight("run", "quick", "--out", "products"), code)
     crashes = list((tmp_path / "products").glob("crash-*.txt"))
     assert len(crashes) == isinstance(error, ZeroDivisionError)

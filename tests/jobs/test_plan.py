@@ -54,7 +54,7 @@ def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
 
 def test_without_a_model_of_one_material_the_unseen_fabric_has_no_training_rows(files):
     tasks = edited(files, '[[models]]\nmodel = "neumip"\n', "")
-    assert {task.spec["split"] for task in tasks if "twill_4_4" in task.title} == {"test"}
+    assert {task.spec["split"] for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,47 @@ def test_more_rows_keep_the_shards_that_are_full(files, tasks):
 def test_where_and_how_often_a_training_is_saved_is_not_its_identity(files, tasks):
     after = edited(files, "steps = 10", 'steps = 10\ndevice = "cpu"\ncheckpoint_every = 7')
     assert ids(after, "train") == ids(tasks, "train")
-    assert ids(edited(files, "latent = 32", "latent = 16"), "train", "woven") != ids(tasks, "train", "woven")
+    assert ids(edited(files, "hidden = 32", "hidden = 16"), "train", "woven") != ids(tasks, "train", "woven")
+
+
+def test_a_colour_changes_what_is_shown_of_its_fabric_and_no_training(files, tasks):
+    after = edited(files, 'diffuse = "#804020"', 'diffuse = "#0000ff"')
+    assert ids(after, "train") == ids(tasks, "train")
+    assert set(ids(after, "bench", "own")).isdisjoint(ids(tasks, "bench", "own"))
+    for other in ("denim", "twill_4_4"):
+        assert ids(after, "bench", other) == ids(tasks, "bench", other)
+
+
+def test_truth_of_pictures_is_shared_by_all_models_and_data_sets(files, tasks):
+    pictures = ids(tasks, "bench", "truth of ")
+    assert len(pictures) == 3 * 3
+    assert ids(edited(files, "hidden = 32", "hidden = 16"), "bench", "truth of ") == pictures
+    assert ids(edited(files, "seed = 3", "seed = 4"), "bench", "truth of ") == pictures
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "truth of denim, sphere") == pictures[:1]
+
+
+def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tasks):
+    measured = {task.title: task for task in tasks if task.stage == "bench"}
+    for fabric in ("denim", "own", "twill_4_4"):
+        for method, trainings in (("woven", ids(tasks, "train", "woven")), ("point_sampled", [])):
+            assert measured[f"{method} on {fabric}"].spec["models"] == trainings
+        neumip = measured[f"neumip on {fabric}"]
+        assert neumip.spec["models"] == ids(tasks, "train", f"neumip on {fabric}")
+        assert set(ids(tasks, "generate", f"{fabric} test")) < set(neumip.needs)
+    assert [task.title for task in tasks if task.alone] == ["timing of all methods"]
+    assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
+
+
+def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):
+    after = edited(files, "frames = 4", "frames = 4\ntiming_repeats = 21")
+    changed = {task.id for task in after} ^ {task.id for task in tasks}
+    touched = [key for one in (tasks, after) for key in ids(one, "bench", "timing") + ids(one, "report")]
+    assert changed == set(touched)
+
+
+def test_no_two_tasks_write_one_file(tasks):
+    products = [path for task in tasks for path in task.products]
+    assert len(set(products)) == len(products)
 
 
 def test_the_full_plan_is_paper_sized():

@@ -59,7 +59,7 @@ def test_a_recipe_of_ones_own(files):
         ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
         ('model = "woven"', "", ["models.0.model is missing"]),
-        ("latent = 32", "latnet = 32", ["models.0.latnet = 32", "did you mean 'latent'"]),
+        ("hidden = 32", "hiden = 32", ["models.0.hiden = 32", "did you mean 'hidden'"]),
         ("steps = 10", "stepps = 10", ["models.0.training.stepps = 10", "did you mean 'steps'"]),
         ("counts = [1, 2]", "[models.training]", ["models.2", "nothing to train"]),
         ('model = "neumip"', 'model = "neumip"\nname = "woven"', ["models = 'woven'", "names must differ"]),

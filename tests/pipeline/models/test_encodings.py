@@ -3,45 +3,65 @@ import math
 import numpy as np
 import pytest
 import torch
+from scipy.stats import norm
 
-from pipeline.models.encodings import encoded_size, one_blob
+from pipeline.models.encodings import encoded_size, one_blob, periodic_blob
 
 
-def test_periodic_blob_always_sums_to_one():
+def numbers(seed):
+    return torch.rand(256, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+
+
+@pytest.mark.parametrize("deviation", [0.05, 0.125, 0.4, 5.0, 1e20])
+def test_periodic_blob_always_sums_to_one(deviation):
     x = torch.linspace(-2.0, 3.0, 1001)
-    torch.testing.assert_close(one_blob(x, 8, periodic=True).sum(dim=-1), torch.ones(1001), rtol=0, atol=2e-6)
+    torch.testing.assert_close(periodic_blob(x, deviation, 8).sum(dim=-1), torch.ones(1001), rtol=0, atol=2e-6)
 
 
 def test_periodic_blob_does_not_see_whole_turns():
-    x = torch.rand(256, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    x = numbers(1)
     for turns in (-3, 1, 7):
-        torch.testing.assert_close(one_blob(x + turns, 8, True), one_blob(x, 8, True), rtol=0, atol=1e-12)
+        torch.testing.assert_close(periodic_blob(x + turns, 0.1, 8), periodic_blob(x, 0.1, 8), rtol=0, atol=1e-12)
 
 
 def test_periodic_blob_turns_with_its_argument():
     """Moving x by one bin moves the code by one bin, around the edge too."""
-    x = torch.rand(256, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
-    moved = one_blob(x + 1 / 8, 8, True)
-    # The Gaussian is cut at half a turn, four standard deviations: 6e-5 of it is on the other side.
-    torch.testing.assert_close(moved, one_blob(x, 8, True).roll(1, dims=-1), rtol=0, atol=1e-4)
+    x = numbers(2)
+    moved = periodic_blob(x + 1 / 8, 0.1, 8)
+    torch.testing.assert_close(moved, periodic_blob(x, 0.1, 8).roll(1, dims=-1), rtol=0, atol=1e-12)
+
+
+def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
+    """The series ends at m = 7; at the deviation 1/8 what is left out is e^{-2 pi^2} = 3e-9."""
+    x, deviation = numbers(3)[:16], 1 / 8
+    edges = np.linspace(0, 1, 9)
+    images = [np.diff(norm.cdf(edges + k, loc=x[:, None], scale=deviation), axis=-1) for k in range(-3, 4)]
+    np.testing.assert_allclose(periodic_blob(x, deviation, 8), np.sum(images, axis=0), atol=1e-8)
+
+
+def test_every_number_has_its_own_width():
+    x, deviations = numbers(4)[:3], torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
+    together = periodic_blob(x, deviations, 8)
+    for index in range(3):
+        torch.testing.assert_close(together[index], periodic_blob(x[index], float(deviations[index]), 8))
+
+
+def test_wide_blobs_fill_all_bins_alike():
+    torch.testing.assert_close(periodic_blob(numbers(5), 3.0, 8), torch.full((256, 8), 1 / 8, dtype=torch.float64))
 
 
 def test_plain_blob_holds_the_integral_of_a_gaussian_over_each_bin():
-    from scipy.stats import norm
-
-    x, bins = 0.3, 8
-    edges = np.linspace(0, 1, bins + 1)
-    expected = np.diff(norm.cdf(edges, loc=x, scale=1 / bins))
-    np.testing.assert_allclose(one_blob(torch.tensor([x]), bins, False)[0], expected, atol=1e-6)
+    expected = np.diff(norm.cdf(np.linspace(0, 1, 9), loc=0.3, scale=1 / 8))
+    np.testing.assert_allclose(one_blob(torch.tensor([0.3]), 8)[0], expected, atol=1e-6)
 
 
 def test_plain_blob_loses_half_at_an_edge():
-    torch.testing.assert_close(one_blob(torch.tensor([0.0, 1.0]), 8, False).sum(-1), torch.full((2,), 0.5))
+    torch.testing.assert_close(one_blob(torch.tensor([0.0, 1.0]), 8).sum(-1), torch.full((2,), 0.5))
 
 
 def test_plain_and_periodic_agree_far_from_the_edges():
     x = torch.tensor([0.5])
-    torch.testing.assert_close(one_blob(x, 8, False), one_blob(x, 8, True), rtol=0, atol=1e-4)
+    torch.testing.assert_close(one_blob(x, 8), periodic_blob(x, 1 / 8, 8), rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize(("sigma", "expected"), [(1e-9, 0.0), (0.01, 0.0), (0.1, 0.5), (1.0, 1.0), (1e9, 1.0)])

@@ -6,6 +6,7 @@ from pipeline.models.method import Batch, Method
 from pipeline.models.options import WovenOptions
 from pipeline.models.woven import Woven, WovenNetwork, encoder_inputs, rolled
 from pipeline.truth.query import Queries
+from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
 SMALL = WovenOptions(map_texels=16, encoder_channels=4)
@@ -31,10 +32,16 @@ def test_decoder_stores_the_published_bytes(twill):
     assert method.bytes_stored(twill) == 4 * (86_660 + 64)  # 0.35 MB
 
 
-def test_design_options_change_the_design():
-    plain = WovenNetwork(SMALL).architecture()
-    assert WovenNetwork(SMALL.model_copy(update={"spatial_fusion": False})).architecture() != plain
-    assert WovenNetwork(SMALL.model_copy(update={"bins": 4})).architecture() != plain
+def test_every_way_to_enter_the_patch_has_the_published_decoder():
+    for one_blob in ("plain", "periodic", "local"):
+        network = WovenNetwork(WovenOptions(one_blob=one_blob, map_texels=16, encoder_channels=4))
+        assert network.architecture()["parameters"]["decoder"] == 86_660
+
+
+def test_fusion_can_be_left_out():
+    counts = WovenNetwork(WovenOptions(one_blob="periodic", spatial_fusion=False)).architecture()["parameters"]
+    layers = (64 + 24 + 5 + 1) * 128, 2 * (128 + 1) * 128, (128 + 1) * 64, (64 + 1) * 4
+    assert counts["decoder"] == sum(layers)
 
 
 def test_encoder_reads_unit_normals_at_the_right_place(twill):
@@ -56,29 +63,51 @@ def test_rolled_maps_are_the_maps_of_the_moved_cloth(twill):
     moved = rolled(torch.from_numpy(maps)[None], np.array([[8, 24]]))[0].numpy()  # columns, rows
     np.testing.assert_array_equal(moved[:, (3 + 24) % 32, (30 + 8) % 32], maps[:, 3, 30])
     np.testing.assert_array_equal(np.roll(maps, (24, 8), axis=(1, 2)), moved)
+    # The twill repeats after four yarns: 24 texels of 32 are three picks, 8 are one end.
+    rolled_draft = Matrix(rows=tuple(twill.weave.rolled(1, 3).rows()))
+    np.testing.assert_allclose(
+        encoder_inputs(twill.model_copy(update={"draft": rolled_draft}), 32)[0], moved, atol=1e-6
+    )
 
 
-def test_roll_moves_maps_and_centres_alike(twill):
-    """The loss of a rolled batch is that of the cloth with its draft rolled, asked at the moved centre."""
-    network = WovenNetwork(SMALL, [twill])
-    ends, picks = twill.weave.repeat
-    n = 8
+class Fixed:
+    """Stand in for a generator: symmetry 0, then a repeat begun at column and row `begin`."""
+
+    def __init__(self, *begin):
+        self.answers = [np.array([0]), np.array([begin])]
+
+    def integers(self, bound, size=None):
+        return self.answers.pop(0)
+
+
+@pytest.mark.parametrize("one_blob", ["periodic", "local"])
+def test_augmented_cloth_answers_alike(one_blob, twill):
+    """The loss of a batch begun at another yarn is that of the fabric with its draft rolled, asked at the moved centre.
+
+    The twill's four yarns on 16 texels: a yarn is four texels, so that rolled maps are exact.
+    """
+    options = SMALL.model_copy(update={"one_blob": one_blob})
+    network = WovenNetwork(options, [twill])
     generator = torch.Generator().manual_seed(5)
-    u, v = (torch.rand(1, n, generator=generator) * side for side in (ends, picks))
-    wi = torch.nn.functional.normalize(torch.rand(1, n, 3, generator=generator) + 0.1, dim=-1)
-    batch = Batch(torch.tensor([0]), u, v, torch.full((1, n), 0.5), wi, wi, torch.rand(1, n, 4, generator=generator))
+    u, v, angle = (torch.rand(1, 8, generator=generator) for _ in range(3))
+    wi = torch.stack([0.6 * angle.cos(), 0.6 * angle.sin(), torch.full_like(angle, 0.8)], dim=-1)
+    target = torch.rand(1, 8, 4, generator=generator)
+    batch = Batch(torch.tensor([0]), 4 * u, 4 * v, torch.full((1, 8), 0.5), wi, wi, target)
+    augmented = network.loss(batch, Fixed(1, 3))
 
-    class Fixed:
-        def integers(self, side, size):
-            return np.array([[3, 5]])
-
-    loss = network.loss(batch, Fixed())
-
-    still = WovenNetwork(SMALL.model_copy(update={"roll": False}), [twill])
+    rows = twill.weave.rolled(1, 3).rows()
+    elsewhere = twill.model_copy(update={"draft": Matrix(rows=tuple(rows))})
+    still = WovenNetwork(options.model_copy(update={"augment": False}), [elsewhere])
     still.load_state_dict(network.state_dict())
-    still.maps = rolled(still.maps, np.array([[3, 5]]))
-    moved = batch._replace(u=(u + 3 / 16 * ends) % ends, v=(v + 5 / 16 * picks) % picks)
-    torch.testing.assert_close(still.loss(moved, Fixed()), loss, rtol=1e-5, atol=1e-6)
+    moved = batch._replace(u=(4 * u + 1) % 4, v=(4 * v + 3) % 4)
+    torch.testing.assert_close(still.loss(moved, np.random.default_rng(0)), augmented, rtol=1e-5, atol=1e-6)
+    assert network.loss(batch, Fixed(0, 0)).item() != pytest.approx(augmented.item(), rel=1e-6)
+
+
+def test_large_footprints_see_no_place(twill):
+    """Far above one repeat, the `local` network answers the same wherever it is asked."""
+    answers = Woven(WovenNetwork(SMALL)).predict(twill, queries([0.1, 1.7, 3.2], [2.2, 0.4, 3.9], 50.0))
+    np.testing.assert_allclose(answers, np.broadcast_to(answers[:1], answers.shape), rtol=1e-5)
 
 
 def test_predictions_repeat_with_the_cloth(twill):

@@ -95,7 +95,7 @@ def test_sphere_is_conformal():
 
 
 def test_plane_goes_from_resolved_yarns_to_many_repeats():
-    options = ViewOptions(turn=0.0, largest_sigma=1e6, largest_angle=89.9)
+    options = ViewOptions(turn=0.0, horizon=0.1, largest_sigma=1e6, largest_angle=89.9)
     gbuffer = view("plane", 320, 224, options=options)
     u, sigma = spread(gbuffer, gbuffer.u), spread(gbuffer, gbuffer.sigma)
     assert u[-1, 1:] - u[-1, :-1] == pytest.approx(1 / 6)
@@ -103,18 +103,24 @@ def test_plane_goes_from_resolved_yarns_to_many_repeats():
     top = np.flatnonzero(gbuffer.lit.any(axis=1))[0]
     assert abs(top - 0.1 * 224) <= 1
     assert np.nanmin(sigma[top]) > 100
-    assert np.nanmax(view("plane", 320, 224).sigma) == ViewOptions().largest_sigma
+    assert view("plane", 320, 224, options=ViewOptions(largest_sigma=4.0)).sigma.max() == 4.0
 
 
 def test_plane_camera_sees_along_the_ray():
     """Oracle: the angle of a pixel's view below the horizontal is pitch plus its angle in the picture."""
-    gbuffer = view("plane", 101, 81, options=FLAT)
+    gbuffer = view("plane", 101, 81, options=ViewOptions(turn=0.0, horizon=0.1))
     wo = spread(gbuffer, gbuffer.wo)
     focal = 50.5 / math.tan(math.radians(25.0))
     pitch = math.atan(0.4 * 81 / focal)
     for row in (30, 40, 80):
         below = pitch + math.atan((row + 0.5 - 40.5) / focal)
         assert wo[row, 50] == pytest.approx([0, -math.cos(below), math.sin(below)], abs=1e-12)
+
+
+def test_plane_ends_with_a_whole_row():
+    gbuffer = view("plane", 96, 72, options=ViewOptions(largest_angle=80.0))
+    assert (gbuffer.mask.any(axis=1) == gbuffer.mask.all(axis=1)).all()
+    assert gbuffer.wo[:, 2].min() >= math.cos(math.radians(80.0))
 
 
 @pytest.mark.parametrize("scene", ["sphere", "plane"])

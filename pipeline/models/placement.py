@@ -1,0 +1,156 @@
+"""Standard position: what all shifts, mirror images and turns of a cloth have in common.
+
+A repeat may begin at any yarn; the mirror image of a fabric is a fabric, and so is one with warp and weft exchanged by
+the mirror x = y. What these fabrics answer follows from the first one's answers: the mirrors x -> -x, y -> -y and x = y
+generate the eight symmetries of the square, each mirror reverses the twist, and the exchange swaps the components of
+warp and weft. A network that sees each cloth in one standard position only, its queries moved with it, obeys all this
+exactly, and need not spend weights, rows and time on learning it.
+
+Standard is the position whose draft, read pick by pick, is the smallest binary number (True = warp over = 1); among
+equals the one with the smallest numbers of its warp, then of its weft.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from weaves.draft import Draft, Matrix
+from weaves.fabric import Fabric
+from weaves.yarn import Yarn
+
+
+class Symmetry(NamedTuple):
+    """Mirrors applied one after the other."""
+
+    mirror_x: bool
+    """x becomes -x."""
+    mirror_y: bool
+    """y becomes -y."""
+    exchange: bool
+    """x and y change places, and with them warp and weft; after the other two."""
+
+
+SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i in range(8))
+"""All eight; the first changes nothing."""
+
+
+class Placement(NamedTuple):
+    """How F fabrics are brought into standard position.
+
+    Attributes
+    ----------
+    mirror : bool (F, 2)
+        Mirrors of x and of y.
+    exchange : bool (F, 1)
+        Whether x and y change places afterwards.
+    start : float (F, 2)
+        Where the standard repeat begins after that, as shares of it.
+    repeat : float (F, 2)
+        Extent of the standard repeat in x and y, in yarn spacings.
+    """
+
+    mirror: Tensor
+    exchange: Tensor
+    start: Tensor
+    repeat: Tensor
+
+    def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return what the fabrics in standard position are asked.
+
+        Parameters
+        ----------
+        u, v : Tensor (F, n)
+            Centres as shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
+        wi, wo : Tensor (F, n, 3)
+            Directions.
+        """
+        sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
+        u, v = u * sign[..., 0], v * sign[..., 1]
+        u, v = (
+            torch.where(self.exchange, v, u) - self.start[:, :1],
+            torch.where(self.exchange, u, v) - self.start[:, 1:],
+        )
+        order, swap = [1, 0, 2], self.exchange.unsqueeze(-1)
+        wi, wo = wi * sign, wo * sign
+        return _share(u), _share(v), torch.where(swap, wi[..., order], wi), torch.where(swap, wo[..., order], wo)
+
+    def swap(self, components: Tensor) -> Tensor:
+        """Take components (F, n, 4) from a fabric to its standard position, or back."""
+        return torch.where(self.exchange.unsqueeze(-1), components[..., [1, 0, 3, 2]], components)
+
+    def own_repeat(self) -> Tensor:
+        """Return the extents of the fabrics' own repeats, (F, 2)."""
+        return torch.where(self.exchange, self.repeat.flip(-1), self.repeat)
+
+
+def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
+    """Bring a fabric into standard position.
+
+    Returns
+    -------
+    fabric : Fabric
+        The fabric in standard position.
+    symmetry : Symmetry
+        What is applied first.
+    start : tuple of int
+        End and pick of the result at which the standard repeat begins.
+    """
+    best = min((*_smallest(moved(fabric, symmetry)), symmetry) for symmetry in SYMMETRIES)
+    *_, (pick, end), symmetry = best
+    image = moved(fabric, symmetry)
+    return _with_draft(image, np.roll(image.weave.warp_over, (-pick, -end), axis=(0, 1))), symmetry, (end, pick)
+
+
+def moved(fabric: Fabric, symmetry: Symmetry) -> Fabric:
+    """Return the fabric that a symmetry makes of a fabric; its repeat begins where the old one's image does."""
+    matrix, warp, weft = fabric.weave.warp_over, fabric.warp, fabric.weft
+    matrix = matrix[:, ::-1] if symmetry.mirror_x else matrix
+    matrix = matrix[::-1] if symmetry.mirror_y else matrix
+    if symmetry.exchange:
+        matrix, warp, weft = ~matrix.T, weft, warp
+    if sum(symmetry) % 2:
+        warp, weft = _other_handed(warp), _other_handed(weft)
+    return _with_draft(fabric.model_copy(update={"warp": warp, "weft": weft}), matrix)
+
+
+def placement(fabric: Fabric, symmetry: Symmetry, start: tuple[int, int]) -> Placement:
+    """Return the placement of one fabric, F = 1, that `standard` found."""
+    ends, picks = fabric.weave.repeat
+    repeat = (picks, ends) if symmetry.exchange else (ends, picks)
+    return Placement(
+        mirror=torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
+        exchange=torch.tensor([[symmetry.exchange]]),
+        start=torch.tensor([[start[0] / repeat[0], start[1] / repeat[1]]]),
+        repeat=torch.tensor([repeat], dtype=torch.float32),
+    )
+
+
+def _smallest(fabric: Fabric) -> tuple[bytes, list[float], tuple[int, int]]:
+    """Return the smallest draft among all beginnings, the yarns' numbers, and pick and end where it begins."""
+    matrix = fabric.weave.warp_over
+    picks, ends = matrix.shape
+    windows = np.lib.stride_tricks.sliding_window_view(np.tile(matrix, (2, 2)), matrix.shape)[:picks, :ends]
+    numbers = np.packbits(windows.reshape(picks * ends, -1), axis=-1)
+    index = min(range(picks * ends), key=lambda row: numbers[row].tobytes())
+    return numbers[index].tobytes(), _numbers(fabric.warp) + _numbers(fabric.weft), divmod(index, ends)
+
+
+def _numbers(yarn: Yarn) -> list[float]:
+    return [yarn.roughness, yarn.bend, yarn.twist, yarn.relief, yarn.width, yarn.blend]
+
+
+def _other_handed(yarn: Yarn) -> Yarn:
+    return yarn.model_copy(update={"twist": -yarn.twist})
+
+
+def _with_draft(fabric: Fabric, matrix: np.typing.NDArray[np.bool_]) -> Fabric:
+    return fabric.model_copy(update={"draft": Matrix(rows=tuple(Draft(matrix).rows()))})
+
+
+def _share(x: Tensor) -> Tensor:
+    """Reduce to [0, 1); rounding can reach 1, which periodic encodings do not mind and plain ones see as the edge."""
+    return x - x.floor()

@@ -1,0 +1,191 @@
+"""Numbers as the page prints them: rows of cells, already worded."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports.record import TRUTH, Record
+from reports.style import display
+from reports.summary import BASELINE, COMPONENTS, rows
+from reports.tiles import EXPOSURE, hex_colour
+from reports.wording import learnt
+from weaves.fabric import Fabric
+
+Row = dict[str, Any]
+NONE = "–"
+
+
+def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, list[Row]]:
+    """Return the rows of the error table by role."""
+    result: dict[str, list[Row]] = {}
+    for row in rows(errors):
+        known = row.role == "unseen" and row.method in per_material
+        result.setdefault(row.role, []).append(
+            {
+                "method": row.method,
+                "label": display(row.method, row.setting) + (" *" if known else ""),
+                "baseline": row.setting == BASELINE,
+                "cells": [
+                    scientific(row.mse),
+                    f"{scientific(row.low)} … {scientific(row.high)}",
+                    percent(row.noise_share),
+                    times(row.ratio) if row.setting != BASELINE else "1",
+                    _interval(row.ratio_low, row.ratio_high) if row.setting != BASELINE else NONE,
+                    fixed(row.colour_rrmse),
+                    *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
+                ],
+            }
+        )
+    return result
+
+
+def fabric_rows(table: pd.DataFrame) -> dict[str, Any]:
+    """Return the MSE of every method on every fabric; the lowest of a row is marked."""
+    labels = [column for column in table.columns if column not in ("role", "fabric")]
+    lines = []
+    for record in table.to_dict("records"):
+        values = [record[label] for label in labels]
+        best = min((v for v in values if not _missing(v)), default=math.nan)
+        cells = [{"text": scientific(value), "best": value == best} for value in values]
+        lines.append({"fabric": plain(record["fabric"]), "role": record["role"], "cells": cells})
+    return {"labels": [display(*_split(label)) for label in labels], "rows": lines}
+
+
+def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str, Any]:
+    """Return the rows of the aliasing table, and the variance that the motion itself brings."""
+    motion = [record.value for record in records if record.metric == "motion"]
+    lines: dict[tuple[str, str], Row] = {}
+    for row in rows(aliasing):
+        key = (row.method, row.setting)
+        found = lines.setdefault(key, {"method": row.method, "label": display(*key), "by_role": {}})
+        found["baseline"] = row.setting == BASELINE
+        found["by_role"][row.role] = [signed(row.flicker), signed(row.excess_energy)]
+    return {
+        "rows": list(lines.values()),
+        "roles": list(dict.fromkeys(aliasing["role"])) if len(aliasing) else [],
+        "motion": scientific(float(np.mean(motion))) if motion else NONE,
+    }
+
+
+def timing_rows(timing: pd.DataFrame) -> list[Row]:
+    """Return the rows of the timing table."""
+    return [
+        {
+            "method": row.method,
+            "label": display(row.method, row.setting),
+            "baseline": row.setting == BASELINE,
+            "cells": [
+                f"{row.median_ns:,.0f}",
+                f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",
+                times(row.time_ratio),
+                NONE if row.method == TRUTH else size(row.bytes_stored),
+            ],
+        }
+        for row in rows(timing)
+    ]
+
+
+def figures_of_merit(records: Sequence[Record], errors: pd.DataFrame, timing: pd.DataFrame) -> list[Row]:
+    """Return the few numbers at the head of the page, of the first learnt method and of the truth."""
+    result = []
+    methods = learnt(errors) if len(errors) else []
+    if methods:
+        method, setting = methods[0]
+        for row in rows(errors[(errors["method"] == method) & (errors["setting"] == setting)]):
+            if not _missing(row.ratio):
+                fabrics = "fabric" if row.fabrics == 1 else "fabrics"
+                note = f"MSE of 2 points over that of {display(method, setting)}, {row.fabrics} {row.role} {fabrics}"
+                result.append({"value": times(row.ratio), "note": note, "paper": "paper: 4.1×"})
+        cost = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
+        if len(cost) and not _missing(cost.iloc[0]):
+            note = f"time of a query of {display(method, setting)} over that of 2 points"
+            result.append({"value": times(float(cost.iloc[0])), "note": note, "paper": "paper: 0.83×"})
+    truth = [record.value for record in records if record.metric == "truth_relative_error"]
+    if truth:
+        note = "relative standard error of the truth: median over queries, mean over fabrics"
+        result.append({"value": percent(float(np.mean(truth)), 2), "note": note, "paper": ""})
+    return result
+
+
+def fabric_card(fabric: Fabric, role: str) -> Row:
+    """Return what the gallery says of a fabric."""
+    ends, picks = fabric.weave.repeat
+    yarns = []
+    for family, yarn in (("warp", fabric.warp), ("weft", fabric.weft)):
+        numbers = [
+            f"{yarn.bend:g}°",
+            f"{yarn.twist:g}°".replace("-", "−"),
+            f"{yarn.roughness:g}",
+            f"{yarn.relief:g}",
+            f"{yarn.width:g}",
+        ]
+        colours = [hex_colour([EXPOSURE * c for c in rgb]) for rgb in (yarn.diffuse_rgb, yarn.specular_rgb)]
+        yarns.append({"family": family, "cells": numbers, "colours": colours})
+    return {
+        "name": fabric.name,
+        "title": plain(fabric.name),
+        "role": role,
+        "weave": fabric.weave.name,
+        "repeat": f"{ends} ends × {picks} picks",
+        "source": fabric.source,
+        "yarns": yarns,
+    }
+
+
+def plain(name: str) -> str:
+    """Return a fabric's name as words: ``wool gabardine``, ``twill 4/4``."""
+    return re.sub(r"(?<=\d)_(?=\d)", "/", name).replace("_", " ")
+
+
+def scientific(value: float | None) -> str:
+    """Return ``2.62e-3``."""
+    if _missing(value):
+        return NONE
+    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    return f"{mantissa}e{int(exponent)}".replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """Return a number with its sign; 0 has none."""
+    return NONE if _missing(value) else ("+" if value > 0 else "") + scientific(value)
+
+
+def times(value: float) -> str:
+    """Return ``4.1×``."""
+    return NONE if _missing(value) else f"{value:.2g}×" if value < 10 else f"{value:,.0f}×"
+
+
+def percent(value: float, digits: int = 1) -> str:
+    """Return ``1.5 %``."""
+    return NONE if _missing(value) else f"{100 * value:.{digits}f} %"
+
+
+def fixed(value: float) -> str:
+    """Return ``.123``."""
+    return NONE if _missing(value) else f"{value:.3f}".removeprefix("0")
+
+
+def size(value: float) -> str:
+    """Return bytes in the unit that suits them."""
+    if _missing(value):
+        return NONE
+    return f"{value:,.0f} B" if value < 1e3 else f"{value / 1e3:,.1f} kB" if value < 1e6 else f"{value / 1e6:,.2f} MB"
+
+
+def _interval(low: float, high: float) -> str:
+    return NONE if _missing(low) else f"{low:.2g} … {high:.2g}"
+
+
+def _missing(value: float | None) -> bool:
+    return value is None or not math.isfinite(value)
+
+
+def _split(label: str) -> tuple[str, str]:
+    method, _, setting = label.partition(" ")
+    return method, setting

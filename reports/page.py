@@ -1,0 +1,224 @@
+"""The page: one folder with ``index.html``, its figures and its tables, which needs nothing else.
+
+The same input gives the same bytes. Figures are written first and the page last: a page that exists is whole.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from pipeline.atomic import atomic_write
+from pipeline.scenes.options import Scene
+from reports import cells, figures, summary, tiles
+from reports.exr import read_exr
+from reports.options import BenchOptions
+from reports.record import TRUTH, Machine, Record, Role, to_table
+from reports.style import DARK, LIGHT, display, render
+from reports.wording import DEFINITIONS, caveats, headline, learnt
+from weaves.fabric import Fabric
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A picture that was rendered."""
+
+    fabric: str
+    scene: Scene
+    method: str
+    """``truth`` for the reference."""
+    setting: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class ModelNote:
+    """What the page says of a method."""
+
+    name: str
+    about: str
+    """In a few words: what it is and how it was trained."""
+    fingerprint: str = ""
+    """Of the trained model."""
+    per_material: bool = False
+    """Whether it learns each fabric by itself."""
+
+
+@dataclass(frozen=True)
+class PageInput:
+    """Everything a page is made of."""
+
+    recipe: str
+    about: str
+    fingerprint: str
+    """Of the recipe."""
+    dataset: str
+    """Name and fingerprint of the data set."""
+    fabrics: Sequence[tuple[Fabric, Role]]
+    models: Sequence[ModelNote]
+    options: BenchOptions
+    records: Sequence[Record]
+    machine: Machine
+    """Where the times were taken."""
+    pictures: Sequence[PictureFile]
+
+
+@dataclass
+class _Strip:
+    """One view of one fabric by every method."""
+
+    fabric: str
+    role: str
+    scene: str
+    cells: list[dict[str, str]] = field(default_factory=list)
+
+
+def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] = lambda fraction: None) -> Path:
+    """Write a page into `folder` and return the path of ``index.html``.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if need be.
+    page : PageInput
+        What was measured.
+    progress : callable
+        Told the share that is done.
+
+    Raises
+    ------
+    BadInput
+        If a picture is missing, or the folder cannot be written.
+    """
+    tables = {
+        "records": to_table(page.records),
+        "errors": summary.error_table(page.records),
+        "errors_by_fabric": summary.fabric_table(page.records),
+        "pictures": summary.picture_table(page.records),
+        "aliasing": summary.aliasing_table(page.records),
+        "timing": summary.timing_table(page.records),
+    }
+    for name, table in tables.items():
+        write_table(folder / "tables" / name, table)
+    progress(0.1)
+    images = dict(_plots(tables, page.records))
+    for name, content in images.items():
+        atomic_write(folder / "figures" / name, content)
+    progress(0.4)
+    for done, (name, content) in enumerate(_tiles(page)):
+        atomic_write(folder / "figures" / name, content)
+        progress(0.4 + 0.6 * min(1.0, (done + 1) / (2 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
+    index = folder / "index.html"
+    atomic_write(index, _html(page, tables, {name.removesuffix("-light.png") for name in images}).encode())
+    return index
+
+
+def write_table(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as ``path.csv`` and ``path.parquet``; equal tables give equal bytes."""
+    atomic_write(path.with_suffix(".csv"), table.to_csv(index=False, lineterminator="\n").encode())
+    buffer = io.BytesIO()
+    table.to_parquet(buffer, index=False, compression="zstd")
+    atomic_write(path.with_suffix(".parquet"), buffer.getvalue())
+
+
+def _plots(tables: dict[str, pd.DataFrame], records: Sequence[Record]) -> Iterator[tuple[str, bytes]]:
+    """Draw every plot that there are numbers for, in both schemes."""
+    errors, timing, aliasing = tables["errors"], tables["timing"], tables["aliasing"]
+    curves = summary.spectra(records)
+    plots: dict[str, tuple[Any, ...]] = {}
+    if len(errors):
+        plots["errors"] = (figures.errors, errors, tables["errors_by_fabric"])
+    if len(errors) and len(timing):
+        plots["error-against-time"] = (figures.error_against_time, errors, timing)
+    if len(aliasing):
+        plots["aliasing"] = (figures.aliasing, aliasing)
+    if curves:
+        plots["spectra"] = (figures.spectra, curves)
+    if len(timing):
+        plots["timing"] = (figures.timing, timing)
+    for name, (plot, *data) in plots.items():
+        for scheme in (LIGHT, DARK):
+            yield f"{name}-{scheme.name}.png", render(plot, scheme, *data)
+
+
+def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
+    """Draw every picture, every difference, and the maps of every fabric."""
+    truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.pictures if p.method == TRUTH}
+    for file in page.pictures:
+        exr = truths[file.fabric, file.scene] if file.method == TRUTH else read_exr(file.path)
+        yield f"{_stem(file)}.png", tiles.picture(exr)
+        if file.method != TRUTH:
+            yield f"{_stem(file)}-difference.png", tiles.difference(exr, truths[file.fabric, file.scene])
+    for fabric, _ in page.fabrics:
+        for kind, draw in (("drawdown", tiles.drawdown), ("height", tiles.height), ("normals", tiles.normals)):
+            yield f"{fabric.name}-{kind}.png", draw(fabric)
+    spheres = [exr for (_, scene), exr in truths.items() if scene == "sphere"]
+    if spheres:
+        yield "overview.png", tiles.overview(spheres, columns=-(-len(spheres) // 2))
+
+
+def _html(page: PageInput, tables: dict[str, pd.DataFrame], plots: set[str]) -> str:
+    errors, timing = tables["errors"], tables["timing"]
+    per_material = [note.name for note in page.models if note.per_material]
+    environment = Environment(
+        loader=PackageLoader("reports"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    fabrics = [cells.fabric_card(fabric, role) for fabric, role in page.fabrics]
+    shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
+    return environment.get_template("page.html.j2").render(
+        page=page,
+        headlines=_headlines(errors, timing),
+        figures_of_merit=cells.figures_of_merit(page.records, errors, timing),
+        errors=cells.error_rows(errors, per_material),
+        by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
+        aliasing=cells.aliasing_rows(tables["aliasing"], page.records),
+        timing=cells.timing_rows(timing),
+        strips=_strips(page, tables["pictures"]),
+        fabrics=fabrics,
+        shown=shown,
+        plots=plots,
+        definitions=DEFINITIONS,
+        caveats=caveats(page.options, per_material, errors),
+        colours={scheme.name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for scheme in (LIGHT, DARK)},
+        schemes={"light": LIGHT, "dark": DARK},
+        difference_range=tiles.DIFFERENCE_RANGE,
+        table_names=sorted(tables),
+    )
+
+
+def _headlines(errors: pd.DataFrame, timing: pd.DataFrame) -> list[str]:
+    """Return a sentence for each learnt method; the first quotes the paper."""
+    result: list[str] = []
+    for key in learnt(errors) if len(errors) else []:
+        if text := headline(*key, errors, timing, paper=not result):
+            result.append(text)
+    return result
+
+
+def _strips(page: PageInput, pictures: pd.DataFrame) -> list[_Strip]:
+    """Return the views, each with the truth first."""
+    mse = {(row.fabric, row.scene, row.method, row.setting): row.mse for row in summary.rows(pictures)}
+    strips: dict[tuple[str, str], _Strip] = {}
+    roles = {fabric.name: role for fabric, role in page.fabrics}
+    for file in sorted(page.pictures, key=lambda file: file.method != TRUTH):
+        strip = strips.setdefault((file.fabric, file.scene), _Strip(file.fabric, roles[file.fabric], file.scene))
+        value = mse.get((file.fabric, file.scene, file.method, file.setting))
+        cell = {"stem": _stem(file), "method": file.method, "label": display(file.method, file.setting)}
+        strip.cells.append(cell | {"mse": cells.scientific(value)})
+    order = {fabric.name: index for index, (fabric, _) in enumerate(page.fabrics)}
+    return sorted(strips.values(), key=lambda strip: (order[strip.fabric], page.options.scenes.index(strip.scene)))
+
+
+def _stem(file: PictureFile) -> str:
+    words = [file.fabric, file.scene, file.method, *file.setting.replace("=", "").split()]
+    return "-".join(words)

@@ -1,0 +1,123 @@
+"""The words of a page: its headline sentences, what every column means, and what the numbers do not say.
+
+Nothing is claimed that was not measured: a sentence is only made where both of its numbers exist.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import pandas as pd
+
+from pipeline.scenes.options import ViewOptions
+from reports.options import BenchOptions
+from reports.record import TRUTH
+from reports.style import display
+from reports.summary import BASELINE, PAPER, rows
+from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
+
+DEFINITIONS: Final = {
+    "MSE": "Mean squared error in linear RGB of the fabric's own colours, over held-out queries and channels, the "
+    "noise of the truth subtracted: MSE as measured minus noise. The truth's error is independent of the method's, "
+    "so this estimates the method's own error. A row is the mean over its fabrics, each weighing alike.",
+    "95 % interval": "Of the MSE, from the spread over queries. It says nothing of other fabrics or other trainings.",
+    "noise": "Mean squared standard error of the truth in the same colours, as its estimator states it, as a share of "
+    "the MSE as measured. The standard error of every component is a column of the data set; components are taken to "
+    "be uncorrelated.",
+    "× lower": "MSE of point sampling at 2 points over the method's, on the very fabrics that the method covers, with "
+    "a 95 % interval (delta method). Above 1 the method is better.",
+    "colour": "Relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft): root of the MSE over the mean of the "
+    "truth, mean over fabrics; the same colour for every fabric.",
+    "S warp, S weft, C warp, C weft": "Relative RMSE of each component: specular and diffuse, warp and weft.",
+    "flicker": "Temporal variance of the receding plane's luminance while the cloth slides by less than a pixel a "
+    "frame, minus the truth's own, over the truth's squared mean. 0 is the truth; below 0 the method shows less of the "
+    "motion than there is. Random methods draw new points in every frame.",
+    "excess energy": "Power of the receding plane beyond half the Nyquist frequency (Hann window, mean over frames) "
+    "minus the truth's, over the truth's squared mean. 0 is the truth.",
+    "ns a query": "Median time of one query, everything included, of calls that take turns in one process after a "
+    "warm-up; quartiles beside it.",
+    "× time": "That time over the time of point sampling at 2 points.",
+    "bytes stored": "What a renderer keeps to answer for one fabric: weights and textures, or tables; mean over "
+    "fabrics.",
+}
+"""Column by column, for the page."""
+
+
+def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
+    """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print."""
+    found = errors[(errors["method"] == method) & (errors["setting"] == setting) & errors["ratio"].notna()]
+    parts = [(_comparison(row.ratio), _fabrics(row.fabrics, row.role)) for row in rows(found)]
+    if not parts:
+        return ""
+    (first, where), *others = parts
+    more = "".join(f" and {ratio} on {fabrics}" for ratio, fabrics in others)
+    times = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
+    cost = f", at {times.iloc[0]:.2g}× its time" if len(times) and math.isfinite(times.iloc[0]) else ""
+    lower, faster = PAPER
+    name = display(method, setting)
+    said = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
+    return f"{said}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{said}."
+
+
+def learnt(errors: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the methods that are not point sampling."""
+    keys = dict.fromkeys(zip(errors["method"], errors["setting"], strict=True))
+    baseline = {method for method, setting in keys if setting == BASELINE}
+    return [key for key in keys if key[0] not in baseline and key[0] != TRUTH]
+
+
+def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataFrame) -> list[str]:
+    """Return what a reader must know before quoting a number."""
+    view = options.view
+    notes = [
+        "The conditions of the published table (data set, ranges, training, footprints) are not known. Our ratios are "
+        "the paper's comparison repeated on this project's own ground truth, not a reproduction of its numbers.",
+        "The truth is that of the model: yarns as bent, twisted cylinders, one layer of fibres scattering once, plus a "
+        "diffuse lobe; reflection only. It is not a measurement of real cloth.",
+        "Times are those of this machine and of code called from Python, a batch of queries at a time; the paper's are "
+        "of a GPU renderer. Only ratios within one column mean anything.",
+        "One training, one seed: how much another training would differ was not measured.",
+        _footprint_note(view),
+        f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
+        f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
+        f"in full colour from ±{DIFFERENCE_RANGE:.0%} of the truth's mean.",
+    ]
+    black = errors[(errors["setting"] == BASELINE) & (errors["zero_answers"] > 0)] if len(errors) else errors
+    if len(black):
+        share = float(black["zero_answers"].mean())
+        notes.append(
+            f"Point sampling at 2 points answers 0 for {share:.0%} of the queries: all its points are hidden from the "
+            "viewer, and the formula gives no value there. Drawing on until a point is seen would cost time and lower "
+            "its error."
+        )
+    if per_material:
+        names = " and ".join(display(name) for name in per_material)
+        notes.append(
+            f"{names} learns every fabric by itself, so no fabric is unseen to it; its rows stand for comparison."
+        )
+    return notes
+
+
+def _footprint_note(view: ViewOptions) -> str:
+    axis = {
+        "major": "its longer axis: it blurs towards the horizon, and the truth itself does not alias",
+        "geometric_mean": "the geometric mean of its axes: the truth is sharper, and shows moiré of its own",
+    }[view.footprint]
+    return (
+        "Footprints are round, as in the papers. A pixel of the pictures is an ellipse on the cloth; the round one "
+        f"takes {axis}. Views beyond {view.largest_angle:g}° to the normal are left out."
+    )
+
+
+def _comparison(ratio: float) -> str:
+    return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}" if value < 100 else f"{value:,.0f}"
+
+
+def _fabrics(count: int, role: str) -> str:
+    return f"the {role} fabric" if count == 1 else f"the {count} {role} fabrics"

@@ -1,0 +1,144 @@
+"""A small benchmark made of stand-ins: two fabrics, the truth as a method, and point sampling."""
+
+import pytest
+
+from pipeline.shards.generate import ShardTask, generate_shard
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.truth.estimator import PointSampler, estimate
+from pipeline.truth.options import TruthOptions
+from reports.options import BenchOptions
+from reports.record import Record
+from reports.summary import COMPONENTS
+from weaves.fabric import load_fabric
+
+COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)
+
+OPTIONS = BenchOptions(
+    sphere_size=(32, 32),
+    plane_size=(40, 32),
+    frames=3,
+    frame_size=(32, 24),
+    truth=COARSE,
+    frame_truth=COARSE,
+    timing_rows=64,
+    timing_repeats=20,
+    warm_up=1,
+)
+
+
+class Points:
+    """The baseline, without the package that will hold it."""
+
+    name = "point_sampled"
+
+    def __init__(self, count):
+        self.count, self.setting = count, f"k = {count}"
+        self.samplers = {}
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        self.samplers[fabric.name] = PointSampler(fabric)
+
+    def predict(self, fabric, queries, seed=0):
+        return self.samplers[fabric.name].sample(queries, self.count, seed)
+
+    def bytes_stored(self, fabric):
+        return 1000 * self.count
+
+
+class Oracle(Points):
+    """The truth itself, with other random numbers; knows denim alone."""
+
+    name = "oracle"
+
+    def __init__(self):
+        super().__init__(0)
+        self.setting = ""
+
+    def covers(self, fabric):
+        return fabric.name == "denim"
+
+    def predict(self, fabric, queries, seed=0):
+        fine = TruthOptions(relative_error=0.05, min_count=512, max_count=1024)
+        return estimate(fabric, queries, fine, seed + 1).mean
+
+
+@pytest.fixture(scope="session")
+def options():
+    return OPTIONS
+
+
+@pytest.fixture(scope="session")
+def points():
+    return [Points(count) for count in (1, 2, 16)]
+
+
+@pytest.fixture(scope="session")
+def oracle():
+    return Oracle()
+
+
+@pytest.fixture(scope="session")
+def dataset(tmp_path_factory):
+    """A data set of held-out rows alone: (manifest, folder)."""
+    folder = tmp_path_factory.mktemp("dataset")
+    truth = TruthOptions(relative_error=0.05, max_count=1024)
+    fabrics = {name: load_fabric(name) for name in ("denim", "twill_4_4")}
+    entries = []
+    for name, fabric in fabrics.items():
+        task = ShardTask(fabric=fabric, split="test", start=0, rows=400, seed=1, truth=truth)
+        generate_shard(task, folder / f"{name}.parquet")
+        entries.append(
+            ShardEntry(file=f"{name}.parquet", fabric=name, split="test", start=0, rows=400, sha256="0" * 64)
+        )
+    manifest = Manifest(
+        name="tiny",
+        fingerprint="0123456789abcdef",
+        roles={"seen": ["denim"], "population": [], "unseen": ["twill_4_4"]},
+        fabrics=fabrics,
+        about={"truth": truth.model_dump(mode="json")},
+        shards=entries,
+    )
+    return manifest, folder
+
+
+METHODS = [("woven", ""), ("neumip", ""), *(("point_sampled", f"k = {k}") for k in (1, 2, 4, 16, 64))]
+
+
+@pytest.fixture(scope="session")
+def made_up():
+    """Records of a whole benchmark with numbers from formulas: points fall as 1/k and cost k."""
+    records = []
+    fabrics = [("denim", "seen"), ("basket", "seen"), ("twill_4_4", "unseen")]
+    for index, (method, setting) in enumerate(METHODS):
+        count = float(setting.removeprefix("k = ") or 9)
+        for scale, (fabric, role) in enumerate(fabrics, start=1):
+            mse = scale * 1e-3 / count
+            subject = Record(method=method, setting=setting, fabric=fabric, role=role)
+            queries = subject.model_copy(update={"scene": "queries"})
+            records.append(queries.of("mse", mse, 400, standard_error=mse / 20, low=0.9 * mse, high=1.1 * mse))
+            records += [queries.of("mse_measured", mse + 1e-6, 400), queries.of("truth_noise", 1e-6, 400)]
+            records.append(queries.of("zero_answers", 0.3 / count, 400))
+            for name in ("colour_rrmse", *(f"rrmse_{c}" for c in COMPONENTS)):
+                records.append(queries.of(name, mse**0.5, 400))
+            for scene in ("sphere", "plane"):
+                records.append(subject.model_copy(update={"scene": scene}).of("mse", 2 * mse, 900))
+            plane = subject.model_copy(update={"scene": "plane"})
+            records.append(plane.of("flicker", -1e-3 if method == "woven" else 0.3 / count, 3))
+            records.append(plane.of("excess_energy", -2e-3 if method == "woven" else 0.2 / count, 3))
+            curve = tuple((0.05 + 0.1 * i, 1e-3 * 2.0**-i + 1e-4 / count) for i in range(5))
+            records.append(plane.of("spectrum", 1e-3, 3, curve=curve))
+        subject = Record(method=method, setting=setting)
+        time = 400 * count + 10 * index
+        records.append(subject.of("time", time, 25, low=0.97 * time, high=1.05 * time, unit="ns/query"))
+        records.append(subject.of("bytes_stored", 2000.0 + index, 3, unit="B"))
+    for fabric, role in fabrics:
+        truth = Record(method="truth", fabric=fabric, role=role)
+        records.append(truth.of("truth_relative_error", 0.0151, 400, low=0.01, high=0.02))
+        curve = tuple((0.05 + 0.1 * i, 1e-3 * 2.0**-i) for i in range(5))
+        plane = truth.model_copy(update={"scene": "plane"})
+        records += [plane.of("motion", 0.01, 3), plane.of("spectrum", 1e-3, 3, curve=curve)]
+    records.append(Record(method="truth").of("time", 2e5, 25, low=1.9e5, high=2.1e5, unit="ns/query"))
+    return records

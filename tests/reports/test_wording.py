@@ -1,0 +1,69 @@
+import math
+
+import pandas as pd
+import pytest
+
+from pipeline.scenes.options import ViewOptions
+from reports.cells import fixed, percent, plain, scientific, signed, size, times
+from reports.options import BenchOptions
+from reports.wording import caveats, headline, learnt
+
+
+def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8):
+    errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio, "zero_answers": 0.0}
+    timing = {"method": "woven", "setting": "", "time_ratio": time_ratio}
+    return pd.DataFrame([errors]), pd.DataFrame([timing])
+
+
+def test_headline_admits_a_defeat():
+    text = headline("woven", "", *tables(0.5, 1.66), paper=False)
+    assert text == (
+        "Woven reaches 2.0× higher MSE than point sampling at 2 points on the 8 seen fabrics, at 1.7× its time."
+    )
+
+
+def test_headline_says_only_what_was_measured():
+    assert headline("woven", "", *tables(math.nan, 1.0)) == ""
+    assert "its time" not in headline("woven", "", *tables(3.0), paper=False)
+    assert "on the unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
+
+
+def test_learnt_leaves_points_out():
+    errors = pd.DataFrame(
+        {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
+    )
+    assert learnt(errors) == [("woven", "")]
+
+
+@pytest.mark.parametrize("footprint", ["major", "geometric_mean"])
+def test_caveats_name_the_footprint(footprint):
+    options = BenchOptions(view=ViewOptions(footprint=footprint))
+    text = " ".join(caveats(options, [], tables(1.0)[0]))
+    assert ("longer axis" in text) == (footprint == "major")
+    assert "NeuMIP" not in text
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (scientific(2.62e-3), "2.62e−3"),
+        (scientific(None), "–"),
+        (scientific(math.nan), "–"),
+        (signed(1.0), "+1.00e0"),
+        (signed(-0.02), "−2.00e−2"),
+        (times(4.12), "4.1×"),
+        (times(0.0834), "0.083×"),
+        (times(1234.0), "1,234×"),
+        (percent(0.0151, 2), "1.51 %"),
+        (fixed(0.1234), ".123"),
+        (fixed(1.5), "1.500"),
+        (size(512), "512 B"),
+        (size(346_896), "346.9 kB"),
+        (size(16_300_000), "16.30 MB"),
+        (plain("twill_4_4"), "twill 4/4"),
+        (plain("wool_gabardine"), "wool gabardine"),
+        (plain("satin_8"), "satin 8"),
+    ],
+)
+def test_numbers_are_worded(found, expected):
+    assert found == expected
