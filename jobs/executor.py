@@ -155,7 +155,7 @@ def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> lis
 def _submit(client: Any, runner: Runner, task: Task, out: Path) -> Any:
     """Hand a task to the cluster; one that must be alone gets a fresh process."""
     if task.alone and client.cluster is not None:
-        client.restart_workers(list(client.nthreads()))
+        client.restart()  # which also forgets results: a worker's end would have dask compute them again
     return client.submit(_work, runner, task, str(out), key=f"{task.stage}-{task.id}")
 
 

@@ -3,8 +3,9 @@
 Every estimator runs `REPLICATES` independent replicates of the same number of points and doubles that number until the
 error asked for is reached. A component is the ratio of two sums, f = N / D; its standard error comes from the spread of
 the replicates' residuals N_r - f D_r (the linearised ratio estimator [Cochran1977Sampling]), with REPLICATES - 1
-degrees of freedom. `mc` takes independent random points, `owen` one scrambled Sobol sequence a replicate, whose error
-falls faster than count^-1/2.
+degrees of freedom. Patches that are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE
+times the limit; one that no point sees answers 0. `mc` takes independent random points, `owen` one scrambled Sobol
+sequence a replicate, whose error falls faster than count^-1/2.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 REPLICATES = 16
+
+HIDDEN_PATIENCE = 16
+"""Times `max_count` that a patch may spend of which some replicate has not seen a single point."""
 
 _MC, _OWEN = 0, 1
 _ESTIMATORS = {"mc": _MC, "owen": _OWEN}
@@ -161,9 +165,10 @@ def _add_point(
 @kernel
 def _ratio_error(sums: npt.NDArray[np.float64], mean: npt.NDArray[np.float64], error: npt.NDArray[np.float64]) -> None:
     """Write the four ratios and their standard errors from the replicates' sums, (REPLICATES, 5)."""
-    area = 0.0
+    area, seen = 0.0, 0
     for r in range(REPLICATES):
         area += sums[r, _AREA]
+        seen += sums[r, _AREA] > 0.0
     for c in range(4):
         mean[c], error[c] = 0.0, 0.0
         if area > 0.0:
@@ -176,6 +181,9 @@ def _ratio_error(sums: npt.NDArray[np.float64], mean: npt.NDArray[np.float64], e
                 residual = sums[r, c] - mean[c] * sums[r, _AREA]
                 spread += residual * residual
             error[c] = math.sqrt(spread * REPLICATES / (REPLICATES - 1)) / area
+            if seen < REPLICATES:
+                # The ratio of a few visible replicates follows them: their spread alone would look too small.
+                error[c] = math.hypot(error[c], mean[c] / math.sqrt(seen))
 
 
 @kernel
@@ -239,7 +247,13 @@ def _estimate_all(
             for c in range(4):
                 size += row_mean[c] * row_mean[c]
                 error += row_error[c] * row_error[c]
-            if done * REPLICATES >= max_count or (size > 0.0 and error <= relative_error * relative_error * size):
+            reached = size > 0.0 and error <= relative_error * relative_error * size
+            seen = 0
+            for r in range(REPLICATES):
+                seen += sums[r, _AREA] > 0.0
+            # A patch of which hardly a point is seen says nothing of its error yet; its points cost little.
+            limit = max_count if seen == REPLICATES else max_count * HIDDEN_PATIENCE
+            if done * REPLICATES >= limit or (reached and seen == REPLICATES):
                 break
             target = 2 * done
         for c in range(4):

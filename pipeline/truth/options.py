@@ -21,7 +21,8 @@ class TruthOptions(BaseModel):
     min_count: int = Field(default=256, ge=32)
     """Points before the first look at the error; a power of two."""
     max_count: int = Field(default=4096, ge=32)
-    """Points after which a query is given up on with the error it has; a power of two."""
+    """Points after which a query is given up on with the error it has; a power of two. Patches that are all but hidden
+    may take 16 times as many."""
     frame: Literal["ply"] = "ply"
     """Cosines inside the yarn layer are taken to the ply normal."""
     normaliser: Literal["visible"] = "visible"

@@ -180,8 +180,23 @@ def test_the_stopping_rule_reaches_the_error_or_spends_its_points():
     options = TruthOptions(relative_error=0.03, min_count=64, max_count=1024)
     answers = estimate(fabric, queries, options, 7)
     relative = np.linalg.norm(answers.standard_error, axis=1) / np.maximum(np.linalg.norm(answers.mean, axis=1), 1e-9)
-    assert ((relative <= 0.03 * (1 + 1e-6)) | (answers.count == 1024)).all()
-    assert set(answers.count) <= {64, 128, 256, 512, 1024}
+    assert ((relative <= 0.03 * (1 + 1e-6)) | (answers.count >= 1024)).all()
+    # Only patches that are all but hidden may take more than max_count, and those are few.
+    assert set(answers.count) <= {64 << k for k in range(9)}
+    assert (answers.count > 1024).mean() < 0.05
+
+
+def test_hidden_patches_do_not_understate_their_error():
+    """Two runs differ by no more than their stated errors say, hidden patches at grazing angles included.
+
+    Before a patch had to be seen by every replicate, the measured variance was 24 times the stated one on this fabric.
+    """
+    fabric = load_fabric("twill_4_4")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 600)
+    first, second = (estimate(fabric, queries, TruthOptions(max_count=1024), seed) for seed in (1, 2))
+    measured = np.sum((first.mean - second.mean) ** 2)
+    stated = np.sum(first.standard_error**2 + second.standard_error**2)
+    assert 0.5 < measured / stated < 2.0
 
 
 def test_translation_by_a_repeat_changes_nothing():

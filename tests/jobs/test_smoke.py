@@ -1,0 +1,28 @@
+"""The whole way, from fabrics to the page, on the smallest recipe; then again, and again with a shard cut in half."""
+
+from jobs.cli import main
+from jobs.ledger import Ledger
+from jobs.plan import plan
+from jobs.recipe import load_recipe
+
+
+def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):
+    out = tmp_path / "out"
+    tasks = plan(load_recipe("smoke"))
+    assert main(["run", "smoke", "--out", str(out)]) == 0, capsys.readouterr().err
+    assert str(out / "report" / "smoke" / "index.html") in capsys.readouterr().out.replace("\n", "")
+    assert all(Ledger(out).state(task) == "done" for task in tasks)
+    # What a run leaves: nothing half-written, nothing outside these folders.
+    assert {path.name for path in out.iterdir()} == {"datasets", "ledger", "models", "records", "report"}
+    assert not list(out.rglob(".tmp-*"))
+
+    assert main(["run", "smoke", "--out", str(out)]) == 0
+    assert f"nothing to do: {len(tasks)} tasks done" in capsys.readouterr().out
+
+    shard = out / tasks[0].products[0]
+    whole = shard.read_bytes()
+    shard.write_bytes(whole[: len(whole) // 2])
+    assert main(["check", "smoke", "--out", str(out)]) == 2
+    assert main(["generate", "smoke", "--out", str(out)]) == 0
+    assert shard.read_bytes() == whole
+    assert main(["check", "smoke", "--out", str(out)]) == 0
