@@ -4,7 +4,8 @@ A repeat may begin at any yarn; the mirror image of a fabric is a fabric, and so
 the mirror x = y. What these fabrics answer follows from the first one's answers: the mirrors x -> -x, y -> -y and x = y
 generate the eight symmetries of the square, each mirror reverses the twist, and the exchange swaps the components of
 warp and weft. A network that sees each cloth in one standard position only, its queries moved with it, obeys all this
-exactly, and need not spend weights, rows and time on learning it.
+exactly, and need not spend weights, rows and time on learning it. Only the symmetries that a cloth itself has, which
+leave its standard position as it is, remain to be learnt.
 
 Standard is the position whose draft, read pick by pick, is the smallest binary number (True = warp over = 1); among
 equals the one with the smallest numbers of its warp, then of its weft.

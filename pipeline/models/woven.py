@@ -115,7 +115,7 @@ class _Encoder(nn.Module):
 
 
 class _Decoder(nn.Module):
-    """Latents and patches to network space: the published 86,660 parameters at the default widths."""
+    """Latents and patches to network space: 86,660 parameters at the default widths, and 8,192 filters if `local`."""
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
@@ -159,7 +159,7 @@ class _Decoder(nn.Module):
         weight = self.first.weight
         x = functional.linear(patch, weight[:, self.latent :])
         x = x + functional.linear(latent[:, : self.latent], weight[:, : self.latent], self.first.bias).unsqueeze(1)
-        if self.filters is not None:
+        if self.filters is not None and where is not None:
             responses = self.filters(latent[:, self.latent :][:, self.seen])
             x = torch.baddbmm(x, where, responses)
         x = _activate(x)
@@ -367,7 +367,8 @@ class Woven:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the fabric's latent; the encoder is not needed to render."""
-        return 4 * (sum(weight.numel() for weight in self._network.decoder.parameters()) + self._network.options.latent)
+        latent, _ = self._encode(fabric)
+        return 4 * (sum(weight.numel() for weight in self._network.decoder.parameters()) + latent.numel())
 
     def _encode(self, fabric: Fabric) -> tuple[Tensor, Placement]:
         key = fingerprint(fabric.optics())

@@ -15,13 +15,13 @@ class TrainingOptions(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    steps: int = Field(default=6000, ge=1, le=10_000_000)
+    steps: int = Field(default=7000, ge=1, le=10_000_000)
     """Optimiser steps."""
-    batch: int = Field(default=4096, ge=1, le=2**22)
+    batch: int = Field(default=1024, ge=1, le=2**22)
     """Queries a step, over all fabrics of the step."""
     fabrics: int = Field(default=8, ge=1, le=4096)
     """Fabrics a step; a model of many fabrics encodes each once and asks it batch / fabrics queries."""
-    learning_rate: float = Field(default=2e-3, gt=0, le=1)
+    learning_rate: float = Field(default=4e-3, gt=0, le=1)
     """Peak learning rate of AdamW."""
     warm_up: float = Field(default=0.03, ge=0, le=0.5)
     """Share of the steps in which the rate rises linearly."""
@@ -29,8 +29,6 @@ class TrainingOptions(BaseModel):
     """Decoupled weight decay of AdamW."""
     gradient_clip: float = Field(default=1.0, gt=0, le=1e6)
     """Largest Euclidean norm of the gradient."""
-    average: float = Field(default=0.0, ge=0, lt=1)
-    """Decay of the exponential moving average of the weights that is kept in the end; 0 keeps the last weights."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the initial weights and of the order of the queries."""
     threads: int = Field(default=1, ge=1, le=1024)

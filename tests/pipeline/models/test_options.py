@@ -25,7 +25,7 @@ def test_model_tells_the_options_apart():
         {"model": "woven", "log_k": float("nan")},
         {"model": "woven", "specular_weight": 0, "diffuse_weight": 0},
         {"model": "woven", "map_texels": 65},
-        {"model": "woven", "latent": 32},
+        {"model": "woven", "latent": 3},
         {"model": "woven", "spatial_fusion": False},
         {"model": "woven", "name": "../woven"},
         {"model": "neumip", "texels_per_yarn": 0},
