@@ -92,7 +92,7 @@ class NeumipOptions(_Options):
     """Share of the training after which the blur has halved (published: 3,333 of 30,000 iterations)."""
     offset_frozen: float = Field(default=0.33, ge=0, le=1)
     """Share of the training after which the offset texture is held fixed (published: 10,000 of 30,000 iterations)."""
-    texture_rate: float = Field(default=10.0, gt=0, le=1000)
+    texture_rate: float = Field(default=3.0, gt=0, le=1000)
     """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""
     log_k: float = Field(default=3.0, gt=0, le=1e4)
     """k of the specular space g(x) = ln(k x + 1)."""
