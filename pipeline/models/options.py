@@ -68,6 +68,18 @@ class WovenOptions(_Options):
             raise ValueError("one_blob = 'local' needs spatial_fusion")
         return self
 
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        changes = {
+            "a picture of the repeat seen from the place asked about": self.one_blob == "local",
+            "one-blobs that wrap": self.one_blob == "periodic",
+            "every cloth in standard position": self.standard,
+            "a random origin in every training step": self.roll,
+            "no spatial fusion": not self.spatial_fusion,
+        }
+        return tuple(change for change, made in changes.items() if made)
+
 
 class NeumipOptions(_Options):
     """One offset texture, one feature pyramid and one small decoder for each fabric [Kuznetsov2021NeuMIP]."""
@@ -100,6 +112,11 @@ class NeumipOptions(_Options):
     """Weight of the specular squared error, taken in log space."""
     diffuse_weight: float = Field(default=2.0, ge=0, le=1e4)
     """Weight of the diffuse squared error."""
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        return ("four components in place of RGB",) + (() if self.offset else ("no offset",))
 
 
 class PointSampledOptions(_Options):
