@@ -98,9 +98,15 @@ def summary_table(tasks: Sequence[Task], ran: Mapping[str, float]) -> Table:
 
 
 def methods_table(frame: Any) -> Table:
-    """Show a benchmark condensed to one row a method (a DataFrame from `reports.summary.summary_table`)."""
+    """Show a benchmark condensed to one row a method (a DataFrame from `reports.summary.summary_table`).
+
+    Bytes are left to the page, so that a line fits a terminal of 80 columns.
+    """
+    frame = frame.drop(columns="bytes", errors="ignore").rename(columns={"ns/query": "ns a query"})
     names = list(frame.columns)
     table = _table("method", *names, right=names)
+    table.columns[0].no_wrap = True
+    table.padding = (0, 1, 0, 0)
     for (method, setting), *values in frame.itertuples():
         table.add_row(f"{method} {setting}".strip(), *(_number(value) for value in values))
     return table
@@ -137,6 +143,8 @@ def _number(value: float) -> str:
     """Write a measured number with three digits; a missing one as a dash."""
     if value != value:
         return "–"
+    if 0 < abs(value) < 0.01:
+        return f"{value:.1e}"
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
