@@ -8,11 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from weaves.fabric import Fabric
 
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
+from weaves.fabric import Fabric
 
 _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 

@@ -13,13 +13,13 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
-from weaves.fabric import Fabric
 
 from pipeline.atomic import atomic_write
 from pipeline.shards.schema import SCHEMA_VERSION
 from pipeline.shards.store import read_shard
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
+from weaves.fabric import Fabric
 
 Role = Literal["seen", "population", "unseen"]
 Split = Literal["train", "validation", "test"]
