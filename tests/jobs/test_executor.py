@@ -88,8 +88,14 @@ def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
 def driver(out):
     command = [sys.executable, str(HERE / "fake_stages.py"), str(out)]
     path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
+    # A background shell hands down an ignored SIGINT; the driver is to hear it as from a terminal.
     process = subprocess.Popen(
-        command, env={**os.environ, "PYTHONPATH": path}, start_new_session=True, stderr=subprocess.PIPE, text=True
+        command,
+        env={**os.environ, "PYTHONPATH": path},
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 30
     while len(list((out / "ledger").glob("*.json"))) < 2:
