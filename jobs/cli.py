@@ -75,6 +75,24 @@ def show(
 
 
 @app.command(sort_key=2)
+def export(
+    fabric: Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")],
+    *,
+    mesh: Annotated[Path, Parameter(help="File to write, ending in .ply.")],
+    vertices: Annotated[int, Parameter(help="Steps across a yarn, and along it in every cell.")] = 64,
+    repeats: Annotated[int, Parameter(help="Copies of the repeat in each direction.")] = 1,
+) -> None:
+    """Write a fabric's surface as triangles with the colours of its yarns, for any 3D program."""
+    from rich.console import Console
+
+    from jobs.exporting import write_mesh
+    from weaves.fabric import load_fabric
+
+    triangles = write_mesh(load_fabric(fabric), mesh, vertices, repeats)
+    Console().print(f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up", soft_wrap=True, highlight=False)
+
+
+@app.command(sort_key=3)
 def plan(recipe: RecipeName) -> None:
     """Show the tasks of a recipe with their rows, bytes and estimated time; nothing is computed."""
     from rich.console import Console
@@ -86,7 +104,7 @@ def plan(recipe: RecipeName) -> None:
     Console().print(plan_table(tasks_of(load_recipe(recipe))))
 
 
-@app.command(sort_key=3)
+@app.command(sort_key=4)
 def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Compute the ground truth: the shards of a recipe's data set."""
     from jobs.work import work
@@ -94,7 +112,7 @@ def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", w
     work(recipe, ["generate"], out, scheduler, workers)
 
 
-@app.command(sort_key=4)
+@app.command(sort_key=5)
 def check(recipe: Annotated[str, Parameter(help="Recipe, or folder of a data set.")], *, out: Out = OUT) -> int:
     """Read every finished shard again: hashes, schema, ranges, finite values."""
     from jobs.checking import check_dataset, dataset_folder
@@ -105,7 +123,7 @@ def check(recipe: Annotated[str, Parameter(help="Recipe, or folder of a data set
     return BadInput.exit_code if faults else 0
 
 
-@app.command(sort_key=5)
+@app.command(sort_key=6)
 def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Train the models of a recipe on its data set."""
     from jobs.work import work
@@ -113,7 +131,7 @@ def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", work
     work(recipe, ["train"], out, scheduler, workers)
 
 
-@app.command(sort_key=6)
+@app.command(sort_key=7)
 def bench(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Measure error, aliasing and time of every method."""
     from jobs.work import work
@@ -121,7 +139,7 @@ def bench(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", work
     work(recipe, ["bench"], out, scheduler, workers)
 
 
-@app.command(sort_key=7)
+@app.command(sort_key=8)
 def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Write the page: pictures, tables and plots of everything measured."""
     from jobs.work import work
@@ -129,7 +147,7 @@ def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", wor
     work(recipe, ["report"], out, scheduler, workers)
 
 
-@app.command(sort_key=8)
+@app.command(sort_key=9)
 def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Generate, train, bench and report, skipping what is done."""
     from jobs.task import STAGES
@@ -138,7 +156,7 @@ def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", worker
     work(recipe, STAGES, out, scheduler, workers)
 
 
-@app.command(sort_key=9)
+@app.command(sort_key=10)
 def status(recipe: RecipeName, *, out: Out = OUT) -> None:
     """Show what is done, what failed and why, and what is missing."""
     from rich.console import Console

@@ -22,14 +22,16 @@ def run(task: Task, out: Path, progress: Progress) -> None:
 def compile_kernels() -> None:
     """Compile the ground truth's kernels into numba's cache, so that of many workers one alone has to."""
     from pipeline.shards.queries import QueryOptions, draw_queries
-    from pipeline.truth.estimator import estimate, point_sampled
+    from pipeline.truth.estimator import ESTIMATORS, estimate
     from pipeline.truth.options import TruthOptions
+    from pipeline.truth.point_sampler import PointSampler
     from weaves.fabric import load_fabric, preset_names
 
     fabric = load_fabric(preset_names()[0])
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 0, 0, 1)
-    estimate(fabric, queries, TruthOptions(min_count=32, max_count=32), 0)
-    point_sampled(fabric, queries, 1, 0)
+    for name in ESTIMATORS:
+        estimate(fabric, queries, TruthOptions(estimator=name, min_count=32, max_count=32), 0)
+    PointSampler(fabric).sample(queries, 1, 0)
 
 
 def _generate(task: Task, out: Path, progress: Progress) -> None:

@@ -40,6 +40,10 @@ HOMES = {
     "dask": ["jobs"],
     "cyclopts": ["jobs"],
     "rich": ["jobs"],
+    "trimesh": ["jobs"],
+    # Only tests render with another renderer.
+    "mitsuba": [],
+    "drjit": [],
 }
 
 MODULES = {

@@ -118,6 +118,10 @@ class Draft:
         """Return the same cloth, its repeat begun `ends` further left and `picks` further down."""
         return Draft(np.roll(self.warp_over, (picks, ends), axis=(0, 1)), self.name)
 
+    def tiled(self, repeats: int) -> Draft:
+        """Return so many repeats of the cloth in each direction as one; BadInput if that is too large."""
+        return Draft(np.tile(self.warp_over, (repeats, repeats)), f"{self.name}, {repeats} x {repeats} repeats")
+
     def rows(self) -> list[str]:
         """Return the drawing that `from_rows` reads."""
         return ["".join("#" if over else "." for over in pick) for pick in self.warp_over[::-1]]

@@ -74,6 +74,15 @@ class Fabric(BaseModel):
             "optical_thickness": self.optical_thickness,
         }
 
+    def back(self) -> Fabric:
+        """Return the cloth whose front, seen from z > 0, is this one's back reflected in the fabric plane.
+
+        Reflection keeps x and y, brings the other yarn on top, and turns a right-handed twist into a left-handed one.
+        """
+        draft = Matrix(rows=tuple(Draft(~self.weave.warp_over).rows()))
+        warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (self.warp, self.weft))
+        return self.model_copy(update={"draft": draft, "warp": warp, "weft": weft})
+
     def to_toml(self) -> str:
         """Return a file that `load_fabric` reads back as an equal fabric."""
         tables: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)

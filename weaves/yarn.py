@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
 from weaves.colour import Colour, Rgb, linear_rgb
 
@@ -36,7 +36,9 @@ class Yarn(BaseModel):
     specular: Colour = (0.3, 0.3, 0.3)
     """Colour k_s of the light scattered once by the fibres."""
     diffuse: Colour = (0.3, 0.3, 0.3)
-    """Colour k_d of the light scattered many times."""
+    """Colour k_d of the light scattered many times and sent back."""
+    diffuse_transmission: Colour = (0.0, 0.0, 0.0)
+    """Colour k_dt of the light scattered many times that leaves on the other side; k_d + k_dt is at most 1."""
 
     @property
     def specular_rgb(self) -> Rgb:
@@ -47,6 +49,18 @@ class Yarn(BaseModel):
     def diffuse_rgb(self) -> Rgb:
         """k_d in linear sRGB."""
         return linear_rgb(self.diffuse)
+
+    @property
+    def diffuse_transmission_rgb(self) -> Rgb:
+        """k_dt in linear sRGB."""
+        return linear_rgb(self.diffuse_transmission)
+
+    @model_validator(mode="after")
+    def _keeps_energy(self) -> Yarn:
+        channels = zip(self.diffuse_rgb, self.diffuse_transmission_rgb, strict=True)
+        if any(back + through > 1.0 + 1e-9 for back, through in channels):
+            raise ValueError("diffuse + diffuse_transmission must be at most 1 in every channel: no yarn makes light")
+        return self
 
     def optics(self) -> dict[str, float]:
         """Return the numbers that shape the four components: all but the colours."""

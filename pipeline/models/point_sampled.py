@@ -8,14 +8,15 @@ shows as aliasing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.options import PointSampledOptions
-from pipeline.truth.estimator import PointSampler
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.point_sampler import PointSampler
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -33,10 +34,12 @@ class PointSampled:
         Name of the method.
     """
 
-    def __init__(self, count: int, footprint: str = "gaussian", name: str = "point_sampled") -> None:
+    def __init__(
+        self, count: int, footprint: Literal["gaussian", "box"] = "gaussian", name: str = "point_sampled"
+    ) -> None:
         self.name, self.setting = name, f"k = {count}"
         self.count = count
-        self._footprint = footprint
+        self._truth = TruthOptions(footprint=footprint)
         self._samplers: dict[str, PointSampler] = {}
 
     def covers(self, fabric: Fabric) -> bool:
@@ -53,12 +56,12 @@ class PointSampled:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the tables that the point model reads."""
-        return sum(array.nbytes for array in self._sampler(fabric).field if isinstance(array, np.ndarray))
+        return self._sampler(fabric).bytes_stored()
 
     def _sampler(self, fabric: Fabric) -> PointSampler:
         key = fingerprint(fabric.optics())
         if key not in self._samplers:
-            self._samplers[key] = PointSampler(fabric, self._footprint)
+            self._samplers[key] = PointSampler(fabric, self._truth)
         return self._samplers[key]
 
 

@@ -61,7 +61,7 @@ class GBuffer:
 
     def queries(self, repeat: tuple[int, int]) -> Queries:
         """Return the N queries in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
-        return Queries(
+        return Queries.round(
             u=_reduce(self.u, repeat[0]),
             v=_reduce(self.v, repeat[1]),
             sigma=self.sigma.astype(np.float32),

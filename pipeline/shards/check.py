@@ -11,7 +11,8 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.schema import SCHEMA, STANDARD_ERRORS
 from pipeline.shards.store import read_table
-from pipeline.truth.frames import COMPONENTS
+from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
+from pipeline.truth.query import STEEPEST_CURVATURE
 from weaves.errors import BadInput
 
 _UNIT_TOLERANCE = 1e-5
@@ -37,8 +38,10 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
     # Values: finite, within their ranges, directions of unit length.
     column = {name: table.column(name).to_numpy() for name in SCHEMA.names if name != "fabric"}
     ends, picks = manifest.fabrics[entry.fabric].weave.repeat
-    ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (0.0, 1.0), "count": (1, np.inf)}
-    ranges |= dict.fromkeys(("sigma", *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
+    ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (-1.0, 1.0), "count": (1, np.inf)}
+    ranges |= {"angle": (-np.inf, np.inf), "curvature": (0.0, STEEPEST_CURVATURE)}
+    ranges |= {TRANSPARENCY: (0.0, 1.0), f"{TRANSPARENCY}_standard_error": (0.0, np.inf)}
+    ranges |= dict.fromkeys(("sigma", "sigma_minor", *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
     for name, values in column.items():
         low, high = ranges.get(name, (-1.0, 1.0))
         if not np.isfinite(values).all():

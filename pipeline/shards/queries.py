@@ -55,7 +55,7 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
     generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
     draws = generator.random((count, _DRAWS))
     low, high = (math.log(bound) for bound in options.sigma)
-    return Queries(
+    return Queries.round(
         u=(draws[:, 0] * repeat[0]).astype(np.float32),
         v=(draws[:, 1] * repeat[1]).astype(np.float32),
         sigma=np.exp(low + (high - low) * draws[:, 2]).astype(np.float32),

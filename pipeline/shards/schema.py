@@ -10,20 +10,23 @@ from typing import Final
 
 import pyarrow as pa
 
-from pipeline.truth.frames import COMPONENTS
+from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 
 _QUERY: Final = {
     "u": "footprint centre along x (weft direction), yarn spacings, in [0, ends of the repeat]",
     "v": "footprint centre along y (warp direction), yarn spacings, in [0, picks of the repeat]",
-    "sigma": "standard deviation of the footprint along each axis, yarn spacings, > 0",
+    "sigma": "standard deviation of the footprint along its first axis, yarn spacings, > 0",
     "wi_x": "unit vector to the light",
     "wi_y": "unit vector to the light",
     "wi_z": "unit vector to the light; signed: below 0 the light is behind the cloth (transmission)",
     "wo_x": "unit vector to the viewer",
     "wo_y": "unit vector to the viewer",
-    "wo_z": "unit vector to the viewer, > 0",
+    "wo_z": "unit vector to the viewer; signed, as wi_z",
+    "sigma_minor": "standard deviation of the footprint along its second axis, yarn spacings, > 0",
+    "angle": "angle from x to the footprint's first axis, radians",
+    "curvature": "curvature of the cloth in the viewer's plane, 1/yarn spacings; 0 for flat cloth",
 }
 _ANSWER: Final = {
     "specular_warp": "S_warp, unit colour, incident cosine included, 1/sr",
@@ -31,8 +34,11 @@ _ANSWER: Final = {
     "diffuse_warp": "C_warp, unit colour, incident cosine included, 1/sr",
     "diffuse_weft": "C_weft, unit colour, incident cosine included, 1/sr",
 }
+_THROUGH: Final = "share of light from straight behind that reaches the viewer unscattered, in [0, 1]"
 
 STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
+QUERY_COLUMNS: Final = tuple(_QUERY)
+"""The columns of a question, as `twillight evaluate` reads them."""
 
 
 def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:
@@ -45,6 +51,8 @@ SCHEMA: Final = pa.schema(
         *(_field(name, pa.float32(), meaning) for name, meaning in _QUERY.items()),
         *(_field(name, pa.float32(), _ANSWER[name]) for name in COMPONENTS),
         *(_field(error, pa.float32(), f"standard error of {error.split('_standard')[0]}") for error in STANDARD_ERRORS),
+        _field(TRANSPARENCY, pa.float32(), _THROUGH),
+        _field(f"{TRANSPARENCY}_standard_error", pa.float32(), "standard error of transparency"),
         _field("count", pa.int32(), "points evaluated for this row"),
     ]
 )

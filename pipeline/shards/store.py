@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
 from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION, STANDARD_ERRORS
-from pipeline.truth.frames import COMPONENTS
+from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 
@@ -37,7 +39,9 @@ def write_shard(path: Path, fabric: str, queries: Queries, answers: Answers, abo
     """
     names = pa.DictionaryArray.from_arrays(np.zeros(len(queries.u), np.int32), pa.array([fabric]))
     columns = [queries.u, queries.v, queries.sigma, *queries.wi.T, *queries.wo.T]
-    columns += [*answers.mean.T, *answers.standard_error.T, answers.count]
+    columns += [queries.sigma_minor, queries.angle, queries.curvature]
+    columns += [*answers.mean.T, *answers.standard_error.T]
+    columns += [answers.transparency, answers.transparency_standard_error, answers.count]
     arrays = [names, *(pa.array(np.ascontiguousarray(column)) for column in columns)]
     facts = json.dumps({"schema_version": SCHEMA_VERSION, **about}, sort_keys=True).encode()
     table = pa.Table.from_arrays(arrays, schema=SCHEMA.with_metadata({_KEY: facts}))
@@ -88,13 +92,22 @@ def read_shard(path: Path) -> tuple[Queries, Answers]:
     """Read a shard's rows with their checksums verified; errors as `read_table`."""
     table = read_table(path)
     column = {name: table.column(name).to_numpy() for name in SCHEMA.names if name != "fabric"}
-    queries = Queries(
+    queries = queries_of(column)
+    mean = np.stack([column[name] for name in COMPONENTS], axis=-1)
+    standard_error = np.stack([column[name] for name in STANDARD_ERRORS], axis=-1)
+    through = column[TRANSPARENCY], column[f"{TRANSPARENCY}_standard_error"]
+    return queries, Answers(mean, standard_error, column["count"], *through)
+
+
+def queries_of(column: Mapping[str, npt.NDArray[np.float32]]) -> Queries:
+    """Gather the columns of questions."""
+    return Queries(
         column["u"],
         column["v"],
         column["sigma"],
         np.stack([column["wi_x"], column["wi_y"], column["wi_z"]], axis=-1),
         np.stack([column["wo_x"], column["wo_y"], column["wo_z"]], axis=-1),
+        column["sigma_minor"],
+        column["angle"],
+        column["curvature"],
     )
-    mean = np.stack([column[name] for name in COMPONENTS], axis=-1)
-    standard_error = np.stack([column[name] for name in STANDARD_ERRORS], axis=-1)
-    return queries, Answers(mean, standard_error, column["count"])

@@ -4,7 +4,8 @@ A kernel of any width over an endless fabric is a density on one repeat, wrapped
 each. A narrow axis is sampled from the kernel itself and wrapped. A wide one would wrap many times and lose the order
 of low-discrepancy points, so it is sampled evenly over the repeat and weighted by the wrapped density instead; for a
 Gaussian of one repeat or more that weight is 1 to 4e-16. The choice depends on the size alone, so both are the same
-integral.
+integral. A footprint with two axes at an angle is no product in x and y: it is sampled from the kernel and wrapped,
+unless it covers the repeat evenly.
 """
 
 from __future__ import annotations
@@ -107,3 +108,50 @@ def place(shape: int, centre: float, sigma: float, repeat: float, number: float)
     odd = whole % 2.0 == 1.0
     near = distance > 1.0 - rest if odd else distance < rest
     return _wrap(centre + (number - 0.5) * repeat, repeat), (whole + (1.0 if near else 0.0)) * repeat / side
+
+
+_EVEN = 1.0  # in repeats: both axes of a Gaussian this wide cover the repeat evenly, to 4e-16
+
+
+@kernel
+def place_pair(
+    shape: int,
+    u: float,
+    v: float,
+    sigma: float,
+    sigma_minor: float,
+    angle: float,
+    ends: float,
+    picks: float,
+    first: float,
+    second: float,
+) -> tuple[float, float, float]:
+    """Return the point of the repeat that two numbers in (0, 1) name, and its weight (mean 1).
+
+    Parameters
+    ----------
+    shape : int
+        GAUSSIAN or BOX.
+    u, v : float
+        Centre.
+    sigma, sigma_minor : float
+        Standard deviations along the two axes.
+    angle : float
+        Angle from x to the first axis, radians.
+    ends, picks : float
+        The repeat.
+    first, second : float
+        Where in the distribution.
+    """
+    if angle == 0.0 or (shape == GAUSSIAN and sigma == sigma_minor):
+        x, weight_x = place(shape, u, sigma, ends, first)
+        y, weight_y = place(shape, v, sigma_minor, picks, second)
+        return x, y, weight_x * weight_y
+    if shape == GAUSSIAN:
+        if min(sigma, sigma_minor) >= _EVEN * max(ends, picks):
+            return _wrap(u + first * ends, ends), _wrap(v + second * picks, picks), 1.0
+        a, b = sigma * normal_quantile(first), sigma_minor * normal_quantile(second)
+    else:
+        a, b = BOX_SIDE * sigma * (first - 0.5), BOX_SIDE * sigma_minor * (second - 0.5)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return _wrap(u + a * cosine - b * sine, ends), _wrap(v + a * sine + b * cosine, picks), 1.0

@@ -9,6 +9,13 @@ Cosine
 Components
     `S_warp, S_weft` (specular) and `C_warp, C_weft` (diffuse), each with unit colour, all over one denominator:
     f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft.
+Gaps and transmission
+    Where no yarn covers the fabric plane is a gap, at z = 0; its area counts in the denominator and it returns nothing.
+    `transparency` is the share of light from straight behind (-wo) that reaches the viewer unscattered: through gaps,
+    and through yarns as exp(-T Lambda). wi and wo on different sides ask for transmission: specular components then
+    take k_s, diffuse ones the colour k_dt. A viewer behind the cloth sees `Fabric.back()`, reflected in the plane.
+Curved cloth
+    Wrapped around a cylinder, the cloth falls away from its tangent plane by kappa s^2 / 2 at distance s.
 Names
     t fibre tangent, n_p ply normal, n_s macro normal, alpha roughness [Wang2022SpongeCake], [Zhu2023Cloth].
 Local yarn frame
@@ -21,3 +28,6 @@ from typing import Final
 
 COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
 """Names of the four components, in the order of every (N, 4) array and of the shard columns."""
+
+TRANSPARENCY: Final = "transparency"
+"""Name of the share that goes straight through, beside the components in answers and shards."""

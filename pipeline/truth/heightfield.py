@@ -14,16 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth.kernel import kernel
+from pipeline.truth.options import Variation
+from pipeline.truth.variation import gloss
 from weaves.draft import cells
 from weaves.fabric import Fabric
 
 WARP, WEFT, GAP = 0, 1, 2
 
 # Columns of `HeightField.yarn`, one row a family.
-RADIUS, INVERSE_RADIUS, SIN_TWIST, COS_TWIST, ALPHA, BETA, BLEND = range(7)
+RADIUS, INVERSE_RADIUS, SIN_TWIST, COS_TWIST, ALPHA, BETA, BLEND, BEND = range(8)
 # Columns of `HeightField.floats`: [pick, end, TOP or UNDER, column]; a bend radius of 0 marks a float drawn flat.
 TOP, UNDER = 0, 1
-OFFSET, BEND_RADIUS, HALF_LENGTH, AXIS_DROP = range(4)
+OFFSET, BEND_RADIUS, HALF_LENGTH, AXIS_DROP, GLOSS = range(5)
 
 _EDGE = 1e-9  # cosine across a yarn below which the slope counts as vertical
 
@@ -35,15 +37,15 @@ class HeightField(NamedTuple):
     ----------
     top : (picks, ends)
         Family on top: WARP or WEFT.
-    floats : (picks, ends, 2, 4)
+    floats : (picks, ends, 2, 5)
         For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
-        length L/2, R cos(u_max).
+        length L/2, R cos(u_max), and the factor of its specular colour.
     crown : (picks, ends)
         Greatest height that any surface of the cell reaches.
-    highest : float
-        Greatest height of the fabric.
-    yarn : (2, 7)
-        Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d.
+    highest, lowest : float
+        Greatest height of the fabric, and a bound that no yarn lies below.
+    yarn : (2, 8)
+        Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d, u_max in radians.
     thickness : float
         Optical thickness T.
     """
@@ -52,13 +54,17 @@ class HeightField(NamedTuple):
     floats: npt.NDArray[np.float64]
     crown: npt.NDArray[np.float64]
     highest: float
+    lowest: float
     yarn: npt.NDArray[np.float64]
     thickness: float
 
 
-def height_field(fabric: Fabric) -> HeightField:
-    """Tabulate a fabric for the kernels."""
-    table = cells(fabric.weave)
+def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightField:
+    """Tabulate a fabric for the kernels; with a `variation`, so many repeats of it that its yarns can differ."""
+    draft = fabric.weave
+    if variation is not None:
+        draft = draft.tiled(variation.repeats)
+    table = cells(draft)
     families = (fabric.warp, fabric.weft)
     yarn = np.array(
         [
@@ -70,11 +76,12 @@ def height_field(fabric: Fabric) -> HeightField:
                 y.roughness,
                 y.relief,
                 y.blend,
+                math.radians(y.bend),
             )
             for y in families
         ]
     )
-    floats = np.zeros((*table.top.shape, 2, 4))
+    floats = np.zeros((*table.top.shape, 2, 5))
     crown = np.zeros(table.top.shape)
     for pick, end in np.ndindex(*table.top.shape):
         for side, offset, length in (
@@ -83,13 +90,18 @@ def height_field(fabric: Fabric) -> HeightField:
         ):
             family = int(table.top[pick, end]) if side == TOP else 1 - int(table.top[pick, end])
             row = _float_row(float(offset), float(length), families[family].width, families[family].bend)
-            floats[pick, end, side] = row
+            factor = 1.0
+            if variation is not None:
+                factor = gloss(variation, family, side, pick, end, float(offset), draft.repeat)
+            floats[pick, end, side] = (*row, factor)
             if side == TOP or families[1 - family].width < 1.0:
                 crown[pick, end] = max(
                     float(crown[pick, end]), families[family].relief * _rise(side, row, yarn[family, RADIUS])
                 )
+    sag = floats[..., BEND_RADIUS] - floats[..., AXIS_DROP]
+    lowest = -float(max(y.relief for y in families) * sag.max())
     return HeightField(
-        np.ascontiguousarray(table.top), floats, crown, float(crown.max()), yarn, fabric.optical_thickness
+        np.ascontiguousarray(table.top), floats, crown, float(crown.max()), lowest, yarn, fabric.optical_thickness
     )
 
 
@@ -164,9 +176,12 @@ def local_position(family: int, offset: float, x: float, y: float, end: int, pic
 
 @kernel
 def surface_at(
-    field: HeightField, x: float, y: float, end: int, pick: int
+    field: HeightField, x: float, y: float, end: int, pick: int, linear: bool
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
     """Return what is seen from above at (x, y) in cell (pick, end) of the repeat.
+
+    With `linear`, normal and tangent are those of angles proportional to the position, v = pi x / w and
+    u = u_max y / (L/2), as published code has them; they belong to no height field, and the height stays the torus's.
 
     Returns
     -------
@@ -199,6 +214,13 @@ def surface_at(
             bound = field.floats[pick, end, side, HALF_LENGTH] / bend
             sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
     cos_u = math.sqrt((1.0 - sin_u) * (1.0 + sin_u))
+    if linear:
+        v = 0.5 * math.pi * across * field.yarn[family, INVERSE_RADIUS]
+        u = 0.0
+        if bend > 0.0:
+            share = min(max(along / field.floats[pick, end, side, HALF_LENGTH], -1.0), 1.0)
+            u = field.yarn[family, BEND] * (share if side == TOP else -share)
+        sin_v, cos_v, sin_u, cos_u = math.sin(v), math.cos(v), math.sin(u), math.cos(u)
 
     # Normal and twisted tangent of the cylinder, then the relief's stretch along z.
     sin_t, cos_t, beta = field.yarn[family, SIN_TWIST], field.yarn[family, COS_TWIST], field.yarn[family, BETA]

@@ -6,16 +6,31 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "table", "auto"]
+
+
+class Variation(BaseModel):
+    """How much the floats differ in gloss."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    spread: float = Field(gt=0, le=2)
+    """Standard deviation of the logarithm of the factor."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Which factors."""
+    repeats: int = Field(default=4, ge=1, le=32)
+    """Repeats of the draft, in each direction, until the factors begin again."""
+
 
 class TruthOptions(BaseModel):
     """How one patch BSDF value is computed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    estimator: Literal["mc", "owen"] = "owen"
-    """`mc`: independent random points; `owen`: Owen-scrambled Sobol points in independent replicates."""
+    estimator: EstimatorName = "owen"
+    """How a value is computed; see pipeline.truth.estimator."""
     footprint: Literal["gaussian", "box"] = "gaussian"
-    """Kernel k_P; the box is the square with the same standard deviation: side = sigma sqrt(12)."""
+    """Kernel k_P; the box has the same standard deviations: sides sigma sqrt(12)."""
     relative_error: float = Field(default=0.02, gt=0, le=1)
     """Stop when the norm of the four standard errors falls below this share of the norm of the four means."""
     min_count: int = Field(default=256, ge=32)
@@ -23,12 +38,18 @@ class TruthOptions(BaseModel):
     max_count: int = Field(default=4096, ge=32)
     """Points after which a query is given up on with the error it has; a power of two. Patches that are all but hidden
     may take 16 times as many."""
-    frame: Literal["ply"] = "ply"
-    """Cosines inside the yarn layer are taken to the ply normal."""
-    normaliser: Literal["visible"] = "visible"
-    """The denominator is the projected area that the viewer sees, A_P."""
-    geometry: Literal["torus"] = "torus"
-    """Yarns are bent, twisted cylinders that form a true height field."""
+    frame: Literal["ply", "macro"] = "ply"
+    """Cosines inside the yarn layer, and of the visible area, are taken to the ply normal or to the macro normal."""
+    normaliser: Literal["visible", "projected"] = "visible"
+    """The denominator: `visible` is the projected area that the viewer sees, A_P; `projected` is |wo.n_s| times the
+    area of the footprint, which restores reciprocity."""
+    geometry: Literal["torus", "linear"] = "torus"
+    """`torus`: yarns are bent, twisted cylinders that form a true height field; `linear`: angles on a yarn grow in
+    proportion to the position, as in published code. Their normals belong to no height field: for comparison only."""
+    shadows: bool = True
+    """Whether points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
+    variation: Variation | None = None
+    """Random gloss of every float; left out: all yarns of a family are alike."""
 
     @model_validator(mode="after")
     def _powers_of_two(self) -> TruthOptions:

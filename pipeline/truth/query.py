@@ -6,10 +6,14 @@ holds the four components.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from weaves.errors import BadInput
+
+_UNIT_TOLERANCE = 1e-4
 
 
 class Queries(NamedTuple):
@@ -20,9 +24,16 @@ class Queries(NamedTuple):
     u, v : float32 (N,)
         Footprint centre, in yarn spacings, along x (weft direction) and y (warp direction).
     sigma : float32 (N,)
-        Standard deviation of the footprint along each axis, in yarn spacings, > 0.
+        Standard deviation of the footprint along its first axis, in yarn spacings, > 0.
     wi, wo : float32 (N, 3)
-        Unit vectors to the light and to the viewer.
+        Unit vectors to the light and to the viewer; on different sides of the cloth, its transmission is asked for.
+    sigma_minor : float32 (N,)
+        Standard deviation along the second axis, at right angles to the first; equal to `sigma` if round.
+    angle : float32 (N,)
+        Angle from x to the first axis, radians.
+    curvature : float32 (N,)
+        Curvature kappa of the cloth in the viewer's plane, in 1/yarn spacings, 0 <= kappa <= 1; across it lies the axis
+        of the cylinder that the cloth is wrapped around.
     """
 
     u: npt.NDArray[np.float32]
@@ -30,10 +41,26 @@ class Queries(NamedTuple):
     sigma: npt.NDArray[np.float32]
     wi: npt.NDArray[np.float32]
     wo: npt.NDArray[np.float32]
+    sigma_minor: npt.NDArray[np.float32]
+    angle: npt.NDArray[np.float32]
+    curvature: npt.NDArray[np.float32]
+
+    @classmethod
+    def round(
+        cls,
+        u: npt.NDArray[np.float32],
+        v: npt.NDArray[np.float32],
+        sigma: npt.NDArray[np.float32],
+        wi: npt.NDArray[np.float32],
+        wo: npt.NDArray[np.float32],
+    ) -> Queries:
+        """Return queries about round footprints of a flat cloth."""
+        flat = np.zeros_like(sigma)
+        return cls(u, v, sigma, wi, wo, sigma, flat, flat)
 
     def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Queries:
         """Return the queries at `index`."""
-        return Queries(self.u[index], self.v[index], self.sigma[index], self.wi[index], self.wo[index])
+        return Queries(*(column[index] for column in self))
 
 
 class Answers(NamedTuple):
@@ -45,12 +72,70 @@ class Answers(NamedTuple):
         Components with unit colour and the standard error of each.
     count : int32 (N,)
         Points evaluated.
+    transparency, transparency_standard_error : float32 (N,)
+        Share of light from straight behind that reaches the viewer unscattered, through gaps and yarns.
     """
 
     mean: npt.NDArray[np.float32]
     standard_error: npt.NDArray[np.float32]
     count: npt.NDArray[np.int32]  # type: ignore[assignment]  # the field's word, though tuples have a count too
+    transparency: npt.NDArray[np.float32]
+    transparency_standard_error: npt.NDArray[np.float32]
+
+    @classmethod
+    def opaque(
+        cls, mean: npt.NDArray[np.float32], standard_error: npt.NDArray[np.float32], count: npt.NDArray[np.int32]
+    ) -> Answers:
+        """Return answers of a cloth that lets nothing straight through."""
+        return cls(mean, standard_error, count, np.zeros(len(mean), np.float32), np.zeros(len(mean), np.float32))
 
     def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Answers:
         """Return the answers at `index`."""
-        return Answers(self.mean[index], self.standard_error[index], self.count[index])
+        return Answers(*(column[index] for column in self))  # type: ignore[arg-type]
+
+
+STEEPEST_CURVATURE = 1.0
+"""Largest curvature: a cylinder as thick as two yarn spacings."""
+
+
+def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
+    """Return what is wrong with the queries that have no answer: row -> (column, value, what is allowed)."""
+    found: dict[int, tuple[str, object, str]] = {}
+
+    def note(rows: Any, name: str, column: npt.NDArray[np.float32], allowed: str) -> None:
+        for row in np.flatnonzero(rows).tolist():
+            found.setdefault(row, (name, column[row].tolist(), allowed))
+
+    for name, column in zip(Queries._fields, queries, strict=True):
+        note(~np.isfinite(column).reshape(len(column), -1).all(axis=1), name, column, "must be finite")
+    for name in ("sigma", "sigma_minor"):
+        note(getattr(queries, name) <= 0, name, getattr(queries, name), "must be greater than 0")
+    for name, directions in (("wi", queries.wi), ("wo", queries.wo)):
+        with np.errstate(invalid="ignore", over="ignore"):
+            length = np.linalg.norm(directions.astype(np.float64), axis=-1)
+            note(np.abs(length - 1.0) > _UNIT_TOLERANCE, name, directions, "must have unit length")
+        note(directions[:, 2] == 0, name, directions, "must not lie in the fabric plane")
+    note(
+        (queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE),
+        "curvature",
+        queries.curvature,
+        f"must be from 0 to {STEEPEST_CURVATURE:g}: no cylinder may be thinner than the yarns on it",
+    )
+    note(
+        (queries.curvature > 0) & (queries.wo[:, 2] < 0),
+        "curvature",
+        queries.curvature,
+        "must be 0 where the viewer is behind the cloth",
+    )
+    return found
+
+
+def validate(queries: Queries, where: str = "queries") -> None:
+    """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
+    found = faults(queries)
+    if not found:
+        return
+    row = min(found)
+    name, value, allowed = found[row]
+    more = f" ({len(found) - 1} more bad rows)" if len(found) > 1 else ""
+    raise BadInput(where, f"{name}[{row}]", value, allowed + more)

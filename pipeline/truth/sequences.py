@@ -1,17 +1,21 @@
 """Random and low-discrepancy numbers as pure functions of (key, index, dimension).
 
 Nothing is drawn "next": any worker, in any order, finds the same number under the same name. The generator is
-SplitMix64's finaliser over a Weyl sequence [Steele2014SplitMix]; the low-discrepancy points are the first two Sobol
-dimensions [Sobol1967] with nested uniform (Owen) scrambling by the Laine-Karras hash in Vegdahl's constants
-[Burley2020Owen].
+SplitMix64's finaliser over a Weyl sequence [Steele2014SplitMix]. Points in the unit square: independent; jittered, one
+in each stratum of a grid; R2, the additive sequence of the plastic number with a random shift [Roberts2018R2]; and the
+first two Sobol dimensions [Sobol1967] with nested uniform (Owen) scrambling by the Laine-Karras hash in Vegdahl's
+constants [Burley2020Owen].
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from pipeline.truth.kernel import kernel
 
+_LEAST = 2.0**-54  # what a coordinate of 0 becomes, for the quantiles of unbounded kernels
 _WEYL = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
@@ -83,3 +87,33 @@ def owen_pair(key: np.uint64, index: int) -> tuple[float, float]:
     seed = np.uint32(key & np.uint64(0xFFFFFFFF))
     second = _reverse_bits(_scramble_reversed(_sobol_second_reversed(np.uint32(index)), seed))
     return (float(first) + 0.5) * 2.0**-32, (float(second) + 0.5) * 2.0**-32
+
+
+_PLASTIC = 1.32471795724474602596
+_R2_FIRST, _R2_SECOND = 1.0 / _PLASTIC, 1.0 / (_PLASTIC * _PLASTIC)
+
+
+@kernel
+def r2_pair(key: np.uint64, index: int) -> tuple[float, float]:
+    """Return the `index`-th point in (0, 1)^2 of the R2 sequence, shifted by the random vector that `key` names."""
+    first = uniform(key, 0, 0) + index * _R2_FIRST
+    second = uniform(key, 0, 1) + index * _R2_SECOND
+    return max(first - math.floor(first), _LEAST), max(second - math.floor(second), _LEAST)
+
+
+@kernel
+def jittered_pair(key: np.uint64, index: int, strata: int, of: int) -> tuple[float, float]:
+    """Return the random point in stratum `strata` of a grid of `of` strata, a power of two; `index` names it."""
+    columns = 1
+    while columns * columns < of:
+        columns *= 2
+    row, column = strata // columns, strata % columns
+    first = (column + uniform(key, index, 0)) / columns
+    second = (row + uniform(key, index, 1)) * columns / of
+    return max(first, _LEAST), max(second, _LEAST)
+
+
+@kernel
+def independent_pair(key: np.uint64, index: int) -> tuple[float, float]:
+    """Return the `index`-th of independent random points in (0, 1)^2."""
+    return max(uniform(key, index, 0), _LEAST), max(uniform(key, index, 1), _LEAST)

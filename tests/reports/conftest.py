@@ -4,8 +4,9 @@ import pytest
 
 from pipeline.shards.generate import ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.truth.estimator import PointSampler, estimate
+from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.point_sampler import PointSampler
 from reports.options import BenchOptions
 from reports.record import Record
 from reports.summary import COMPONENTS

@@ -9,7 +9,7 @@ from reports.metrics import COLOUR_WEIGHTS, colour_error, colour_noise, componen
 
 def answers(mean, standard_error):
     mean, standard_error = np.asarray(mean, np.float32), np.asarray(standard_error, np.float32)
-    return Answers(mean, standard_error, np.full(len(mean), 64, np.int32))
+    return Answers.opaque(mean, standard_error, np.full(len(mean), 64, np.int32))
 
 
 def test_mse_of_known_numbers():

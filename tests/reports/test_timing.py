@@ -8,7 +8,7 @@ from reports.timing import Contender, set_threads, synchronise, time_side_by_sid
 def questions(rows):
     vectors = np.tile(np.float32([0, 0, 1]), (rows, 1))
     scalars = np.zeros(rows, np.float32)
-    return [(None, Queries(scalars, scalars, scalars + 1, vectors, vectors))]
+    return [(None, Queries.round(scalars, scalars, scalars + 1, vectors, vectors))]
 
 
 class Clock:

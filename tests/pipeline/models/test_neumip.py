@@ -99,7 +99,7 @@ def test_method_knows_its_fabrics_and_answers_at_extremes():
     assert not method.covers(plain)
     u, v, sigma = (a.ravel() for a in np.meshgrid([0.0, 4.0, 1e6, -1e6], [0.0, -1e-30, 1e6], [1e-4, 1.0, 1e4]))
     grazing = np.tile(np.float32([np.sin(np.radians(89.9)), 0.0, np.cos(np.radians(89.9))]), (len(u), 1))
-    asked = Queries(*(column.astype(np.float32) for column in (u, v, sigma)), grazing, grazing)
+    asked = Queries.round(*(column.astype(np.float32) for column in (u, v, sigma)), grazing, grazing)
     prediction = method.predict(twill, asked)
     assert prediction.shape == (len(u), 4)
     assert np.isfinite(prediction).all()

@@ -39,7 +39,7 @@ def moved_queries(queries, mean, repeat, symmetry, start=(0.0, 0.0)):
     columns = (torch.from_numpy(c)[None] for c in (queries.u / ends, queries.v / picks, queries.wi, queries.wo))
     u, v, wi, wo = (column[0].numpy() for column in one.move(*columns))
     ends, picks = (picks, ends) if symmetry.exchange else (ends, picks)
-    there = Queries(u * np.float32(ends), v * np.float32(picks), queries.sigma, wi, wo)
+    there = Queries.round(u * np.float32(ends), v * np.float32(picks), queries.sigma, wi, wo)
     return there, one.swap(torch.from_numpy(mean)[None])[0].numpy()
 
 

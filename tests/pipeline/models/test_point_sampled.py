@@ -3,7 +3,7 @@ import numpy as np
 from pipeline.models.method import Method
 from pipeline.models.point_sampled import PointSampled
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import point_sampled
+from pipeline.truth.point_sampler import PointSampler
 from weaves.fabric import load_fabric
 
 
@@ -15,7 +15,7 @@ def test_it_is_the_truth_package_s_baseline():
     assert method.covers(fabric)
     assert method.bytes_stored(fabric) > 0
     answer = method.predict(fabric, queries, seed=9)
-    np.testing.assert_array_equal(answer, point_sampled(fabric, queries, 4, 9))
+    np.testing.assert_array_equal(answer, PointSampler(fabric).sample(queries, 4, 9))
     assert not np.array_equal(answer, method.predict(fabric, queries, seed=10))
 
 

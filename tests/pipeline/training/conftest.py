@@ -20,7 +20,9 @@ def answered(fabric, queries):
     tilt = queries.wi[:, 2] * (1.0 + queries.wo[:, 0])
     rough = fabric.warp.roughness
     mean = np.stack([0.1 * rough * wave * tilt, 0.05 * tilt, 0.2 * wave * tilt, 0.2 * (1 - wave) * tilt], axis=-1)
-    return Answers(mean.astype(np.float32), np.full((len(mean), 4), 1e-3, np.float32), np.full(len(mean), 64, np.int32))
+    return Answers.opaque(
+        mean.astype(np.float32), np.full((len(mean), 4), 1e-3, np.float32), np.full(len(mean), 64, np.int32)
+    )
 
 
 @pytest.fixture(scope="session")

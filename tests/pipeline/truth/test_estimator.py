@@ -7,10 +7,12 @@ import pytest
 from scipy import stats
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import REPLICATES, estimate, point_sampled
+from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint import BOX_SIDE
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.point_sampler import PointSampler
 from pipeline.truth.query import Queries
+from pipeline.truth.replicates import REPLICATES
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric, preset_names
 from weaves.surface import surface_at as oracle
@@ -27,7 +29,7 @@ def _direction(theta, phi):
 def _queries(wi, wo, sigma=20.0, rows=1, centre=(0.3, 0.7)):
     ones = np.ones(rows, np.float32)
     directions = (np.tile(np.asarray(w, np.float32), (rows, 1)) for w in (wi, wo))
-    return Queries(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
+    return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
 
 
 def _both(fabric, warp=None, weft=None, **changes):
@@ -217,7 +219,7 @@ def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
     for other in (0.0, 89.9):
         queries = _queries(_direction(theta, 13), _direction(other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, TruthOptions(min_count=64, max_count=128), 1)
-        for values in (answers.mean, answers.standard_error, point_sampled(fabric, queries, 1, 0)):
+        for values in (answers.mean, answers.standard_error, PointSampler(fabric).sample(queries, 1, 0)):
             assert np.isfinite(values).all()
             assert (values >= 0).all()
 
@@ -226,7 +228,7 @@ def test_point_sampling_converges_to_the_truth():
     fabric = load_fabric("basket")
     queries = _queries(_direction(30, 0), _direction(45, 120), sigma=0.7)
     exact = estimate(fabric, queries, EXACT, 1)
-    np.testing.assert_allclose(point_sampled(fabric, queries, 400_000, 1), exact.mean, rtol=0.03)
+    np.testing.assert_allclose(PointSampler(fabric).sample(queries, 400_000, 1), exact.mean, rtol=0.03)
 
 
 @pytest.mark.parametrize(
@@ -235,11 +237,14 @@ def test_point_sampling_converges_to_the_truth():
         ("sigma", 0.0, "sigma[1] = 0.0: must be greater than 0"),
         ("u", math.nan, "u[1] = nan: must be finite"),
         ("wi", (0.0, 0.0, 2.0), "wi[1]"),
-        ("wo", (0.0, 0.6, -0.8), "wo_z[1]"),
+        ("wo", (0.0, 1.0, 0.0), "wo[1] = [0.0, 1.0, 0.0]: must not lie in the fabric plane"),
+        ("sigma_minor", -1.0, "sigma_minor[1] = -1.0: must be greater than 0"),
+        ("curvature", 1.5, "curvature[1] = 1.5: must be from 0 to 1"),
     ],
 )
 def test_bad_queries_are_named(field, value, words):
     queries = _queries((0, 0, 1), (0, 0.6, 0.8), rows=3)
+    queries = queries._replace(sigma_minor=queries.sigma.copy())
     getattr(queries, field)[1] = value
     with pytest.raises(BadInput) as caught:
         estimate(load_fabric("denim"), queries, TruthOptions(), 0)

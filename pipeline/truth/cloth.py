@@ -1,0 +1,89 @@
+"""A fabric and its queries as kernels read them: both sides of the cloth, the options, and columns in float64."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.footprint import BOX, GAUSSIAN
+from pipeline.truth.heightfield import HeightField, height_field
+from pipeline.truth.options import TruthOptions, Variation
+from pipeline.truth.patch import Choices
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+AREA: Final = 5
+"""Column of the denominator in every array of sums, after the four components and what goes straight through."""
+
+SUMS: Final = 6
+"""Columns of every array of sums."""
+
+FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
+
+
+class Model(NamedTuple):
+    """One side of a fabric with the options that shape its numbers.
+
+    Attributes
+    ----------
+    front, back : HeightField
+        The side that the viewer sees, and the other, reflected in the fabric plane.
+    choices : Choices
+        Options of the point's share.
+    shape : int
+        GAUSSIAN or BOX.
+    projected : bool
+        Whether the denominator is the footprint's projected area.
+    """
+
+    front: HeightField
+    back: HeightField
+    choices: Choices
+    shape: int
+    projected: bool
+
+
+class Columns(NamedTuple):
+    """N queries in float64 with unit directions, the viewer in front; the fields of `Queries`."""
+
+    u: npt.NDArray[np.float64]
+    v: npt.NDArray[np.float64]
+    sigma: npt.NDArray[np.float64]
+    wi: npt.NDArray[np.float64]
+    wo: npt.NDArray[np.float64]
+    sigma_minor: npt.NDArray[np.float64]
+    angle: npt.NDArray[np.float64]
+    curvature: npt.NDArray[np.float64]
+
+    def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_]) -> Columns:
+        """Return the queries at `index`."""
+        return Columns(*(np.ascontiguousarray(column[index]) for column in self))
+
+
+def columns_of(queries: Queries, behind: bool = False) -> Columns:
+    """Return queries for kernels, reflected in the fabric plane if the viewer is `behind` the cloth."""
+    wide = Columns(*(np.ascontiguousarray(column, np.float64) for column in queries))
+    flip = (1.0, 1.0, -1.0 if behind else 1.0)
+    wi, wo = (w / np.linalg.norm(w, axis=-1, keepdims=True) * flip for w in (wide.wi, wide.wo))
+    return wide._replace(wi=wi, wo=wo)
+
+
+def model_of(fabric: Fabric, options: TruthOptions, behind: bool = False) -> Model:
+    """Return a fabric for kernels, seen from `behind` if asked for."""
+    front, back = _sides(fabric, options.variation)
+    return Model(
+        back if behind else front,
+        front if behind else back,
+        Choices(options.frame == "macro", options.geometry == "linear", options.shadows),
+        FOOTPRINTS[options.footprint],
+        options.normaliser == "projected",
+    )
+
+
+@lru_cache(maxsize=16)
+def _sides(fabric: Fabric, variation: Variation | None) -> tuple[HeightField, HeightField]:
+    """Tabulate both sides, once for each fabric; the draft of a back repeats as that of the front does."""
+    return height_field(fabric, variation), height_field(fabric.back(), variation)

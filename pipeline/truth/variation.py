@@ -1,0 +1,42 @@
+"""Yarns that differ: a random factor of the specular colour for every float, as real cloth glitters [Jin2022Woven].
+
+The factors are log-normal with mean 1; their spread is chosen here, because the published form is not stated. A cloth
+that varies is a larger cloth that repeats: the draft is tiled, so that every float of the tile has a factor of its own
+and nothing else of the method changes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.truth.options import Variation
+
+
+def gloss(
+    variation: Variation, family: int, side: int, pick: int, end: int, offset: float, repeat: tuple[int, int]
+) -> float:
+    """Return the factor of a float, named by its family, its yarn and twice the position of its centre.
+
+    Parameters
+    ----------
+    variation : Variation
+        How much the floats differ.
+    family, side : int
+        Whose float; whether it lies on top (0) or beneath (1) here.
+    pick, end : int
+        The cell.
+    offset : float
+        Centre of the cell minus centre of the float, along the yarn's own axis.
+    repeat : tuple of int
+        Ends and picks of the tiled draft.
+    """
+    if not math.isfinite(offset):
+        offset = 0.0
+    ends, picks = repeat
+    # A weft's own axis points to -x (frames).
+    centre = round(2 * (pick - offset)) % (2 * picks) if family == 0 else round(2 * (end - offset)) % (2 * ends)
+    line = end if family == 0 else pick
+    normal = np.random.default_rng([variation.seed, family, side, line, centre]).standard_normal()
+    return math.exp(variation.spread * normal - 0.5 * variation.spread**2)
