@@ -1,7 +1,7 @@
 """How kernels are compiled: single-threaded, without the GIL, cached on disk under a name that follows their sources.
 
 numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of this
-package cannot serve a stale kernel. No fast-math: the bytes of a shard must not depend on how a compiler reorders sums.
+package cannot serve a stale kernel. No fast-math but where a kernel says so (`fast_kernel`).
 """
 
 from __future__ import annotations
@@ -28,3 +28,12 @@ numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
 """Decorator of every compiled function of the ground truth."""
+
+fast_kernel = numba.njit(
+    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
+)
+"""Decorator of the few flat loops in single precision that vector units must be free to sum in their own order.
+
+NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never
+between runs, workers or orders on one.
+"""

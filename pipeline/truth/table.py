@@ -1,0 +1,252 @@
+"""The repeat as a table of nodes with horizons, which turns a query of any footprint into a sum over some thousand nodes.
+
+A cloth whose draft maps onto itself under a translation needs one cell of each orbit only: an 8-end satin is 8 cells,
+not 64. Every piece of yarn seen from above in such a cell is a tensor grid of nodes, x = r sin v across the yarn with v
+evenly spaced, evenly spaced along it. A node holds normal, tangent, and for each azimuth the slope of its horizon.
+Where a highlight is narrower than a node, finer nodes resolve it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.heightfield import (
+    ALPHA,
+    BEND,
+    GAP,
+    HALF_LENGTH,
+    RADIUS,
+    SIN_TWIST,
+    TOP,
+    UNDER,
+    WARP,
+    HeightField,
+    surface_at,
+)
+from pipeline.truth.horizon import horizons
+from pipeline.truth.kernel import kernel
+
+NODES: Final = 32
+"""Nodes a yarn spacing, across and along."""
+
+AZIMUTHS: Final = 64
+"""Directions in which horizons are known."""
+
+_RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
+_FINEST = 16
+_FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
+
+Single = npt.NDArray[np.float32]
+Double = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+# Columns of `Table.pieces`.
+START, COLUMNS, ROWS, KIND_X, KIND_Y, FAMILY, FINE_START, FINE = range(8)
+
+
+class Table(NamedTuple):
+    """Nodes of one side of a cloth.
+
+    Attributes
+    ----------
+    repeat : int64 (2,)
+        Ends and picks.
+    pieces : int64 (P, 8)
+        First node, nodes along x and along y, which edges along x and along y, family (or GAP), first fine node, fine
+        nodes a node.
+    copies : int64 (P, C, 2)
+        End and pick of the cells in which a piece lies.
+    edges : float32 (E, n + 1)
+        Borders of nodes within their cell; shorter rows repeat their last value.
+    evenly : float32 (N,)
+        Share of the cloth's area that a node and its copies stand for.
+    normal : float32 (4, N)
+        Normal of each node, and 1 / n_z; rows x, y, z, 1 / z.
+    fine : float32 (7, F)
+        The same for the finer nodes, then the tangent. Within a piece, first all nodes' first ones.
+    slope : float32 (A, N)
+        Slope of the horizon.
+    slope_behind : float32 (A, N)
+        The same at the back of the cloth; no rows if not asked for.
+    uniform : float
+        Standard deviation from which on a Gaussian covers the cloth evenly.
+    """
+
+    repeat: Index
+    pieces: Index
+    copies: Index
+    edges: Single
+    evenly: Single
+    normal: Single
+    fine: Single
+    slope: Single
+    slope_behind: Single
+    uniform: float
+
+
+def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = NODES, azimuths: int = AZIMUTHS) -> Table:
+    """Build the table of one side of a cloth.
+
+    Parameters
+    ----------
+    front, back : HeightField
+        The side that is seen and the other one, reflected in the fabric plane.
+    behind : bool
+        Whether light from behind will be asked for.
+    nodes, azimuths : int
+        Resolution.
+    """
+    picks, ends = front.top.shape
+    orbits = _orbits(front.top)
+    kinds: list[tuple[float, ...]] = []
+    rows, copies, grids = [], [], []
+    start, fine_start = 0, 0
+    for orbit in orbits:
+        pick, end = orbit[0]
+        for family, x_edges, y_edges in _pieces(front, pick, end, nodes):
+            for edges in (x_edges, y_edges):
+                if edges not in kinds:
+                    kinds.append(edges)
+            columns, lines = len(x_edges) - 1, len(y_edges) - 1
+            finer = (1, 1) if family == GAP else _finer(front, family, pick, end, columns, lines)
+            kind_x, kind_y = kinds.index(x_edges), kinds.index(y_edges)
+            rows.append((start, columns, lines, kind_x, kind_y, family, fine_start, finer[0] * finer[1]))
+            copies.append([(e, p) for p, e in orbit])
+            grids.append((end, pick, family, x_edges, y_edges, finer))
+            start += columns * lines
+            fine_start += columns * lines * finer[0] * finer[1]
+
+    # Positions of the nodes and of the finer ones; then what the surface is there.
+    at = [_positions(front, *grid) for grid in grids]
+    x, y = (np.concatenate([part[axis] for part in at]) for axis in (0, 1))
+    fine_x, fine_y = (np.concatenate([part[axis] for part in at]) for axis in (2, 3))
+    areas = [np.outer(np.diff(g[4]), np.diff(g[3])).ravel() * len(c) for g, c in zip(grids, copies, strict=True)]
+    size = max(map(len, kinds))
+    slope = horizons(front, x, y, azimuths, False)
+    slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
+    pieces = np.array(rows, np.int64)
+    return Table(
+        repeat=np.array([ends, picks], np.int64),
+        pieces=pieces,
+        copies=np.array(copies, np.int64),
+        edges=np.array([edges + (edges[-1],) * (size - len(edges)) for edges in kinds], np.float32),
+        evenly=(np.concatenate(areas) / (ends * picks)).astype(np.float32),
+        normal=_surface(front, x, y)[:4],
+        fine=_surface(front, fine_x, fine_y),
+        slope=slope,
+        slope_behind=slope_behind,
+        uniform=_FADED * _longest_period(front.top),
+    )
+
+
+def _orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
+    """Group the cells (pick, end) that translations of the cloth onto itself carry into one another."""
+    picks, ends = top.shape
+    steps = [(p, e) for p, e in np.ndindex(picks, ends) if np.array_equal(np.roll(top, (p, e), (0, 1)), top)]
+    left = dict.fromkeys(np.ndindex(picks, ends))
+    orbits = []
+    while left:
+        pick, end = next(iter(left))
+        orbits.append([((pick + p) % picks, (end + e) % ends) for p, e in steps])
+        for cell in orbits[-1]:
+            del left[cell]
+    return orbits
+
+
+def _longest_period(top: npt.NDArray[np.int8]) -> float:
+    """Return the wavelength of the slowest wave that the translations of a cloth onto itself leave."""
+    picks, ends = top.shape
+    steps = [(p, e) for p, e in np.ndindex(picks, ends) if np.array_equal(np.roll(top, (p, e), (0, 1)), top)]
+    shortest = min(
+        math.hypot(m / ends, n / picks)
+        for m in range(ends + 1)
+        for n in range(-picks, picks + 1)
+        if (m or n) and all((m * e * picks + n * p * ends) % (ends * picks) == 0 for p, e in steps)
+    )
+    return 1.0 / shortest
+
+
+def _pieces(
+    field: HeightField, pick: int, end: int, nodes: int
+) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
+    """Return family, x edges and y edges of everything seen from above in a cell."""
+    top = int(field.top[pick, end])
+    around = [tuple((0.5 + radius * np.sin(np.linspace(-math.pi / 2, math.pi / 2, nodes + 1))).tolist())
+              for radius in field.yarn[:, RADIUS]]  # fmt: skip
+
+    def straight(low: float, high: float) -> tuple[float, ...]:
+        return tuple(np.linspace(low, high, max(4, math.ceil(nodes * (high - low))) + 1).tolist())
+
+    def oriented(family: int, across: tuple[float, ...], along: tuple[float, ...]) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
+        return (family, across, along) if family == WARP else (family, along, across)
+
+    found = [oriented(top, around[top], straight(0.0, 1.0))]
+    margin = 0.5 - float(field.yarn[top, RADIUS])
+    if margin > 1e-9:
+        beneath = 1 - top
+        for low, high in ((0.0, margin), (1.0 - margin, 1.0)):
+            found.append(oriented(beneath, around[beneath], straight(low, high)))
+        gap = 0.5 - float(field.yarn[beneath, RADIUS])
+        if gap > 1e-9:
+            sides = [[(0.0, width), (1.0 - width, 1.0)] for width in (margin, gap)]
+            for first in sides[0]:
+                for second in sides[1]:
+                    found.append((GAP, *oriented(top, straight(*first), straight(*second))[1:]))
+    return found
+
+
+def _finer(field: HeightField, family: int, pick: int, end: int, columns: int, lines: int) -> tuple[int, int]:
+    """Return how many finer nodes, along x and along y, resolve the highlights of a piece."""
+    side = TOP if family == field.top[pick, end] else UNDER
+    alpha = field.yarn[family, ALPHA]
+    length = 2.0 * field.floats[pick, end, side, HALF_LENGTH]
+    across, along = (columns, lines) if family == WARP else (lines, columns)
+    turn_along = 2.0 * field.yarn[family, BEND] / length / along
+    turn_across = math.pi * abs(field.yarn[family, SIN_TWIST]) / across
+    counts = [min(_FINEST, max(1, math.ceil(_RESOLVED * turn / alpha))) for turn in (turn_across, turn_along)]
+    return (counts[0], counts[1]) if family == WARP else (counts[1], counts[0])
+
+
+def _positions(
+    field: HeightField, end: int, pick: int, family: int, x_edges: tuple[float, ...], y_edges: tuple[float, ...], finer: tuple[int, int],
+) -> tuple[Double, Double, Double, Double]:
+    """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
+
+    def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Double:
+        # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
+        if bent:
+            borders = np.arcsin(np.clip((np.array(edges) - 0.5) / radius, -1.0, 1.0))
+        else:
+            borders = np.array(edges)
+        share = (np.arange(count)[:, None] + 0.5) / count
+        at = borders[:-1] + share * np.diff(borders)
+        return 0.5 + radius * np.sin(at) if bent else at
+
+    radius = 0.0 if family == GAP else float(field.yarn[family, RADIUS])
+    bent = (family == WARP, family not in (WARP, GAP))
+    grids = []
+    for counts in ((1, 1), finer):
+        xs = end + middles(x_edges, counts[0], bent[0], radius)
+        ys = pick + middles(y_edges, counts[1], bent[1], radius)
+        shape = (counts[1], counts[0], ys.shape[1], xs.shape[1])
+        grids.append(np.broadcast_to(xs[None, :, None, :], shape).ravel())
+        grids.append(np.broadcast_to(ys[:, None, :, None], shape).ravel())
+    return grids[0], grids[1], grids[2], grids[3]
+
+
+@kernel
+def _surface(field: HeightField, x: Double, y: Double) -> Single:
+    """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
+    found = np.zeros((7, len(x)), np.float32)
+    for k in range(len(x)):
+        family, _, _, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]), False)
+        if family == GAP:
+            nx, ny, nz = 0.0, 0.0, 1.0
+        values = (nx, ny, nz, 1.0 / nz, tx, ty, tz)
+        for c in range(7):
+            found[c, k] = values[c]
+    return found
