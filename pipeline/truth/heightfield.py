@@ -127,21 +127,31 @@ def _rise(side: int, row: tuple[float, float, float, float], radius: float) -> f
 
 
 @kernel
-def _height_top(field: HeightField, family: int, pick: int, end: int, x: float, y: float) -> tuple[float, float, float]:
-    """Return height and its slopes along local x and y, for a float on top; |x| <= r."""
-    r, beta, bend = field.yarn[family, RADIUS], field.yarn[family, BETA], field.floats[pick, end, TOP, BEND_RADIUS]
-    sine = min(1.0, abs(x) * field.yarn[family, INVERSE_RADIUS])
+def torus_height(
+    r: float, inverse_r: float, beta: float, bend: float, half: float, drop: float, x: float, y: float
+) -> tuple[float, float, float]:
+    """Return height and its slopes along local x and y, for a float on top; |x| <= r, constants as in `HeightField`."""
+    sine = min(1.0, abs(x) * inverse_r)
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     steepness = math.copysign(sine, x) / max(cosine, _EDGE)
     if bend == 0.0:
         return beta * r * cosine, -beta * steepness, 0.0
-    rho, half = r * cosine, field.floats[pick, end, TOP, HALF_LENGTH]
+    rho = r * cosine
     root = math.sqrt((bend + rho - y) * (bend + rho + y))
     # The difference root - R cos(u_max), as a quotient without cancellation: small bends keep every digit.
     rise = 2.0 * bend * rho + rho * rho + (half - y) * (half + y)
-    height = rise / (root + field.floats[pick, end, TOP, AXIS_DROP])
+    height = rise / (root + drop)
     inverse = beta / root
     return beta * height, -(bend + rho) * inverse * steepness, -y * inverse
+
+
+@kernel
+def _height_top(field: HeightField, family: int, pick: int, end: int, x: float, y: float) -> tuple[float, float, float]:
+    """Return height and its slopes along local x and y, for a float on top; |x| <= r."""
+    yarn, own = field.yarn[family], field.floats[pick, end, TOP]
+    return torus_height(
+        yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP], x, y
+    )
 
 
 @kernel

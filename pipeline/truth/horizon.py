@@ -12,7 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth.heightfield import (
+    AXIS_DROP,
+    BEND_RADIUS,
+    BETA,
     GAP,
+    HALF_LENGTH,
+    INVERSE_RADIUS,
     OFFSET,
     RADIUS,
     TOP,
@@ -22,13 +27,14 @@ from pipeline.truth.heightfield import (
     height_along,
     local_position,
     surface_at,
+    torus_height,
 )
 from pipeline.truth.kernel import kernel
 
 _HALVINGS, _SECANTS = 3, 4
 _STRIP_POINTS = 8
 _NEAREST = 1e-6
-_FLATTEST = 1e-4  # slope below which nothing is told apart from the horizontal
+_FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are not told apart
 _STEEPEST = 1e4
 
 
@@ -41,13 +47,24 @@ def _slope_of_top(
 
     The slope is greatest where its tangent passes through the point, at the root of (h - z) - s h', which falls with s.
     """
+    # The ray in the frame of the float.
+    family = int(field.top[pick, end])
+    yarn, own = field.yarn[family], field.floats[pick, end, TOP]
+    r, inverse_r, beta = yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA]
+    bend, length, drop = own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP]
+    x, y = local_position(family, own[OFFSET], x, y, column, row)
+    if family != WARP:
+        dx, dy = dy, -dx
+
     a = max(a, _NEAREST)
-    low, rise_a = height_along(field, TOP, x + a * dx, y + a * dy, dx, dy, end, pick, column, row)
+    low, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + a * dx, y + a * dy)
+    rise_a = slope_x * dx + slope_y * dy
     low -= z
     fall_a = low - a * rise_a
     if fall_a >= 0.0:
         return max(best, low / a)
-    high, rise_b = height_along(field, TOP, x + b * dx, y + b * dy, dx, dy, end, pick, column, row)
+    high, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + b * dx, y + b * dy)
+    rise_b = slope_x * dx + slope_y * dy
     high -= z
     fall_b = high - b * rise_b
     if fall_b <= 0.0:
@@ -67,8 +84,9 @@ def _slope_of_top(
             share = min(max(fall_a / (fall_a - fall_b), 0.02), 0.98)
         theta = first + (last - first) * share
         s = middle - half * math.cos(theta)
-        height, rise = height_along(field, TOP, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
+        height, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + s * dx, y + s * dy)
         height -= z
+        rise = slope_x * dx + slope_y * dy
         best = max(best, height / s)
         fall = (height - s * rise) * math.sin(theta)
         if fall < 0.0:

@@ -33,7 +33,7 @@ from pipeline.truth.kernel import kernel
 NODES: Final = 32
 """Nodes a yarn spacing, across and along."""
 
-AZIMUTHS: Final = 64
+AZIMUTHS: Final = 128
 """Directions in which horizons are known."""
 
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
