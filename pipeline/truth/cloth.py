@@ -37,6 +37,8 @@ class Model(NamedTuple):
         GAUSSIAN or BOX.
     projected : bool
         Whether the denominator is the footprint's projected area.
+    varied : bool
+        Whether floats differ in gloss.
     """
 
     front: HeightField
@@ -44,6 +46,7 @@ class Model(NamedTuple):
     choices: Choices
     shape: int
     projected: bool
+    varied: bool
 
 
 class Columns(NamedTuple):
@@ -80,6 +83,7 @@ def model_of(fabric: Fabric, options: TruthOptions, behind: bool = False) -> Mod
         Choices(options.frame == "macro", options.geometry == "linear", options.shadows),
         FOOTPRINTS[options.footprint],
         options.normaliser == "projected",
+        options.variation is not None,
     )
 
 

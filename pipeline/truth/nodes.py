@@ -17,13 +17,17 @@ from pipeline.truth.cloth import Columns, Model
 from pipeline.truth.footprint import GAUSSIAN, interval_masses
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP
 from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.single import absorbed, remaining
 from pipeline.truth.table import COLUMNS, FAMILY, FINE, FINE_START, KIND_X, KIND_Y, ROWS, START, Single, Table
 
-_EDGE: Final = np.float32(0.1)
+_EDGE: Final = np.float32(0.01)
+_EDGE_JUMP: Final = np.float32(0.1)
+_UNSEEN: Final = 0.002
 _SMOOTH: Final = np.float32(0.0005)
 
-_0, _1 = np.float32(0.0), np.float32(1.0)
+_0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_JUMP = np.float32(3.0)
 _TINY = np.float32(1e-30)
 _GRAZING = np.float32(1e-6)
 _STEEPEST = 1e4
@@ -35,44 +39,81 @@ def weigh(
     ix: np.float32, iy: np.float32, iz: np.float32, ox: np.float32, oy: np.float32, oz: np.float32,
     slope_i: np.float32, low_i: Single, high_i: Single, turn_i: np.float32,
     slope_o: np.float32, low_o: Single, high_o: Single, turn_o: np.float32,
-    blend: np.float32, lit: Single, areas: Single, diffuses: Single,
+    blend: np.float32, lit: Single, areas: Single, diffuses: Single, margins: Single, lit_margins: Single,
 ) -> tuple[float, float]:
-    """Write each node's weight if it is seen and lit, and its shares of area and diffuse; return the sums of both."""
+    """Write each node's weight if it is seen and lit, and its shares of area and diffuse; return the sums of both.
+
+    The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not.
+    """
     area, diffuse = _0, _0
     for k in range(len(weight)):
         cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
         cos_i = ix * nx[k] + iy * ny[k] + iz * nz[k]
-        visible = weight[k] if slope_o > low_o[k] + turn_o * (high_o[k] - low_o[k]) else _0
-        both = visible if slope_i > low_i[k] + turn_i * (high_i[k] - low_i[k]) else _0
-        both = both if cos_i > _0 else _0
+        margin_o = slope_o - low_o[k] - turn_o * (high_o[k] - low_o[k])
+        margin_i = min(min(slope_i - low_i[k] - turn_i * (high_i[k] - low_i[k]), cos_i), margin_o)
+        visible = weight[k] if margin_o > _0 else _0
+        both = weight[k] if margin_i > _0 else _0
         projected = cos_o * inverse[k]
         a = visible * projected
         c = both * projected * (blend * cos_i + (_1 - blend) * iz)
-        lit[k], areas[k], diffuses[k] = both, a, c
+        lit[k], areas[k], diffuses[k], margins[k], lit_margins[k] = both, a, c, margin_o, margin_i
         area += a
         diffuse += c
     return area, diffuse
 
 
 @fast_kernel
-def doubts(areas: Single, diffuses: Single, speculars: Single, columns: int) -> tuple[float, float, float]:
-    """Return the squared errors of the three sums over a piece, from neighbours of which one is hidden."""
+def borders(
+    areas: Single, diffuses: Single, speculars: Single, margins: Single, lit_margins: Single, columns: int
+) -> tuple[float, float, float, float, float, float]:
+    """Return what the borders of shadows, found between nodes, add to the three sums, and their squared errors.
+
+    Where the margin changes sign from one node to the next, the border lies where its straight line crosses 0, and the
+    visible node counts up to there instead of half-way. Where the margin jumps, half-way is as good as anything.
+    """
     area, diffuse, specular = _0, _0, _0
-    for k in range(len(areas) - columns - 1):
-        a, a1, a2 = areas[k], areas[k + 1], areas[k + columns]
-        c, c1, c2 = diffuses[k], diffuses[k + 1], diffuses[k + columns]
-        s, s1, s2 = speculars[k], speculars[k + 1], speculars[k + columns]
-        # One of the two is 0 where a border runs between them.
-        area += a * a * _SMOOTH + _border(a, a1) + _border(a, a2)
-        diffuse += c * c * _SMOOTH + _border(c, c1) + _border(c, c2)
-        specular += s * s * _SMOOTH + _border(s, s1) + _border(s, s2)
-    return area, diffuse, specular
+    area_error, diffuse_error, specular_error = _0, _0, _0
+    for k in range(columns, len(areas) - 2 * columns - 2):
+        m, right, down = margins[k], margins[k + 1], margins[k + columns]
+        share, doubt = _crossing(margins[k - 1], m, right, margins[k + 2], abs(m - down))
+        v = areas[k] + areas[k + 1]
+        area += v * share
+        area_error += areas[k] * areas[k] * _SMOOTH + v * v * doubt
+        share, doubt = _crossing(margins[k - columns], m, down, margins[k + 2 * columns], abs(m - right))
+        v = areas[k] + areas[k + columns]
+        area += v * share
+        area_error += v * v * doubt
+
+        m, right, down = lit_margins[k], lit_margins[k + 1], lit_margins[k + columns]
+        share, doubt = _crossing(lit_margins[k - 1], m, right, lit_margins[k + 2], abs(m - down))
+        v, w = diffuses[k] + diffuses[k + 1], speculars[k] + speculars[k + 1]
+        diffuse += v * share
+        specular += w * share
+        diffuse_error += diffuses[k] * diffuses[k] * _SMOOTH + v * v * doubt
+        specular_error += speculars[k] * speculars[k] * _SMOOTH + w * w * doubt
+        share, doubt = _crossing(lit_margins[k - columns], m, down, lit_margins[k + 2 * columns], abs(m - right))
+        v, w = diffuses[k] + diffuses[k + columns], speculars[k] + speculars[k + columns]
+        diffuse += v * share
+        specular += w * share
+        diffuse_error += v * v * doubt
+        specular_error += w * w * doubt
+    return area, diffuse, specular, area_error, diffuse_error, specular_error
 
 
 @fast_kernel
-def _border(a: np.float32, b: np.float32) -> np.float32:
-    """Return the squared error of two neighbours: of the one that counts, if the other does not."""
-    return (a + b) * (a + b) * _EDGE if min(a, b) == _0 else _0
+def _crossing(before: np.float32, m: np.float32, n: np.float32, after: np.float32, across: np.float32) -> tuple[float, float]:
+    """Return what a border between nodes of margins m and n adds to the visible one's share, and its squared error.
+
+    `before` and `after` are the margins beyond them, `across` the change of the margin at a right angle, which shares
+    the border with the links in that direction.
+    """
+    change = abs(m - n)
+    weight = change / (change + across + _TINY)
+    jump = change > _JUMP * max(abs(before - m), abs(n - after))
+    share = _0 if jump else max(m, n) / (change + _TINY) - _HALF
+    crossed = min(m, n) <= _0 and max(m, n) > _0
+    doubt = weight * (_EDGE_JUMP if jump else _EDGE)
+    return (weight * share if crossed else _0), (doubt if crossed else _0)
 
 
 @fast_kernel
@@ -229,10 +270,12 @@ def sum_rows(
     nodes = table.normal.shape[1]
     weight, lit = np.zeros(nodes, np.float32), np.zeros(nodes, np.float32)
     areas, diffuses, speculars = np.zeros(nodes, np.float32), np.zeros(nodes, np.float32), np.zeros(nodes, np.float32)
+    margins, lit_margins = np.zeros(nodes, np.float32), np.zeros(nodes, np.float32)
     cells = max(table.repeat[0], table.repeat[1])
     scratch = np.zeros((2, cells, len(table.edges), table.edges.shape[1] - 1), np.float32)
     touched = np.zeros((2, cells, len(table.edges)), np.bool_)
     azimuths = len(table.slope)
+    moved = np.zeros(5)
     thickness = np.float32(front.thickness)
     for row in range(rows):
         wi, wo = columns.wi[row], columns.wo[row]
@@ -254,7 +297,8 @@ def sum_rows(
             _fill_weights(table, model.shape, columns, row, scratch, touched, weight)
         shares = table.evenly if even else weight
 
-        area, area_error = 0.0, 0.0
+        area, area_error, moved_area = 0.0, 0.0, 0.0
+        moved[:] = 0.0
         sums, squares = means[row], errors[row]
         for p in range(len(table.pieces)):
             piece = table.pieces[p]
@@ -270,7 +314,7 @@ def sum_rows(
                 table.normal[3, start:stop], share, ix, iy, iz, ox, oy, oz,
                 slope_i, horizon_i[i0, start:stop], horizon_i[i1, start:stop], ti,
                 slope_o, table.slope[o0, start:stop], table.slope[o1, start:stop], to,
-                np.float32(yarn[BLEND]), lit[:count], areas[:count], diffuses[:count],
+                np.float32(yarn[BLEND]), lit[:count], areas[:count], diffuses[:count], margins[:count], lit_margins[:count],
             )
             area += a
             speculars[:count] = _0
@@ -303,18 +347,28 @@ def sum_rows(
                             *parts, ix, iy, iz, ox, oy, oz, square, thickness, size, scale, lit[:count], speculars[:count]
                         )
                     f0, f1 = f1, f1 + count
-            a2, c2, s2 = doubts(areas[:count], diffuses[:count], speculars[:count], across)
+            a1, c1, s1, a2, c2, s2 = borders(
+                areas[:count], diffuses[:count], speculars[:count], margins[:count], lit_margins[:count], across
+            )
+            moved_area += a1
             area_error += a2
             if family != GAP:
+                moved[family] += s1
+                moved[2 + family] += c1 / math.pi
                 squares[family] += s2
                 squares[2 + family] += c2 / (math.pi * math.pi)
 
-        # Ratios: the error of the area adds to that of each numerator.
+        # Ratios: what borders between nodes move, what they leave in doubt, and what nothing here can see.
         below = wo[2] if model.projected else area
+        if area < HIDDEN_SHARE * wo[2]:
+            means[row], errors[row] = 0.0, 0.0
+            continue
+        squares[4] = area_error * (sums[4] / area) ** 2
         for c in range(5):
-            if below > 0.0:
-                mean = sums[c] / below
-                squares[4] = mean * mean * area_error if c == 4 else squares[4]
-                spread = math.sqrt(squares[c]) + (0.0 if model.projected else mean * math.sqrt(area_error))
-                means[row, c], errors[row, c] = mean, spread / below
+            mean = sums[c] / below
+            inner = 0.0 if model.projected else mean
+            shift = moved[c] - inner * moved_area
+            doubt = squares[c] + inner * inner * area_error
+            means[row, c] = mean
+            errors[row, c] = math.sqrt(shift * shift + doubt) / below + _UNSEEN * mean
     return means, errors, counts

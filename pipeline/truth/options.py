@@ -33,6 +33,8 @@ class TruthOptions(BaseModel):
     """Kernel k_P; the box has the same standard deviations: sides sigma sqrt(12)."""
     relative_error: float = Field(default=0.02, gt=0, le=1)
     """Stop when the norm of the four standard errors falls below this share of the norm of the four means."""
+    absolute_error: float = Field(default=1e-5, ge=0, le=1)
+    """Or below this, 1/sr: dark patches need no more."""
     min_count: int = Field(default=256, ge=32)
     """Points before the first look at the error; a power of two."""
     max_count: int = Field(default=4096, ge=32)

@@ -94,6 +94,9 @@ class Answers(NamedTuple):
         return Answers(*(column[index] for column in self))  # type: ignore[arg-type]
 
 
+HIDDEN_SHARE = 1e-3
+"""A patch of which the viewer sees less than this share of its projected area counts as hidden and answers 0."""
+
 STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
 

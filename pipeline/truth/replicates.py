@@ -2,8 +2,7 @@
 
 A component is the ratio of two sums, f = N / D; its standard error comes from the spread of the replicates' residuals
 N_r - f D_r (the linearised ratio estimator [Cochran1977Sampling]), with REPLICATES - 1 degrees of freedom. Patches that
-are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit; one that no
-point sees answers 0. The point sets differ in how fast the error falls: as count^-1/2 for independent points, faster
+are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit. The point sets differ in how fast the error falls: as count^-1/2 for independent points, faster
 for the others.
 """
 
@@ -19,6 +18,7 @@ from pipeline.truth.cloth import AREA, SUMS, Columns, Model
 from pipeline.truth.footprint import place_pair
 from pipeline.truth.heightfield import GAP
 from pipeline.truth.kernel import kernel
+from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.patch import Scene, point_share, scene
 from pipeline.truth.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
 
@@ -100,6 +100,7 @@ def sample_rows(
     index: npt.NDArray[np.int64],
     method: int,
     relative_error: float,
+    absolute_error: float,
     min_count: int,
     max_count: int,
     seed: np.uint64,
@@ -114,7 +115,7 @@ def sample_rows(
         Name of each row: its random numbers are a function of (seed, index).
     method : int
         INDEPENDENT, JITTERED, R2 or OWEN.
-    relative_error, min_count, max_count, seed
+    relative_error, absolute_error, min_count, max_count, seed
         As in `TruthOptions` and `estimate`.
     """
     rows = len(index)
@@ -150,11 +151,20 @@ def sample_rows(
             for c in range(4):
                 size += mean[c] * mean[c]
                 squares += error[c] * error[c]
-            reached = size > 0.0 and squares <= relative_error * relative_error * size
+            if size == 0.0:
+                # So many points without light: a share of 1 / count may have been missed.
+                error[2] = error[3] = abs(query.light.z) / (math.pi * done * REPLICATES)
+                squares = 2.0 * error[2] * error[2]
+            reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
             # A patch of which hardly a point is seen says nothing of its error yet; its points cost little.
             limit = max_count if seen == REPLICATES else max_count * HIDDEN_PATIENCE
             if done * REPLICATES >= limit or (reached and seen == REPLICATES):
                 break
             target = 2 * done
         counts[row] = done * REPLICATES
+        area = 0.0
+        for r in range(REPLICATES):
+            area += sums[r, AREA]
+        if area < HIDDEN_SHARE * query.viewer.z * counts[row]:
+            mean[:], error[:] = 0.0, 0.0
     return means, errors, counts

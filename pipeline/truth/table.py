@@ -31,11 +31,12 @@ from pipeline.truth.horizon import horizons
 from pipeline.truth.kernel import kernel
 
 NODES: Final = 32
-"""Nodes a yarn spacing, across and along."""
+"""Nodes a yarn spacing, across and along, of a cloth of up to `_FEW` different cells; fewer for more, down to three quarters."""
 
 AZIMUTHS: Final = 128
 """Directions in which horizons are known."""
 
+_FEW = 8
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
 _FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
@@ -88,7 +89,7 @@ class Table(NamedTuple):
     uniform: float
 
 
-def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = NODES, azimuths: int = AZIMUTHS) -> Table:
+def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0, azimuths: int = AZIMUTHS) -> Table:
     """Build the table of one side of a cloth.
 
     Parameters
@@ -98,10 +99,11 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = N
     behind : bool
         Whether light from behind will be asked for.
     nodes, azimuths : int
-        Resolution.
+        Resolution; 0 nodes: as many as `NODES` says.
     """
     picks, ends = front.top.shape
     orbits = _orbits(front.top)
+    nodes = nodes or max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / len(orbits)))))
     kinds: list[tuple[float, ...]] = []
     rows, copies, grids = [], [], []
     start, fine_start = 0, 0

@@ -1,0 +1,99 @@
+"""The estimators `table` and `auto`: sums over tabulated nodes, and sampling for what the table cannot say well enough.
+
+`auto` asks the table first, which costs some ten microseconds a query, and samples the queries of which the table's own
+stated error is above the one asked for, and those that it knows nothing of: tiny footprints, curved cloth, footprints
+at an angle, and models other than the default.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.cloth import Columns, Model
+from pipeline.truth.footprint import GAUSSIAN
+from pipeline.truth.nodes import sum_rows
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.replicates import OWEN, sample_rows
+from pipeline.truth.table import NODES, Table, tabulate
+from weaves.errors import BadInput
+
+Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
+
+_SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
+_STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
+"""Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
+
+
+def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+    """Answer each query by the table if that states the error asked for, else by scrambled Sobol points."""
+    rows = len(index)
+    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    left = np.ones(rows, np.bool_)
+    known = np.flatnonzero(_tabulated(model, columns))
+    if known.size:
+        chosen = columns.take(known)
+        mean, error, count = sum_rows(model, _table(model, chosen), chosen)
+        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
+        good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
+        means[known], errors[known], counts[known] = mean, error, count
+        left[known[good]] = False
+    missing = np.flatnonzero(left)
+    if missing.size:
+        mean, error, count = sample_rows(
+            model,
+            columns.take(missing),
+            index[missing],
+            OWEN,
+            options.relative_error / _STUDENT,
+            options.absolute_error / _STUDENT,
+            options.min_count,
+            options.max_count,
+            np.uint64(seed),
+        )
+        means[missing], errors[missing] = mean, _STUDENT * error
+        counts[missing] += count
+    return means, errors, counts
+
+
+def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+    """Answer every query by the table, whatever error that states."""
+    known = _tabulated(model, columns)
+    if not known.all():
+        row = int(np.flatnonzero(~known)[0])
+        allowed = "flat cloth, footprints along the axes of at least "
+        allowed += f"{_SMALLEST:.3g} yarn spacings, and the default frame, geometry, shadows and variation: take auto"
+        raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
+    return sum_rows(model, _table(model, columns), columns)
+
+
+def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say which queries the table knows of."""
+    choices = model.choices
+    if choices.macro or choices.linear or not choices.shadows or model.varied:
+        return np.zeros(len(columns.u), np.bool_)
+    along = columns.angle == 0.0
+    if model.shape == GAUSSIAN:
+        along |= columns.sigma == columns.sigma_minor
+    wide = np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST
+    return along & wide & (columns.curvature == 0.0)
+
+
+_TABLES: dict[tuple[int, bool], tuple[Model, Table]] = {}
+_KEPT: Final = 4
+
+
+def _table(model: Model, columns: Columns) -> Table:
+    """Return the table of one side of a cloth, one of the last few built."""
+    behind = bool((columns.wi[:, 2] < 0.0).any())
+    for with_behind in (True, False):
+        kept = _TABLES.get((id(model.front), with_behind))
+        if kept and kept[0].front is model.front and (with_behind or not behind):
+            return kept[1]
+    while len(_TABLES) >= _KEPT:
+        _TABLES.pop(next(iter(_TABLES)))
+    table = tabulate(model.front, model.back, behind)
+    _TABLES[id(model.front), behind] = (model, table)
+    return table
