@@ -30,6 +30,7 @@ app = App(
     default_parameter=Parameter(negative=()),
 )
 
+FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
 Out = Annotated[Path, Parameter(help="Folder of all products.")]
 Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; without one, this machine works.")]
@@ -55,7 +56,7 @@ def list_() -> None:
 
 @app.command(sort_key=1)
 def show(
-    fabric: Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")],
+    fabric: FabricName,
     *,
     out: Annotated[Path | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
 ) -> None:
@@ -76,7 +77,7 @@ def show(
 
 @app.command(sort_key=2)
 def export(
-    fabric: Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")],
+    fabric: FabricName,
     *,
     mesh: Annotated[Path, Parameter(help="File to write, ending in .ply.")],
     vertices: Annotated[int, Parameter(help="Steps across a yarn, and along it in every cell.")] = 64,
@@ -113,17 +114,57 @@ def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", w
 
 
 @app.command(sort_key=5)
-def check(recipe: Annotated[str, Parameter(help="Recipe, or folder of a data set.")], *, out: Out = OUT) -> int:
-    """Read every finished shard again: hashes, schema, ranges, finite values."""
-    from jobs.checking import check_dataset, dataset_folder
+def evaluate(
+    fabric: FabricName,
+    queries: Annotated[Path, Parameter(help="Parquet file of questions, in the columns of a shard.")],
+    *,
+    out: Annotated[Path, Parameter(help="Parquet file to write.")],
+    estimator: Annotated[str | None, Parameter(help="How a value is computed: auto, table, owen, mc, …")] = None,
+    relative_error: Annotated[float | None, Parameter(help="Error to stop at, as a share of the value.")] = None,
+    absolute_error: Annotated[float | None, Parameter(help="Or to stop at in 1/sr, for dark rows.")] = None,
+    max_count: Annotated[int | None, Parameter(help="Points after which a row is given up on, a power of 2.")] = None,
+    footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None,
+    frame: Annotated[str | None, Parameter(help="Cosines inside the yarns: ply or macro.")] = None,
+    normaliser: Annotated[str | None, Parameter(help="Denominator: visible or projected.")] = None,
+    seed: Annotated[int, Parameter(help="Name of the random numbers.")] = 0,
+    skip_bad: Annotated[bool, Parameter(help="List rows without an answer, instead of stopping at them.")] = False,
+) -> None:
+    """Answer any list of questions about a fabric: the file's rows with their answers."""
+    from jobs.evaluating import evaluate as answer
+    from jobs.evaluating import truth_options
+    from weaves.fabric import load_fabric
 
-    faults = check_dataset(dataset_folder(recipe, out))
+    options = truth_options(
+        estimator=estimator,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        max_count=max_count,
+        footprint=footprint,
+        frame=frame,
+        normaliser=normaliser,
+    )
+    answer(load_fabric(fabric), queries, out, options, seed, skip_bad)
+
+
+@app.command(sort_key=6)
+def check(
+    subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")], *, out: Out = OUT
+) -> int:
+    """Read every finished shard again, or test a fabric's ground truth against the laws of physics."""
+    from jobs.checking import check_dataset, check_fabric, resolve
+    from weaves.fabric import Fabric
+
+    found = resolve(subject, out)
+    if isinstance(found, Fabric):
+        check_fabric(found)
+        return 0
+    faults = check_dataset(found)
     for fault in faults:
         _tell(fault)
     return BadInput.exit_code if faults else 0
 
 
-@app.command(sort_key=6)
+@app.command(sort_key=7)
 def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Train the models of a recipe on its data set."""
     from jobs.work import work
@@ -131,15 +172,28 @@ def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", work
     work(recipe, ["train"], out, scheduler, workers)
 
 
-@app.command(sort_key=7)
-def bench(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
-    """Measure error, aliasing and time of every method."""
+@app.command(sort_key=8)
+def bench(
+    recipe: Annotated[
+        str, Parameter(help="Recipe; or `stability`: rounding at the extremes; or `truth`: how fast it is.")
+    ],
+    *,
+    out: Out = OUT,
+    scheduler: Scheduler = "",
+    workers: Workers = 0,
+) -> None:
+    """Measure error, aliasing and time of every method, or how stable and how fast the truth itself is."""
+    from jobs.benching import BENCHES
+
+    if recipe in BENCHES:
+        BENCHES[recipe](out)
+        return
     from jobs.work import work
 
     work(recipe, ["bench"], out, scheduler, workers)
 
 
-@app.command(sort_key=8)
+@app.command(sort_key=9)
 def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Write the page: pictures, tables and plots of everything measured."""
     from jobs.work import work
@@ -147,7 +201,7 @@ def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", wor
     work(recipe, ["report"], out, scheduler, workers)
 
 
-@app.command(sort_key=9)
+@app.command(sort_key=10)
 def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Generate, train, bench and report, skipping what is done."""
     from jobs.task import STAGES
@@ -156,7 +210,7 @@ def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", worker
     work(recipe, STAGES, out, scheduler, workers)
 
 
-@app.command(sort_key=10)
+@app.command(sort_key=11)
 def status(recipe: RecipeName, *, out: Out = OUT) -> None:
     """Show what is done, what failed and why, and what is missing."""
     from rich.console import Console
@@ -180,8 +234,8 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return _end(f"twillight: {' '.join(str(error).split())}", 2)
     except (BadInput, WorkFailed) as error:
         return _end(str(error), error.exit_code)
-    except KeyboardInterrupt:
-        return _end("stopped; what was finished is kept, and the same command goes on from there", 130)
+    except KeyboardInterrupt as stop:
+        return _end(str(stop) or "stopped; what was finished is kept, and the same command goes on from there", 130)
     except BrokenPipeError:
         # Whoever read the output has seen enough, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -112,6 +112,55 @@ def methods_table(frame: Any) -> Table:
     return table
 
 
+def evaluation_table(summary: Any) -> Table:
+    """Show what `twillight evaluate` did (a Summary from `pipeline.shards.evaluate`)."""
+    answered = summary.rows - summary.bad
+    table = _table("rows", "answered", "median relative error", "points a query", "queries a second")
+    for column in table.columns:
+        column.justify = "right"
+    table.add_row(
+        f"{summary.rows:,}",
+        f"{answered:,}",
+        "–"
+        if summary.median_relative_error != summary.median_relative_error
+        else f"{summary.median_relative_error:.2%}",
+        _number(summary.points / answered) if answered else "–",
+        _number(answered / summary.seconds) if summary.seconds else "–",
+    )
+    return table
+
+
+def invariants_table(name: str, found: Sequence[Any]) -> Table:
+    """Show the invariants of a fabric (a sequence of `pipeline.truth.invariants.Invariant`)."""
+    table = _table("invariant", "value", "should be", "holds", "", right=("value",))
+    for item in found:
+        style = "bold red" if item.verdict == "broken" else ""
+        table.add_row(item.name, _measured(item), _should_be(item), _holds(item), item.note, style=style)
+    table.title, table.title_justify = name, "left"
+    return table
+
+
+def _measured(item: Any) -> str:
+    value = f"{item.measured:.4g}"
+    return f"{value} ± {item.standard_error:.1g}" if item.standard_error else value
+
+
+def _should_be(item: Any) -> str:
+    return "–" if item.relation == "reported" else f"{item.relation} {item.expected:g}"
+
+
+def _holds(item: Any) -> str:
+    inside = item.relation == "<=" and item.sigmas < -5
+    match item.verdict:
+        case "exact":
+            return "exactly"
+        case "statistics":
+            return f"by {-item.sigmas:.0f} σ" if inside else f"within statistics ({item.sigmas:+.1f} σ)"
+        case "broken":
+            return f"NO ({item.sigmas:+.1f} σ)" if item.standard_error else "NO"
+    return "a number only"
+
+
 def duration(seconds: float) -> str:
     """Write a time as a person would say it."""
     if seconds < 120:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from reports.record import TRUTH, Record
+from reports.stability import Finding
 from reports.style import display
 from reports.summary import BASELINE, COMPONENTS, rows
 from reports.tiles import EXPOSURE, hex_colour
@@ -111,6 +112,41 @@ def figures_of_merit(records: Sequence[Record], errors: pd.DataFrame, timing: pd
         note = "relative standard error of the truth: median over queries, mean over fabrics"
         result.append({"value": percent(float(np.mean(truth)), 2), "note": note, "paper": ""})
     return result
+
+
+def stability_rows(findings: Sequence[Finding]) -> dict[str, list[Row]]:
+    """Return the rows of the table of extremes by arithmetic: worst error, limit, the textbook's, what cannot be."""
+    result: dict[str, list[Row]] = {}
+    for finding in findings:
+        share = finding.naive_not_finite / finding.count
+        lost = f"{100 * share:.0f} % NaN" if share else ""
+        naive = "" if _missing(finding.naive) or share == 1 else f"{finding.naive:.1e}"
+        result.setdefault(finding.arithmetic, []).append(
+            {
+                "expression": finding.expression,
+                "corner": finding.corner,
+                "cells": [
+                    f"{finding.worst:.1e}",
+                    f"{finding.limit:.1e}",
+                    ", ".join(filter(None, (naive, lost))) or NONE,
+                    str(finding.not_finite),
+                    str(finding.negative),
+                ],
+                "holds": finding.holds,
+                "verdict": "ok" if finding.holds else "limit",
+                "at": finding.at,
+            }
+        )
+    return result
+
+
+def rate_rows(records: Sequence[Record]) -> list[list[str]]:
+    """Return the rows of the table of speeds: what, fabric, value with unit, note."""
+    return [
+        [record.setting, record.fabric or NONE, f"{record.value:,.3g} {record.unit}", record.note]
+        for record in records
+        if record.metric == "rate"
+    ]
 
 
 def fabric_card(fabric: Fabric, role: str) -> Row:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from reports import cells, figures, summary, tiles
 from reports.exr import read_exr
 from reports.options import BenchOptions
 from reports.record import TRUTH, Machine, Record, Role, to_table
+from reports.stability import Finding, from_records
 from reports.style import DARK, LIGHT, display, render
 from reports.wording import DEFINITIONS, caveats, headline, learnt
 from weaves.fabric import Fabric
@@ -104,6 +105,9 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "aliasing": summary.aliasing_table(page.records),
         "timing": summary.timing_table(page.records),
     }
+    findings = from_records(page.records)
+    if findings:
+        tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
     for name, table in tables.items():
         write_table(folder / "tables" / name, table)
     progress(0.1)
@@ -115,7 +119,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         atomic_write(folder / "figures" / name, content)
         progress(0.4 + 0.6 * min(1.0, (done + 1) / (2 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
     index = folder / "index.html"
-    atomic_write(index, _html(page, tables, {name.removesuffix("-light.png") for name in images}).encode())
+    atomic_write(index, _html(page, tables, findings, {name.removesuffix("-light.png") for name in images}).encode())
     return index
 
 
@@ -163,7 +167,7 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
         yield "overview.png", tiles.overview(spheres, columns=-(-len(spheres) // 2))
 
 
-def _html(page: PageInput, tables: dict[str, pd.DataFrame], plots: set[str]) -> str:
+def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[Finding], plots: set[str]) -> str:
     errors, timing = tables["errors"], tables["timing"]
     per_material = [note.name for note in page.models if note.per_material]
     environment = Environment(
@@ -183,6 +187,8 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], plots: set[str]) -> 
         by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
         aliasing=cells.aliasing_rows(tables["aliasing"], page.records),
         timing=cells.timing_rows(timing),
+        stability=cells.stability_rows(findings),
+        rates=cells.rate_rows(page.records),
         strips=_strips(page, tables["pictures"]),
         fabrics=fabrics,
         shown=shown,

@@ -50,8 +50,15 @@ Metric = Literal[
     "spectrum",
     "time",
     "bytes_stored",
+    "worst_error",
+    "listed_error",
+    "naive_error",
+    "not_finite",
+    "negative",
+    "naive_not_finite",
+    "rate",
 ]
-"""Everything that is measured; `reports.page` defines each in a sentence."""
+"""Everything that is measured; defined in `reports.page`, the last seven in `reports.stability` and `throughput`."""
 
 
 class Provenance(BaseModel):
@@ -102,6 +109,8 @@ class Record(BaseModel):
     """Unit of `value`."""
     curve: tuple[tuple[float, float], ...] = ()
     """Points of a curve, where one number does not say it all."""
+    note: str = ""
+    """What else there is to say of `value`, such as the input that gave it."""
     provenance: Provenance = Provenance()
     """What was measured."""
 

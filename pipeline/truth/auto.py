@@ -2,7 +2,7 @@
 
 `auto` asks the table first, which costs some ten microseconds a query, and samples the queries of which the table's own
 stated error is above the one asked for, and those that it knows nothing of: tiny footprints, curved cloth, footprints
-at an angle, and models other than the default.
+at an angle, cloths of more than `_MOST_CELLS` different cells, and models other than the default.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.nodes import sum_rows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.replicates import OWEN, sample_rows
-from pipeline.truth.table import NODES, Table, tabulate
+from pipeline.truth.table import NODES, Table, different_cells, tabulate
 from weaves.errors import BadInput
 
 Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
 
+_MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
 _SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
 _STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
 """Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
@@ -35,7 +36,15 @@ def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opti
     known = np.flatnonzero(_tabulated(model, columns))
     if known.size:
         chosen = columns.take(known)
-        mean, error, count = sum_rows(model, _table(model, chosen), chosen)
+        mean, error, count = sum_rows(
+            model,
+            _table(model, chosen),
+            chosen,
+            index[known],
+            options.relative_error,
+            options.absolute_error,
+            np.uint64(seed),
+        )
         size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
         means[known], errors[known], counts[known] = mean, error, count
@@ -63,22 +72,23 @@ def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opt
     known = _tabulated(model, columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
-        allowed = "flat cloth, footprints along the axes of at least "
+        allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints along the axes of at least "
         allowed += f"{_SMALLEST:.3g} yarn spacings, and the default frame, geometry, shadows and variation: take auto"
         raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
-    return sum_rows(model, _table(model, columns), columns)
+    return sum_rows(model, _table(model, columns), columns, index, 1.0, np.inf, np.uint64(seed))
 
 
 def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
     """Say which queries the table knows of."""
     choices = model.choices
-    if choices.macro or choices.linear or not choices.shadows or model.varied:
+    other = choices.macro or choices.linear or not choices.shadows or model.varied
+    if other or different_cells(model.front) > _MOST_CELLS:
         return np.zeros(len(columns.u), np.bool_)
     along = columns.angle == 0.0
     if model.shape == GAUSSIAN:
         along |= columns.sigma == columns.sigma_minor
     wide = np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST
-    return along & wide & (columns.curvature == 0.0)
+    return np.asarray(along & wide & (columns.curvature == 0.0))
 
 
 _TABLES: dict[tuple[int, bool], tuple[Model, Table]] = {}

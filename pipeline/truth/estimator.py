@@ -16,6 +16,7 @@ from pipeline.truth import replicates
 from pipeline.truth.auto import auto_rows, table_rows
 from pipeline.truth.cloth import Columns, Model, columns_of, model_of
 from pipeline.truth.options import EstimatorName, TruthOptions
+from pipeline.truth.quadrature import quadrature_rows
 from pipeline.truth.query import Answers, Queries, validate
 from weaves.fabric import Fabric
 
@@ -27,7 +28,15 @@ def _sampled(
     method: int, model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
 ) -> Raw:
     return replicates.sample_rows(
-        model, columns, index, method, options.relative_error, options.absolute_error, options.min_count, options.max_count, np.uint64(seed)
+        model,
+        columns,
+        index,
+        method,
+        options.relative_error,
+        options.absolute_error,
+        options.min_count,
+        options.max_count,
+        np.uint64(seed),
     )
 
 
@@ -38,6 +47,7 @@ ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "jittered": partial(_sampled, replicates.JITTERED),
     "r2": partial(_sampled, replicates.R2),
     "owen": partial(_sampled, replicates.OWEN),
+    "quadrature": quadrature_rows,
     "table": table_rows,
     "auto": auto_rows,
 }

@@ -241,7 +241,10 @@ def _add_gaussian(
 
 @fast_kernel
 def _add_box(
-    edges: npt.NDArray[np.float32], middle: np.float32, reach: np.float32, inverse: np.float32,
+    edges: npt.NDArray[np.float32],
+    middle: np.float32,
+    reach: np.float32,
+    inverse: np.float32,
     masses: npt.NDArray[np.float32],
 ) -> None:
     for k in range(len(masses)):

@@ -92,7 +92,7 @@ def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightFi
             row = _float_row(float(offset), float(length), families[family].width, families[family].bend)
             factor = 1.0
             if variation is not None:
-                factor = gloss(variation, family, side, pick, end, float(offset), draft.repeat)
+                factor = gloss(variation, family, side, pick, end, float(offset), float(length), draft.repeat)
             floats[pick, end, side] = (*row, factor)
             if side == TOP or families[1 - family].width < 1.0:
                 crown[pick, end] = max(
@@ -267,3 +267,28 @@ def height_along(
     if family == WARP:
         return height, slope_x * dx + slope_y * dy
     return height, slope_x * dy - slope_y * dx
+
+
+@kernel
+def span_over(
+    field: HeightField,
+    family: int,
+    x: float,
+    y: float,
+    dx: float,
+    dy: float,
+    start: float,
+    stop: float,
+    column: int,
+    row: int,
+) -> tuple[float, float]:
+    """Return the part of the way from `start` to `stop` that lies over a yarn of a cell; none of it: stop < start.
+
+    The way leads from (x, y) along the unit direction (dx, dy); the cell is at (column, row) of the endless fabric.
+    """
+    radius, slope = field.yarn[family, RADIUS], dx if family == WARP else dy
+    across, _ = local_position(family, 0.0, x, y, column, row)
+    if slope == 0.0:
+        return (start, stop) if abs(across) <= radius else (stop, start - 1.0)
+    first, second = (-radius - across) / slope, (radius - across) / slope
+    return max(start, min(first, second)), min(stop, max(first, second))

@@ -26,6 +26,7 @@ from pipeline.truth.heightfield import (
     HeightField,
     height_along,
     local_position,
+    span_over,
     surface_at,
     torus_height,
 )
@@ -40,8 +41,19 @@ _STEEPEST = 1e4
 
 @kernel
 def _slope_of_top(
-    field: HeightField, x: float, y: float, z: float, dx: float, dy: float, a: float, b: float,
-    end: int, pick: int, column: int, row: int, best: float,
+    field: HeightField,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    a: float,
+    b: float,
+    end: int,
+    pick: int,
+    column: int,
+    row: int,
+    best: float,
 ) -> float:
     """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
 
@@ -98,18 +110,29 @@ def _slope_of_top(
 
 @kernel
 def _slope_of_strip(
-    field: HeightField, x: float, y: float, z: float, dx: float, dy: float, a: float, b: float,
-    end: int, pick: int, column: int, row: int,
+    field: HeightField,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    a: float,
+    b: float,
+    end: int,
+    pick: int,
+    column: int,
+    row: int,
 ) -> float:
     """Return the greatest slope to the yarn beneath between distances a and b, searched point by point."""
     family = 1 - int(field.top[pick, end])
     best = 0.0
+    a, b = span_over(field, family, x, y, dx, dy, a, b, column, row)
+    if b < a:
+        return best
     for k in range(_STRIP_POINTS):
         s = max(a + (b - a) * k / (_STRIP_POINTS - 1.0), _NEAREST)
-        across, _ = local_position(family, field.floats[pick, end, UNDER, OFFSET], x + s * dx, y + s * dy, column, row)
-        if abs(across) <= field.yarn[family, RADIUS]:
-            height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
-            best = max(best, (height - z) / s)
+        height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
+        best = max(best, (height - z) / s)
     return best
 
 

@@ -29,9 +29,7 @@ numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
 """Decorator of every compiled function of the ground truth."""
 
-fast_kernel = numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
-)
+fast_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
 """Decorator of the few flat loops in single precision that vector units must be free to sum in their own order.
 
 NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never

@@ -27,7 +27,7 @@ class TruthOptions(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    estimator: EstimatorName = "owen"
+    estimator: EstimatorName = "auto"
     """How a value is computed; see pipeline.truth.estimator."""
     footprint: Literal["gaussian", "box"] = "gaussian"
     """Kernel k_P; the box has the same standard deviations: sides sigma sqrt(12)."""

@@ -120,12 +120,12 @@ def point_share(
 
     # What light reaches it, from the front or through the cloth.
     cos_i = light.x * nx + light.y * ny + light.z * nz
+    # Over a curved cloth the front may see a light below its tangent plane; one that it does not see is behind.
+    lit, transmitted = False, False
     if light.z > 0.0 or light.bend > 0.0:
-        transmitted = False
         lit = cos_i > 0.0 and (not choices.shadows or visible(front, x, y, z, side, light))
-    else:
-        transmitted = True
-        lit = cos_i < 0.0 and light.z < 0.0 and _lit_from_behind(back, x, y, query.light_behind, choices)
+    if not lit and light.z < 0.0:
+        lit = transmitted = cos_i < 0.0 and _lit_from_behind(back, x, y, query.light_behind, choices)
     if not lit:
         return family, area, 0.0, 0.0, through
     facing = abs(cos_i)

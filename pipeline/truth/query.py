@@ -110,7 +110,7 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
             found.setdefault(row, (name, column[row].tolist(), allowed))
 
     for name, column in zip(Queries._fields, queries, strict=True):
-        note(~np.isfinite(column).reshape(len(column), -1).all(axis=1), name, column, "must be finite")
+        note(~np.isfinite(column).all(axis=tuple(range(1, column.ndim))), name, column, "must be finite")
     for name in ("sigma", "sigma_minor"):
         note(getattr(queries, name) <= 0, name, getattr(queries, name), "must be greater than 0")
     for name, directions in (("wi", queries.wi), ("wo", queries.wo)):

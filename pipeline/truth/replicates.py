@@ -2,8 +2,8 @@
 
 A component is the ratio of two sums, f = N / D; its standard error comes from the spread of the replicates' residuals
 N_r - f D_r (the linearised ratio estimator [Cochran1977Sampling]), with REPLICATES - 1 degrees of freedom. Patches that
-are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit. The point sets differ in how fast the error falls: as count^-1/2 for independent points, faster
-for the others.
+are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit. The point sets
+differ in how fast the error falls: as count^-1/2 for independent points, faster for the others.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pipeline.truth.cloth import AREA, SUMS, Columns, Model
 from pipeline.truth.footprint import place_pair
 from pipeline.truth.heightfield import GAP
 from pipeline.truth.kernel import kernel
-from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.patch import Scene, point_share, scene
+from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
 
 REPLICATES: Final = 16

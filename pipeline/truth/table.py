@@ -1,4 +1,4 @@
-"""The repeat as a table of nodes with horizons, which turns a query of any footprint into a sum over some thousand nodes.
+"""The repeat as a table of nodes with horizons: a query of any footprint becomes a sum over some thousand nodes.
 
 A cloth whose draft maps onto itself under a translation needs one cell of each orbit only: an 8-end satin is 8 cells,
 not 64. Every piece of yarn seen from above in such a cell is a tensor grid of nodes, x = r sin v across the yarn with v
@@ -9,6 +9,7 @@ Where a highlight is narrower than a node, finer nodes resolve it.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from pipeline.truth.horizon import horizons
 from pipeline.truth.kernel import kernel
 
 NODES: Final = 32
-"""Nodes a yarn spacing, across and along, of a cloth of up to `_FEW` different cells; fewer for more, down to three quarters."""
+"""Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
 
 AZIMUTHS: Final = 128
 """Directions in which horizons are known."""
@@ -97,7 +98,7 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0
     front, back : HeightField
         The side that is seen and the other one, reflected in the fabric plane.
     behind : bool
-        Whether light from behind will be asked for.
+        Whether light from behind will be asked for; through gaps it always is.
     nodes, azimuths : int
         Resolution; 0 nodes: as many as `NODES` says.
     """
@@ -129,6 +130,7 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0
     areas = [np.outer(np.diff(g[4]), np.diff(g[3])).ravel() * len(c) for g, c in zip(grids, copies, strict=True)]
     size = max(map(len, kinds))
     slope = horizons(front, x, y, azimuths, False)
+    behind = behind or any(family == GAP for _, _, family, *_ in grids)
     slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
     pieces = np.array(rows, np.int64)
     return Table(
@@ -145,10 +147,22 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0
     )
 
 
+def different_cells(field: HeightField) -> int:
+    """Return how many cells of the repeat no translation of the cloth onto itself carries into one another."""
+    return field.top.size // len(_translations(field.top.shape, field.top.tobytes()))
+
+
+@lru_cache(maxsize=256)
+def _translations(shape: tuple[int, int], top: bytes) -> tuple[tuple[int, int], ...]:
+    """List the shifts by picks and ends that carry the cloth onto itself; `top` holds `HeightField.top`."""
+    cloth = np.frombuffer(top, np.int8).reshape(shape)
+    return tuple(shift for shift in np.ndindex(shape) if np.array_equal(np.roll(cloth, shift, (0, 1)), cloth))
+
+
 def _orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
     """Group the cells (pick, end) that translations of the cloth onto itself carry into one another."""
     picks, ends = top.shape
-    steps = [(p, e) for p, e in np.ndindex(picks, ends) if np.array_equal(np.roll(top, (p, e), (0, 1)), top)]
+    steps = _translations(top.shape, top.tobytes())
     left = dict.fromkeys(np.ndindex(picks, ends))
     orbits = []
     while left:
@@ -162,7 +176,7 @@ def _orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
 def _longest_period(top: npt.NDArray[np.int8]) -> float:
     """Return the wavelength of the slowest wave that the translations of a cloth onto itself leave."""
     picks, ends = top.shape
-    steps = [(p, e) for p, e in np.ndindex(picks, ends) if np.array_equal(np.roll(top, (p, e), (0, 1)), top)]
+    steps = _translations(top.shape, top.tobytes())
     shortest = min(
         math.hypot(m / ends, n / picks)
         for m in range(ends + 1)
@@ -181,18 +195,23 @@ def _pieces(
               for radius in field.yarn[:, RADIUS]]  # fmt: skip
 
     def straight(low: float, high: float) -> tuple[float, ...]:
-        return tuple(np.linspace(low, high, max(4, math.ceil(nodes * (high - low))) + 1).tolist())
+        return tuple(np.linspace(low, high, max(2, math.ceil(nodes * (high - low))) + 1).tolist())
 
-    def oriented(family: int, across: tuple[float, ...], along: tuple[float, ...]) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
+    def oriented(
+        family: int, across: tuple[float, ...], along: tuple[float, ...]
+    ) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         return (family, across, along) if family == WARP else (family, along, across)
 
-    found = [oriented(top, around[top], straight(0.0, 1.0))]
-    margin = 0.5 - float(field.yarn[top, RADIUS])
+    # Nodes end where the crossing yarn does: from there on the other side of the cloth is another one.
+    margin, gap = (max(0.0, 0.5 - float(field.yarn[family, RADIUS])) for family in (top, 1 - top))
+    along = straight(0.0, 1.0)
+    if gap > 1e-9:
+        along = straight(0.0, gap)[:-1] + straight(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
+    found = [oriented(top, around[top], along)]
     if margin > 1e-9:
         beneath = 1 - top
         for low, high in ((0.0, margin), (1.0 - margin, 1.0)):
             found.append(oriented(beneath, around[beneath], straight(low, high)))
-        gap = 0.5 - float(field.yarn[beneath, RADIUS])
         if gap > 1e-9:
             sides = [[(0.0, width), (1.0 - width, 1.0)] for width in (margin, gap)]
             for first in sides[0]:
@@ -214,16 +233,20 @@ def _finer(field: HeightField, family: int, pick: int, end: int, columns: int, l
 
 
 def _positions(
-    field: HeightField, end: int, pick: int, family: int, x_edges: tuple[float, ...], y_edges: tuple[float, ...], finer: tuple[int, int],
+    field: HeightField,
+    end: int,
+    pick: int,
+    family: int,
+    x_edges: tuple[float, ...],
+    y_edges: tuple[float, ...],
+    finer: tuple[int, int],
 ) -> tuple[Double, Double, Double, Double]:
     """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
 
     def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Double:
         # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
-        if bent:
-            borders = np.arcsin(np.clip((np.array(edges) - 0.5) / radius, -1.0, 1.0))
-        else:
-            borders = np.array(edges)
+        places = np.array(edges)
+        borders = np.arcsin(np.clip((places - 0.5) / radius, -1.0, 1.0)) if bent else places
         share = (np.arange(count)[:, None] + 0.5) / count
         at = borders[:-1] + share * np.diff(borders)
         return 0.5 + radius * np.sin(at) if bent else at

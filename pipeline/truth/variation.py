@@ -15,7 +15,14 @@ from pipeline.truth.options import Variation
 
 
 def gloss(
-    variation: Variation, family: int, side: int, pick: int, end: int, offset: float, repeat: tuple[int, int]
+    variation: Variation,
+    family: int,
+    side: int,
+    pick: int,
+    end: int,
+    offset: float,
+    length: float,
+    repeat: tuple[int, int],
 ) -> float:
     """Return the factor of a float, named by its family, its yarn and twice the position of its centre.
 
@@ -27,16 +34,16 @@ def gloss(
         Whose float; whether it lies on top (0) or beneath (1) here.
     pick, end : int
         The cell.
-    offset : float
-        Centre of the cell minus centre of the float, along the yarn's own axis.
+    offset, length : float
+        Centre of the cell minus centre of the float, along the yarn's own axis, and the float's length.
     repeat : tuple of int
         Ends and picks of the tiled draft.
     """
-    if not math.isfinite(offset):
-        offset = 0.0
     ends, picks = repeat
-    # A weft's own axis points to -x (frames).
     centre = round(2 * (pick - offset)) % (2 * picks) if family == 0 else round(2 * (end - offset)) % (2 * ends)
+    if not math.isfinite(length):
+        # A yarn that never changes side is one float.
+        centre = 0
     line = end if family == 0 else pick
     normal = np.random.default_rng([variation.seed, family, side, line, centre]).standard_normal()
     return math.exp(variation.spread * normal - 0.5 * variation.spread**2)

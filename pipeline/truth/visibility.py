@@ -14,7 +14,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pipeline.truth.heightfield import OFFSET, RADIUS, TOP, UNDER, WARP, HeightField, height_along, local_position
+from pipeline.truth.heightfield import (
+    OFFSET,
+    RADIUS,
+    TOP,
+    UNDER,
+    WARP,
+    HeightField,
+    height_along,
+    local_position,
+    span_over,
+)
 from pipeline.truth.kernel import kernel
 
 _STRIP_POINTS = 8
@@ -120,13 +130,15 @@ def _strip_blocks(
     """Say whether the yarn beneath reaches the ray between `start` and `stop`, searched point by point."""
     dx, dy = towards.dx, towards.dy
     family = 1 - int(field.top[pick, end])
+    # A yarn may be narrower than the distance of points along the whole way.
+    start, stop = span_over(field, family, x, y, dx, dy, start, stop, column, row)
+    if stop < start:
+        return False
     for k in range(_STRIP_POINTS):
         s = start + (stop - start) * k / (_STRIP_POINTS - 1.0)
-        across, _ = local_position(family, field.floats[pick, end, UNDER, OFFSET], x + s * dx, y + s * dy, column, row)
-        if abs(across) <= field.yarn[family, RADIUS]:
-            height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
-            if height > _altitude(z, towards, s):
-                return True
+        height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
+        if height > _altitude(z, towards, s):
+            return True
     return False
 
 

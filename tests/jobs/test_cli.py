@@ -9,7 +9,9 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import write_shard
+from pipeline.truth import invariants
 from pipeline.truth.query import Answers
+from pipeline.truth.verdict import exact, worst
 from reports.exr import read_exr
 from weaves.errors import WorkFailed
 from weaves.fabric import load_fabric
@@ -40,8 +42,8 @@ def complaint(answer, code=2):
 def test_help_lists_the_verbs_in_the_order_of_work(twillight):
     code, text, _ = twillight("--help")
     verbs = [line.split()[1] for line in text.splitlines() if line.startswith("│") and line.split()[1].isalpha()]
-    order = ["list", "show", "plan", "generate", "check", "train", "bench", "report", "run", "status"]
-    assert code == 0 and [verb for verb in verbs if verb in order] == order
+    order = ["list", "show", "export", "plan", "generate", "evaluate", "check", "train", "bench", "report", "run"]
+    assert code == 0 and [verb for verb in verbs if verb in [*order, "status"]] == [*order, "status"]
 
 
 def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
@@ -80,12 +82,20 @@ def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
         (["show", "satin.toml"], ["satin.toml", "draft.move = 3"]),
         (["check", "smoke"], ["manifest.json", "does not exist"]),
         (["check", "."], ["manifest.json", "does not exist"]),
+        (["check", "denin"], ["'denin'", "did you mean 'denim'", "quick"]),
+        (["check", "quik"], ["'quik'", "did you mean 'quick'", "denim"]),
+        (["check", "missing.toml"], ["missing.toml", "no such file"]),
+        (["check", "satin.toml"], ["satin.toml", "draft.move = 3"]),
+        (["check", "neither.toml"], ["neither.toml", "has neither [dataset] nor [draft]"]),
+        (["check", "twill_4_4"], ["'twill_4_4'", "is both preset and folder", "./twill_4_4"]),
         (["generate", "smoke", "--out", "nan.toml"], ["nan.toml", "a folder that can be written"]),
         (["generate", "smoke", "--scheduler", "tcp//nowhere"], ["tcp//nowhere", "no dask scheduler"]),
     ],
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(twillight, tmp_path, tokens, words):
     (tmp_path / "broken.toml").write_text("name = \n")
+    (tmp_path / "neither.toml").write_text('name = "x"\n')
+    (tmp_path / "twill_4_4").mkdir()
     fabric = (
         'name = "x"\n[draft]\n{draft}\n[warp]\nbend = {bend}\nroughness = 0.3\n[weft]\nbend = 20\nroughness = 0.3\n'
     )
@@ -155,3 +165,22 @@ def test_check_tells_of_a_shard_cut_in_half(twillight, dataset):
     code, _, told = twillight("check", str(dataset))
     assert code == 2 and "Traceback" not in told
     assert all("part-a.parquet" in line for line in told.splitlines()) and "whole" in told
+
+
+def test_check_of_a_fabric_shows_its_invariants_and_fails_if_one_is_broken(twillight, tmp_path, monkeypatch):
+    def holds(fabric):
+        return [exact("as it should be", 1.0, 1.0, 0.0), worst("close", 1.01, 1.0, 0.01, 15)]
+
+    def breaks(fabric):
+        return [exact(f"made of {fabric.name}", 2.0, 1.0, 0.0, "<="), worst("far off", 2.0, 1.0, 0.01, 15)]
+
+    monkeypatch.setattr(invariants, "INVARIANTS", (holds,))
+    (tmp_path / "own.toml").write_text(load_fabric("denim").model_copy(update={"name": "own"}).to_toml())
+    for fabric in ("denim", "own.toml"):
+        code, text, told = twillight("check", fabric)
+        assert (code, told) == (0, "") and text.startswith(fabric.removesuffix(".toml"))
+        assert "exactly" in text and "within statistics (+1.0 σ)" in text
+    monkeypatch.setattr(invariants, "INVARIANTS", (holds, breaks))
+    code, text, told = twillight("check", "denim")
+    assert code == 1 and text.count("NO") == 2
+    assert told == "denim: 2 of 4 invariants do not hold: made of denim, far off\n"

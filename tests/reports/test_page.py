@@ -10,6 +10,7 @@ from reports.exr import write_exr
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.record import this_machine
+from reports.stability import judge, to_records
 from weaves.fabric import load_fabric
 
 VOID = {"meta", "img", "source", "link", "br", "hr", "input"}
@@ -152,3 +153,22 @@ def test_a_page_of_nothing_claims_nothing(page_input, tmp_path):
     assert "4.1" not in page.words
     assert "Two fabrics and one unseen." in page.words
     assert all((tmp_path / link).is_file() for link in page.files)
+
+
+def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path):
+    assert "stability" not in written[1].ids
+    assert "#stability" not in written[1].targets
+    findings = [
+        judge("σ", "near <the> axis", "float32", {"w": [0.25]}, [1.0], [1.0], 1e-6, naive=[1.001]),
+        judge("f_t", "equal Λ", "float64", {"w": [0.5]}, [1.5], [1.0], 1e-15, naive=[np.nan]),
+    ]
+    more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *to_records(findings)]})
+    page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
+    assert "stability" in page.ids
+    assert "#stability" in page.targets
+    words = page.words.replace(" ", "")
+    assert "near<the>axis0.0e+002.0e-061.0e-0300okw0.25" in words
+    assert "equalΛ5.0e-012.0e-15100%NaN00limitw0.5" in words
+    assert len(pd.read_csv(tmp_path / "tables" / "stability.csv")) == 2
+    # Nothing else on the page takes the two arithmetics for methods.
+    assert page.words.count("float32") == 1

@@ -18,7 +18,7 @@ from weaves.fabric import load_fabric, preset_names
 from weaves.surface import surface_at as oracle
 
 LEVEL = 1e-3
-EXACT = TruthOptions(relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
+EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
 
 
 def _direction(theta, phi):
@@ -102,7 +102,9 @@ def test_order_of_convergence(estimator, low, high):
     counts = [256, 1024, 4096, 16384]
     errors = []
     for count in counts:
-        options = TruthOptions(estimator=estimator, relative_error=1e-9, min_count=count, max_count=count)
+        options = TruthOptions(
+            estimator=estimator, absolute_error=0.0, relative_error=1e-9, min_count=count, max_count=count
+        )
         errors.append(np.sqrt(np.mean((estimate(fabric, queries, options, 3).mean - exact) ** 2)))
     order = -stats.linregress(np.log(counts), np.log(errors)).slope
     assert low < order < high
@@ -117,8 +119,13 @@ def test_reported_errors_cover_the_true_error(estimator):
     """
     fabric = load_fabric("wool_gabardine")
     queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=80.0), fabric.weave.repeat, 5, 0, 120)
-    reference = estimate(fabric, queries, TruthOptions(relative_error=1e-9, min_count=1 << 16, max_count=1 << 16), 8)
-    options = TruthOptions(estimator=estimator, relative_error=1e-9, min_count=1024, max_count=1024)
+    reference = estimate(
+        fabric,
+        queries,
+        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 16, max_count=1 << 16),
+        8,
+    )
+    options = TruthOptions(estimator=estimator, absolute_error=0.0, relative_error=1e-9, min_count=1024, max_count=1024)
     answers = estimate(fabric, queries, options, 2)
     seen = answers.standard_error > 1e-5
     z = (answers.mean - reference.mean)[seen] / np.hypot(answers.standard_error, reference.standard_error)[seen]
@@ -130,7 +137,9 @@ def test_reported_errors_cover_the_true_error(estimator):
 def test_the_two_estimators_agree():
     fabric = load_fabric("silk_charmeuse")
     queries = draw_queries(QueryOptions(sigma=(0.5, 4.0), max_angle=75.0), fabric.weave.repeat, 6, 0, 40)
-    options = TruthOptions(relative_error=1e-9, min_count=1 << 14, max_count=1 << 14)
+    options = TruthOptions(
+        estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 14, max_count=1 << 14
+    )
     first = estimate(fabric, queries, options, 1)
     second = estimate(fabric, queries, options.model_copy(update={"estimator": "mc"}), 2)
     spread = np.hypot(first.standard_error, second.standard_error)
@@ -162,7 +171,7 @@ def test_white_cloth_returns_no_more_light_than_it_gets():
     wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - u)], axis=-1).astype(np.float32)
     for theta in (0, 60, 80):
         queries = _queries((0, 0, 1), _direction(theta, 40), rows=rows)._replace(wi=wi)
-        answers = estimate(fabric, queries, TruthOptions(min_count=256, max_count=256), 3)
+        answers = estimate(fabric, queries, TruthOptions(estimator="owen", min_count=256, max_count=256), 3)
         returned = answers.mean[:, 2:].sum(axis=1) * math.pi / wi[:, 2]
         assert returned.mean() + 3 * returned.std() / math.sqrt(rows) < 1.0
 
@@ -170,8 +179,8 @@ def test_white_cloth_returns_no_more_light_than_it_gets():
 def test_a_row_depends_on_its_index_alone():
     fabric = load_fabric("basket")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 50)
-    whole = estimate(fabric, queries, TruthOptions(), 7)
-    part = estimate(fabric, queries.take(slice(20, 30)), TruthOptions(), 7, start=20)
+    whole = estimate(fabric, queries, TruthOptions(estimator="owen"), 7)
+    part = estimate(fabric, queries.take(slice(20, 30)), TruthOptions(estimator="owen"), 7, start=20)
     np.testing.assert_array_equal(part.mean, whole.mean[20:30])
     np.testing.assert_array_equal(part.standard_error, whole.standard_error[20:30])
 
@@ -179,7 +188,7 @@ def test_a_row_depends_on_its_index_alone():
 def test_the_stopping_rule_reaches_the_error_or_spends_its_points():
     fabric = load_fabric("satin_8")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 300)
-    options = TruthOptions(relative_error=0.03, min_count=64, max_count=1024)
+    options = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=0.03, min_count=64, max_count=1024)
     answers = estimate(fabric, queries, options, 7)
     relative = np.linalg.norm(answers.standard_error, axis=1) / np.maximum(np.linalg.norm(answers.mean, axis=1), 1e-9)
     assert ((relative <= 0.03 * (1 + 1e-6)) | (answers.count >= 1024)).all()
@@ -195,7 +204,7 @@ def test_hidden_patches_do_not_understate_their_error():
     """
     fabric = load_fabric("twill_4_4")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 600)
-    first, second = (estimate(fabric, queries, TruthOptions(max_count=1024), seed) for seed in (1, 2))
+    first, second = (estimate(fabric, queries, TruthOptions(estimator="owen", max_count=1024), seed) for seed in (1, 2))
     measured = np.sum((first.mean - second.mean) ** 2)
     stated = np.sum(first.standard_error**2 + second.standard_error**2)
     assert 0.5 < measured / stated < 2.0
@@ -205,7 +214,7 @@ def test_translation_by_a_repeat_changes_nothing():
     fabric = load_fabric("denim")
     near = _queries(_direction(40, 10), _direction(35, 170), sigma=0.25, centre=(0.5, 0.25))
     far = near._replace(u=near.u + 4096.0, v=near.v - 4096.0)
-    options = TruthOptions(min_count=512, max_count=512)
+    options = TruthOptions(estimator="owen", min_count=512, max_count=512)
     np.testing.assert_allclose(
         estimate(fabric, far, options, 1).mean, estimate(fabric, near, options, 1).mean, rtol=1e-6
     )
@@ -218,7 +227,7 @@ def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
     fabric = _both(load_fabric("silk_charmeuse"), roughness=roughness)
     for other in (0.0, 89.9):
         queries = _queries(_direction(theta, 13), _direction(other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
-        answers = estimate(fabric, queries, TruthOptions(min_count=64, max_count=128), 1)
+        answers = estimate(fabric, queries, TruthOptions(estimator="owen", min_count=64, max_count=128), 1)
         for values in (answers.mean, answers.standard_error, PointSampler(fabric).sample(queries, 1, 0)):
             assert np.isfinite(values).all()
             assert (values >= 0).all()
@@ -247,7 +256,7 @@ def test_bad_queries_are_named(field, value, words):
     queries = queries._replace(sigma_minor=queries.sigma.copy())
     getattr(queries, field)[1] = value
     with pytest.raises(BadInput) as caught:
-        estimate(load_fabric("denim"), queries, TruthOptions(), 0)
+        estimate(load_fabric("denim"), queries, TruthOptions(estimator="owen"), 0)
     assert words in str(caught.value)
 
 
@@ -262,8 +271,13 @@ def test_the_adaptive_estimate_states_its_error_on_every_preset(name):
     """
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 11, 0, 400)
-    exact = estimate(fabric, queries, TruthOptions(relative_error=1e-9, min_count=1 << 15, max_count=1 << 15), 12)
-    answers = estimate(fabric, queries, TruthOptions(), 13)
+    exact = estimate(
+        fabric,
+        queries,
+        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 15, max_count=1 << 15),
+        12,
+    )
+    answers = estimate(fabric, queries, TruthOptions(estimator="owen"), 13)
     spread = np.hypot(answers.standard_error, exact.standard_error)
     difference = answers.mean - exact.mean
     assert (np.abs(difference) > 3 * spread + 1e-6).mean() < 0.06

@@ -1,0 +1,156 @@
+"""A file of questions that came from elsewhere: read in blocks of bounded size, every fault told in its own words."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
+from pipeline.shards.store import queries_of
+from pipeline.truth.query import Queries, faults
+from weaves.errors import BadInput
+
+ROW_GROUP: Final = 16_384
+"""Rows read, held and written at a time."""
+OPTIONAL: Final = {"sigma_minor": "sigma", "angle": 0.0, "curvature": 0.0}
+"""Columns that may be left out, and what is taken then: another column, or a number."""
+ANSWERS: Final = [field for field in SCHEMA if field.name not in ("fabric", *QUERY_COLUMNS)]
+"""The columns of an answer."""
+
+_BUFFER = 1 << 20  # bytes of a column read at a time, so that one huge row group is not held whole
+
+
+class BadRow(NamedTuple):
+    """A row that has no answer: its index in the file, the column, the value there, and what is wrong with it."""
+
+    row: int
+    column: str
+    value: object
+    reason: str
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Turn what pyarrow says of a file that cannot be read into one sentence."""
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "no such file", "the path of a Parquet file is needed") from error
+    except (pa.ArrowException, OSError) as error:
+        reason = " ".join(str(error).split(". ")[0].split()).rstrip(".")
+        raise BadInput(
+            str(path), "", f"not a whole Parquet file ({reason})", "one that can be read is needed"
+        ) from error
+
+
+@contextmanager
+def open_questions(path: Path) -> Iterator[pq.ParquetFile]:
+    """Open a Parquet file whose pages are verified as they are read.
+
+    Raises
+    ------
+    BadInput
+        If it is missing, cut short, or no such file.
+    """
+    with _whole(path):
+        file = pq.ParquetFile(path, page_checksum_verification=True, buffer_size=_BUFFER)
+    with file:
+        yield file
+
+
+def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -> Iterator[pa.Table]:
+    """Yield the rows in blocks of `ROW_GROUP`, however the file is cut."""
+    batches = file.iter_batches(ROW_GROUP, columns=columns)
+    held: list[pa.RecordBatch] = []
+    while True:
+        with _whole(path):
+            batch = next(batches, None)
+        if batch is not None:
+            held.append(batch)
+        rows = sum(len(part) for part in held)
+        while rows >= ROW_GROUP or (batch is None and rows):
+            table = pa.Table.from_batches(held)
+            yield table.slice(0, ROW_GROUP).combine_chunks()
+            held = table.slice(ROW_GROUP).to_batches()
+            rows = sum(len(part) for part in held)
+        if batch is None:
+            return
+
+
+def check_columns(path: Path, schema: pa.Schema) -> None:
+    """Refuse columns that are missing, of another type, there twice, or named as an answer."""
+    where, names = str(path), Counter(schema.names)
+    answers = {field.name for field in ANSWERS}
+    if missing := [name for name in QUERY_COLUMNS if name not in names and name not in OPTIONAL]:
+        found = f"column{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing"
+        needed = ", ".join(name for name in QUERY_COLUMNS if name not in OPTIONAL)
+        raise BadInput(where, "", found, f"needed are {needed}; {', '.join(OPTIONAL)} may be left out")
+    for name, times in names.items():
+        if times > 1:
+            raise BadInput(where, "column", name, "is there more than once")
+        if name in answers:
+            raise BadInput(where, "column", name, "has the name of an answer: rename it or leave it out")
+        kind = schema.field(name).type
+        if name in QUERY_COLUMNS and kind not in (pa.float32(), pa.float64()):
+            raise BadInput(where, f"type of column {name}", str(kind), "must be float (32 bits) or double (64 bits)")
+
+
+def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int]) -> None:
+    """Read all questions once and refuse the file if any has no answer."""
+    asked = [name for name in QUERY_COLUMNS if name in file.schema_arrow.names]
+    first, count, start = None, 0, 0
+    for block in blocks(path, file, asked):
+        _, bad = questions_of(block, start, repeat)
+        first = first or next(iter(bad), None)
+        count += len(bad)
+        start += len(block)
+    if first:
+        more = f"{count - 1:,} more bad row{'s' if count > 2 else ''}; " if count > 1 else ""
+        allowed = f"{first.reason} ({more}--skip-bad answers the others)"
+        raise BadInput(str(path), f"row {first.row}, column {first.column}", first.value, allowed)
+
+
+def questions_of(block: pa.Table, start: int, repeat: tuple[int, int]) -> tuple[Queries, list[BadRow]]:
+    """Return a block's questions in single precision and its bad rows; `start` is the file's index of its first row."""
+    given = {name: block[name].to_numpy() for name in QUERY_COLUMNS if name in block.column_names}
+    single: dict[str, npt.NDArray[np.float32]] = {}
+    for name in QUERY_COLUMNS:
+        default = OPTIONAL.get(name, 0.0)
+        if name not in given:
+            column = single["sigma"] if default == "sigma" else np.full(len(block), default)
+        else:
+            column = given[name]
+        with np.errstate(over="ignore", under="ignore"):
+            single[name] = column.astype(np.float32)
+        if name in ("u", "v"):
+            # A place far off would lose its digits: fold it into the repeat first.
+            far = np.isfinite(column) & (single[name] != column)
+            single[name][far] = np.fmod(column[far], repeat[name == "v"]).astype(np.float32)
+    questions = queries_of(single)
+    return questions, [
+        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(faults(questions).items())
+    ]
+
+
+def _bad_row(block: pa.Table, row: int, start: int, name: str, allowed: str) -> BadRow:
+    """Describe a fault by the file's own columns and values."""
+    columns = [f"{name}_{axis}" for axis in "xyz"] if name in ("wi", "wo") else [name]
+    values = [block[column][row].as_py() for column in columns]
+    empty = [column for column, value in zip(columns, values, strict=True) if value is None]
+    if empty:
+        return BadRow(start + row, empty[0], None, "must not be null")
+    if len(values) > 1:
+        return BadRow(start + row, f"{columns[0]}..{columns[-1][-1]}", values, allowed)
+    value = values[0]
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = np.float32(value)
+    lost = np.isfinite(value) and value != 0 and (rounded == 0 or not np.isfinite(rounded))
+    return BadRow(start + row, name, value, allowed + (" in single precision" if lost else ""))

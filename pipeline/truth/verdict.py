@@ -1,0 +1,102 @@
+"""What is said of a measured number: that it holds exactly, within its statistical error, or not.
+
+A number without statistical error holds if it is what it should be up to rounding; many with errors hold if Student's t
+of the worst stays below the quantile of `LEVEL`, corrected after Sidak for how many they are.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+Floats = npt.NDArray[np.float64]
+
+LEVEL: Final = 1e-4
+"""Probability that an invariant that holds is called broken."""
+
+ROUNDING: Final = 2e-6
+"""Relative error of a few operations on answers in single precision."""
+
+
+class Invariant(NamedTuple):
+    """One thing that must hold, and whether it does.
+
+    Attributes
+    ----------
+    name : str
+        What is measured.
+    measured, expected, standard_error : float
+        The number, what it should be, and its uncertainty, 0 if it has none.
+    relation : str
+        Whether it should be equal or at most so large; ``reported``: there is nothing it should be.
+    verdict : str
+        ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
+    note : str
+        What else to know.
+    """
+
+    name: str
+    measured: float
+    expected: float
+    standard_error: float
+    relation: Literal["=", "<=", "reported"]
+    verdict: Literal["exact", "statistics", "broken", "reported"]
+    note: str
+
+    @property
+    def sigmas(self) -> float:
+        """Distance from what is expected in standard errors; 0 without any."""
+        return (self.measured - self.expected) / self.standard_error if self.standard_error else 0.0
+
+
+def exact(
+    name: str, measured: float, expected: float, tolerance: float, relation: Literal["=", "<="] = "=", note: str = ""
+) -> Invariant:
+    """Judge a number without statistical error; NaN is broken."""
+    beyond = measured - expected if relation == "<=" else abs(measured - expected)
+    return Invariant(name, measured, expected, 0.0, relation, "exact" if beyond <= tolerance else "broken", note)
+
+
+def worst(
+    name: str,
+    measured: npt.ArrayLike,
+    expected: float,
+    errors: npt.ArrayLike,
+    freedom: int,
+    relation: Literal["=", "<="] = "=",
+    note: str = "",
+) -> Invariant:
+    """Judge many numbers by the one that lies furthest off in its standard errors, which is the one returned.
+
+    Parameters
+    ----------
+    measured, errors : float (N,)
+        The numbers and their standard errors.
+    freedom : int
+        Degrees of freedom of the errors.
+    """
+    values, spread = np.broadcast_arrays(np.atleast_1d(np.asarray(measured, np.float64)), np.asarray(errors))
+    # Rounding counts as error too: two sums of the same points differ by it and by nothing else.
+    beyond = (values - expected) / (spread + ROUNDING * max(abs(expected), 1e-3))
+    score = beyond if relation == "<=" else np.abs(beyond)
+    row = int(np.argmax(np.where(np.isnan(score), np.inf, score)))
+    level = 1.0 - (1.0 - LEVEL) ** (1.0 / len(values))
+    limit = float(stats.t.isf(level if relation == "<=" else level / 2.0, freedom))
+    holds = bool(score[row] <= limit)
+    note = note or (f"worst of {len(values)}, limit {limit:.1f} σ" if len(values) > 1 else "")
+    verdict: Literal["statistics", "broken"] = "statistics" if holds else "broken"
+    return Invariant(name, float(values[row]), expected, float(spread[row]), relation, verdict, note)
+
+
+def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Floats:
+    """Return first / second, and 1 where they are equal, so that nothing over nothing is no difference."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.equal(first, second), 1.0, np.divide(first, second, dtype=np.float64))
+
+
+def largest(values: Floats) -> float:
+    """Return the greatest modulus; NaN if there is one."""
+    return float(np.abs(values).max())

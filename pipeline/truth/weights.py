@@ -1,0 +1,71 @@
+"""Which share of a footprint falls on which node of a table."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.cloth import Columns
+from pipeline.truth.footprint import interval_masses
+from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.table import COLUMNS, KIND_X, KIND_Y, ROWS, START, Single, Table
+
+_0 = np.float32(0.0)
+
+
+@kernel
+def fill_weights(
+    table: Table,
+    shape: int,
+    columns: Columns,
+    row: int,
+    scratch: Single,
+    touched: npt.NDArray[np.bool_],
+    weight: Single,
+) -> None:
+    """Write the share of a footprint that falls on each node and its copies.
+
+    `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any.
+    """
+    weight[:] = _0
+    kinds, ends, picks = len(table.edges), table.repeat[0], table.repeat[1]
+    for axis in range(2):
+        centre, sigma, cells = columns.u[row], columns.sigma[row], ends
+        if axis == 1:
+            centre, sigma, cells = columns.v[row], columns.sigma_minor[row], picks
+        centre -= math.floor(centre / cells) * cells
+        for cell in range(cells):
+            for kind in range(kinds):
+                touched[axis, cell, kind] = interval_masses(
+                    shape, centre, sigma, float(cells), table.edges[kind], float(cell), scratch[axis, cell, kind]
+                )
+    for p in range(len(table.pieces)):
+        piece = table.pieces[p]
+        start, across, lines = piece[START], piece[COLUMNS], piece[ROWS]
+        for c in range(table.copies.shape[1]):
+            end, pick = table.copies[p, c, 0], table.copies[p, c, 1]
+            if touched[0, end, piece[KIND_X]] and touched[1, pick, piece[KIND_Y]]:
+                along_x, along_y = scratch[0, end, piece[KIND_X]], scratch[1, pick, piece[KIND_Y]]
+                _add_product(along_x[:across], along_y[:lines], weight[start : start + across * lines])
+
+
+@fast_kernel
+def _add_product(along_x: Single, along_y: Single, weight: Single) -> None:
+    """Add the products of the shares along x and along y to the nodes of a grid."""
+    across = len(along_x)
+    for j in range(len(along_y)):
+        if along_y[j] > _0:
+            line = weight[j * across : (j + 1) * across]
+            for i in range(across):
+                line[i] += along_y[j] * along_x[i]
+
+
+@fast_kernel
+def any_weight(share: Single) -> bool:
+    """Say whether any of the shares is above 0."""
+    total = _0
+    for k in range(len(share)):
+        total += share[k]
+    return bool(total > _0)

@@ -1,0 +1,307 @@
+"""Questions from a file: the numbers of `estimate`, whatever the file's cut; every fault named; whole or not at all."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import pipeline.shards.evaluate as evaluate_module
+import pipeline.shards.questions as questions_module
+from pipeline.shards.evaluate import Summary, bad_list, evaluate_file
+from pipeline.shards.schema import QUERY_COLUMNS, STANDARD_ERRORS
+from pipeline.truth.estimator import estimate
+from pipeline.truth.frames import COMPONENTS
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+FABRIC = load_fabric("denim")
+OPTIONS = TruthOptions(estimator="owen", relative_error=0.2, min_count=64, max_count=128)
+ROWS = 300
+SEED = 5
+
+
+def questions(rows=ROWS, seed=1):
+    """Return the least columns that a file needs, in float64."""
+    rng = np.random.default_rng(seed)
+    columns = {"u": rng.random(rows) * 4, "v": rng.random(rows) * 4, "sigma": np.exp(rng.normal(size=rows))}
+    for name in ("wi", "wo"):
+        w = rng.normal(size=(rows, 3))
+        w[:, 2] = np.abs(w[:, 2]) + 0.2
+        w /= np.linalg.norm(w, axis=1, keepdims=True)
+        columns |= {f"{name}_{axis}": w[:, k] for k, axis in enumerate("xyz")}
+    return columns
+
+
+def expected(columns, start=0):
+    """Return the answers of `estimate` to columns without an own shape of footprint."""
+    single = {name: np.asarray(column, np.float32) for name, column in columns.items()}
+    w = (np.stack([single[f"{name}_{axis}"] for axis in "xyz"], axis=-1) for name in ("wi", "wo"))
+    return estimate(FABRIC, Queries.round(single["u"], single["v"], single["sigma"], *w), OPTIONS, SEED, start)
+
+
+class Case:
+    """A file of questions in a folder of its own, and its result."""
+
+    def __init__(self, folder):
+        self.queries, self.out = folder / "queries.parquet", folder / "deep" / "result.parquet"
+        self.options = OPTIONS
+
+    def write(self, columns, row_group_size=100):
+        table = columns if isinstance(columns, pa.Table) else pa.table(columns)
+        pq.write_table(table, self.queries, row_group_size=row_group_size)
+        return self
+
+    def run(self, **choices):
+        return evaluate_file(FABRIC, self.queries, self.out, self.options, SEED, **choices)
+
+    def result(self):
+        return pq.read_table(self.out)
+
+    def refused(self, **choices):
+        """Return the sentence, and check that nothing at all was written."""
+        with pytest.raises(BadInput) as caught:
+            self.run(**choices)
+        assert not self.out.parent.exists() and "\n" not in str(caught.value)
+        return str(caught.value)
+
+
+@pytest.fixture
+def case(tmp_path):
+    return Case(tmp_path)
+
+
+def same(table, answers, rows=slice(None)):
+    """Check the answer columns of a result."""
+    for k, (name, error) in enumerate(zip(COMPONENTS, STANDARD_ERRORS, strict=True)):
+        np.testing.assert_array_equal(table[name].to_numpy()[rows], answers.mean[:, k])
+        np.testing.assert_array_equal(table[error].to_numpy()[rows], answers.standard_error[:, k])
+    np.testing.assert_array_equal(table["transparency"].to_numpy()[rows], answers.transparency)
+    np.testing.assert_array_equal(table["count"].to_numpy()[rows], answers.count)
+
+
+def test_the_answers_are_those_of_estimate_and_other_columns_are_carried_along(case):
+    columns = questions()
+    tags = pa.array([f"tag {k % 3}" for k in range(ROWS)]).dictionary_encode()
+    nested = pa.array([[k] if k % 2 else None for k in range(ROWS)])
+    given = pa.table({"id": np.arange(ROWS), "tag": tags, **columns, "nested": nested})
+    summary = case.write(given).run()
+    table = case.result()
+    assert table.column_names[: given.num_columns] == given.column_names
+    assert table.select(given.column_names).combine_chunks().cast(given.schema).equals(given)
+    same(table, expected(columns))
+    assert (summary.rows, summary.bad) == (ROWS, 0) and summary.points == table["count"].to_numpy().sum()
+
+
+def test_a_result_read_alone_is_understood(case):
+    case.write(questions(3)).run()
+    schema = case.result().schema
+    about = json.loads(schema.metadata[b"twillight"])
+    assert about["truth"] == OPTIONS.model_dump(mode="json") and about["seed"] == SEED
+    assert about["fabric"]["name"] == "denim" and about["queries"] == "queries.parquet"
+    assert about["left_out"] == {"sigma_minor": "sigma", "angle": 0.0, "curvature": 0.0}
+    assert "1/sr" in schema.field("specular_warp").metadata[b"meaning"].decode()
+    assert not schema.field("count").nullable
+
+
+@pytest.mark.parametrize("estimator", ["owen", "auto"])
+def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, monkeypatch, estimator):
+    case.options = OPTIONS.model_copy(update={"estimator": estimator})
+    columns = questions()
+    columns["wi_z"][::5] *= -1.0
+    columns["wo_z"][::7] *= -1.0
+    case.write(columns).run()
+    whole, table = case.out.read_bytes(), case.result()
+    for chunk in (1, 7, 100, 10_000):
+        case.run(chunk=chunk)
+        assert case.out.read_bytes() == whole
+    case.write(columns, row_group_size=17).run()
+    assert case.result().equals(table)
+    # Blocks that end inside row groups.
+    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
+    case.run(chunk=10)
+    assert case.result().equals(table)
+
+
+@pytest.mark.parametrize("row_group_size", [10, 1000])
+def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, monkeypatch, row_group_size):
+    case.write(questions(), row_group_size)
+    blocks, asked = [], []
+
+    def spy(fabric, queries, options, seed, start):
+        asked.append(len(queries.u))
+        return estimate(fabric, queries, options, seed, start)
+
+    def held(block, *rest):
+        blocks.append((block.num_rows, block.nbytes))
+        return questions_module.questions_of(block, *rest)
+
+    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
+    monkeypatch.setattr(evaluate_module, "estimate", spy)
+    monkeypatch.setattr(evaluate_module, "questions_of", held)
+    case.run(chunk=16)
+    assert [rows for rows, _ in blocks] == [64, 64, 64, 64, 44]
+    assert max(nbytes for _, nbytes in blocks) <= 9 * (64 * 8 + 64 // 8)  # nine columns, and a bit a null
+    assert max(asked) == 16 and sum(asked) == ROWS + 1  # one for the compiler, outside the clock
+
+
+def test_single_precision_and_missing_columns_are_what_they_stand_for(case):
+    columns = questions()
+    case.write(columns).run()
+    table = case.result()
+    single = {name: np.asarray(column, np.float32) for name, column in columns.items()}
+    full = {**single, "sigma_minor": single["sigma"], "angle": np.zeros(ROWS), "curvature": np.zeros(ROWS, np.float32)}
+    case.write(full).run()
+    assert set(full) == set(QUERY_COLUMNS)
+    for name in COMPONENTS:
+        assert case.result()[name].equals(table[name])
+    # An own shape is no default.
+    case.write(full | {"sigma_minor": single["sigma"] * 0.5, "angle": np.ones(ROWS)}).run()
+    assert not case.result()["diffuse_warp"].equals(table["diffuse_warp"])
+
+
+def test_places_far_off_keep_their_digits_in_double_precision(case):
+    columns = questions()
+    columns["u"], columns["v"] = (np.round(columns[name] * 2**20) / 2**20 for name in ("u", "v"))
+    case.write(columns).run()
+    near = case.result()
+    case.write(columns | {"u": columns["u"] + 4 * 2**28, "v": columns["v"] - 4 * 2**28}).run()
+    for name in COMPONENTS:
+        np.testing.assert_allclose(case.result()[name].to_numpy(), near[name].to_numpy(), rtol=1e-4, atol=1e-6)
+
+
+def spoilt():
+    """Return questions with six bad rows, and what is wrong with each."""
+    columns = questions()
+    columns["sigma"][7] = -1.0
+    columns["sigma"][8] = 1e-60
+    columns["u"][120] = math.nan
+    columns["wi_z"][200] += 0.5
+    columns["curvature"] = np.where(np.arange(ROWS) == 250, 1.5, 0.0)
+    table = pa.table(columns)
+    missing = pa.array(columns["v"], mask=np.arange(ROWS) == 299)
+    table = table.set_column(table.column_names.index("v"), "v", missing)
+    return table, [
+        (7, "sigma", "-1.0", "must be greater than 0"),
+        (8, "sigma", "1e-60", "must be greater than 0 in single precision"),
+        (120, "u", "nan", "must be finite"),
+        (200, "wi_x..z", None, "must have unit length"),
+        (250, "curvature", "1.5", "must be from 0 to 1"),
+        (299, "v", "", "must not be null"),
+    ]
+
+
+def test_the_first_bad_row_is_named_and_the_others_are_counted(case):
+    sentence = case.write(spoilt()[0]).refused()
+    assert "queries.parquet: row 7, column sigma = -1.0: must be greater than 0 (5 more bad rows;" in sentence
+
+
+def test_bad_rows_are_skipped_listed_and_change_no_other_row(case):
+    table, faults = spoilt()
+    summary = case.write(table).run(skip_bad=True)
+    assert (summary.rows, summary.bad) == (ROWS, len(faults))
+    with bad_list(case.out).open(newline="") as file:
+        listed = list(csv.DictReader(file))
+    for row, (index, column, value, reason) in zip(listed, faults, strict=True):
+        assert (int(row["row"]), row["column"]) == (index, column) and row["reason"].startswith(reason)
+        assert value is None or row["value"] == value
+    result, good = case.result(), np.ones(ROWS, bool)
+    good[[index for index, *_ in faults]] = False
+    np.testing.assert_array_equal(result["count"].is_valid().to_numpy(), good)
+    same(result, expected(questions()).take(good), good)
+    # The same bytes in any chunks, and an empty list where nothing is bad.
+    first = case.out.read_bytes()
+    case.run(skip_bad=True, chunk=3)
+    assert case.out.read_bytes() == first
+    case.write(questions()).run(skip_bad=True)
+    assert bad_list(case.out).read_text().splitlines() == ["row,column,value,reason"]
+
+
+def test_files_without_a_good_row_are_answered(case):
+    assert case.write({name: column[:0] for name, column in questions().items()}).run().rows == 0
+    assert case.result().num_rows == 0
+    columns = questions(4) | {"sigma": np.zeros(4)}
+    summary = case.write(columns).run(skip_bad=True)
+    assert summary.bad == 4 and math.isnan(summary.median_relative_error)
+    assert case.result()["count"].null_count == 4
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda t: t.drop_columns(["wi_z"]), "column wi_z missing"),
+        (lambda t: t.drop_columns(["wi_z", "u"]), "columns u, wi_z missing"),
+        (lambda t: t.append_column("count", t["u"]), "column = 'count': has the name of an answer"),
+        (lambda t: t.append_column("u", t["u"]), "column = 'u': is there more than once"),
+        (lambda t: t.set_column(0, "u", t["u"].cast("string")), "type of column u = 'string'"),
+        (lambda t: t.set_column(0, "u", pa.nulls(ROWS)), "type of column u = 'null'"),
+        (lambda t: t.set_column(2, "sigma", pa.array(np.ones(ROWS, np.int64))), "type of column sigma = 'int64'"),
+        (lambda t: t.append_column("angle", pa.array(np.full(ROWS, np.inf))), "row 0, column angle = inf"),
+    ],
+)
+def test_files_that_ask_nothing_are_refused(case, change, said):
+    assert said in case.write(change(pa.table(questions()))).refused()
+
+
+def test_files_that_are_not_whole_are_refused(case):
+    assert "no such file" in case.refused()
+    case.queries.write_text("u,v\n1,2\n")
+    assert "not a whole Parquet file" in case.refused()
+    content = case.write(questions()).queries.read_bytes()
+    case.queries.write_bytes(content[: len(content) // 2])
+    assert "not a whole Parquet file" in case.refused()
+    case.queries.write_bytes(b"")
+    assert "not a whole Parquet file" in case.refused()
+
+
+def test_a_page_that_was_damaged_leaves_nothing(case):
+    pq.write_table(pa.table(questions(20_000)), case.queries, write_page_checksum=True, compression="none")
+    content = bytearray(case.queries.read_bytes())
+    content[len(content) // 2] ^= 1
+    case.queries.write_bytes(content)
+    assert "not a whole Parquet file" in case.refused()
+    with pytest.raises(BadInput, match="not a whole Parquet file"):
+        case.run(skip_bad=True)
+    assert not list(case.out.parent.iterdir())
+
+
+def test_outputs_that_cannot_be_written_are_refused_before_any_work(case, monkeypatch, tmp_path):
+    case.write(questions())
+    monkeypatch.setattr(evaluate_module, "estimate", None)
+    before = case.queries.read_bytes()
+    (tmp_path / "link.parquet").symlink_to(case.queries)
+    for out in (case.queries, tmp_path / "link.parquet", tmp_path, case.queries / "result.parquet"):
+        with pytest.raises(BadInput):
+            evaluate_file(FABRIC, case.queries, out, OPTIONS, SEED)
+    assert case.queries.read_bytes() == before
+
+
+def test_an_evaluation_that_is_stopped_leaves_what_was_there(case, monkeypatch):
+    case.write(questions()).run()
+    before = case.out.read_bytes()
+
+    def stop(share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        case.run(chunk=50, progress=stop, skip_bad=True)
+    assert case.out.read_bytes() == before and [path.name for path in case.out.parent.iterdir()] == [case.out.name]
+
+
+def test_the_median_is_that_of_the_rows():
+    rng = np.random.default_rng(3)
+    mean = np.exp(rng.normal(size=(1001, 4))).astype(np.float32)
+    error = (mean * np.exp(rng.normal(size=(1001, 1)))).astype(np.float32)
+    mean[:100], error[:100] = 0.0, 0.0
+    summary = Summary()
+    for part in (slice(0, 300), slice(300, None)):
+        summary.add(Answers.opaque(mean[part], error[part], np.ones(1001, np.int32)[part]))
+    relative = np.linalg.norm(error[100:], axis=1) / np.linalg.norm(mean[100:], axis=1)
+    assert summary.median_relative_error == pytest.approx(np.median(relative), rel=0.005)
+    assert summary.points == 1001

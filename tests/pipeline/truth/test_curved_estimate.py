@@ -1,0 +1,139 @@
+"""`estimate` on curved cloth against a brute force in NumPy, and light from below the tangent plane."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.truth.cloth import model_of
+from pipeline.truth.estimator import estimate
+from pipeline.truth.heightfield import height_field
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.patch import point_share, scene
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+from weaves.surface import GAP, WARP, WEFT, surface_at
+
+STEP = 0.0025
+EXACT = TruthOptions(estimator="owen", footprint="box", relative_error=1e-9, min_count=1 << 14, max_count=1 << 14)
+
+
+def _direction(elevation, azimuth):
+    a, b = math.radians(elevation), math.radians(azimuth)
+    return np.array([math.cos(a) * math.cos(b), math.cos(a) * math.sin(b), math.sin(a)])
+
+
+def _queries(fabric, wi, wo, curvature, rows=1):
+    """Return queries about the whole repeat, by a box."""
+    column, side = np.ones(rows, np.float32), np.float32(fabric.weave.repeat[0] / math.sqrt(12))
+    wi, wo = (np.tile(w.astype(np.float32), (rows, 1)) for w in (wi, wo))
+    return Queries(column, column, side * column, wi, wo, side * column, 0 * column, np.float32(curvature) * column)
+
+
+def _free(fabric, x, y, z, w, curvature):
+    """Say which points see w, marching until the ray is above the cloth and rises."""
+    flat = math.hypot(w[0], w[1])
+    highest, free, rows = height_field(fabric).highest, np.ones(len(x), bool), np.arange(len(x))
+    step = 0
+    while rows.size:
+        step += 1
+        s = step * STEP
+        altitude = z[rows] + s * (w[2] / flat + 0.5 * curvature * s)
+        point = surface_at(fabric, x[rows] + s * w[0] / flat, y[rows] + s * w[1] / flat)
+        hit = (point.yarn != GAP) & (point.height > altitude + 1e-7)
+        free[rows[hit]] = False
+        done = (altitude > highest) & (w[2] / flat + curvature * s > 0)
+        # On flat cloth a ray that does not rise never leaves.
+        rows = rows[~hit & ~done]
+    return free
+
+
+def _brute(fabric, wi, wo, curvature, x, y):
+    """Return area, F_specular V A and F_diffuse V A of points, the formulas of pipeline.truth.patch written anew."""
+    point, back = surface_at(fabric, x, y), surface_at(fabric.back(), x, y)
+    n, t = point.normal, point.tangent
+    across = (wi[:2] @ wo[:2]) ** 2 / ((wi[:2] @ wi[:2]) * (wo[:2] @ wo[:2]))
+    cos_o, cos_i = n @ wo, n @ wi
+    seen = (cos_o > 0) & _free(fabric, x, y, point.height, wo, curvature)
+    front = (cos_i > 0) & _free(fabric, x, y, point.height, wi, curvature * across)
+    behind = np.zeros(len(x), bool)
+    if wi[2] < 0:
+        mirrored = wi * (1, 1, -1)
+        behind = (cos_i < 0) & (back.normal @ mirrored > 0) & _free(fabric.back(), x, y, back.height, mirrored, 0.0)
+    area = np.where(seen, cos_o / n[:, 2], 0.0)
+
+    def of(yarns, name):
+        return np.where(point.yarn == WARP, getattr(yarns[0], name), getattr(yarns[1], name))
+
+    alpha, blend = (of((fabric.warp, fabric.weft), name) for name in ("roughness", "blend"))
+    sigma_i, sigma_o = (np.sqrt(((np.cross(w, t)) ** 2).sum(1) + (alpha * (t @ w)) ** 2) for w in (wi, wo))
+    h = (wi + wo) / np.linalg.norm(wi + wo)
+    q = (h**2).sum() - (t @ h) ** 2 + (t @ h) ** 2 / alpha**2
+    flakes = 1 / (math.pi * alpha * q**2)
+    depth, c_i = fabric.optical_thickness, np.abs(cos_i)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        a, b = sigma_i / c_i, sigma_o / cos_o
+        reflected = flakes * (1 - np.exp(-depth * (a + b))) / (4 * (sigma_i * cos_o + sigma_o * c_i))
+        passed = flakes * (np.exp(-depth * b) - np.exp(-depth * a)) / (a - b) / (4 * c_i * cos_o)
+        specular = c_i * np.where(front, reflected, passed)
+    macro = np.where(front, max(wi[2], 0.0), abs(wi[2]))
+    diffuse = (blend * c_i + (1 - blend) * macro) / math.pi
+    lit = seen & (front | behind)
+    shares = np.stack([area, np.where(lit, specular, 0) * area, np.where(lit, diffuse, 0) * area], axis=-1)
+    return np.where(seen[:, None], shares, 0), point.yarn, front[seen].mean(), behind[seen].mean()
+
+
+@pytest.mark.parametrize(
+    ("name", "curvature", "light", "viewer"),
+    [
+        ("polyester_lining", 0.2, (20, 40), (35, 200)),
+        ("polyester_lining", 0.2, (-4, 30), (25, 185)),
+        ("denim", 0.4, (-8, 250), (50, 85)),
+    ],
+)
+def test_curved_estimates_match_brute_force(name, curvature, light, viewer):
+    fabric, wi, wo = load_fabric(name), _direction(*light), _direction(*viewer)
+    # One random point in each stratum of a grid over the repeat.
+    strata = 96
+    at = np.stack(np.meshgrid(np.arange(strata), np.arange(strata)), -1).reshape(-1, 2)
+    x, y = ((at + np.random.default_rng(5).random(at.shape)) * fabric.weave.repeat / strata).T
+    shares, yarn, front, behind = _brute(fabric, wi, wo, curvature, x, y)
+    assert front > 0.05, "light below the tangent plane reaches a curved cloth"
+    assert (behind > 0) == (wi[2] < 0)
+
+    # Point by point: only where a march steps over an edge may they differ.
+    model, query = model_of(fabric, EXACT), scene(*wi, *wo, curvature)
+    kernels = [point_share(model.front, model.back, *p, query, model.choices) for p in zip(x, y, strict=True)]
+    assert all(k[0] == family for k, family in zip(kernels, yarn, strict=True))
+    wrong = ~np.isclose([k[1:4] for k in kernels], shares, rtol=1e-9, atol=1e-12).all(axis=1)
+    assert wrong.mean() < 0.005
+
+    # The patch.
+    exact = [shares[yarn == f, column].sum() / shares[:, 0].sum() for column in (1, 2) for f in (WARP, WEFT)]
+    answers = estimate(fabric, _queries(fabric, wi, wo, curvature), EXACT, 2)
+    error = answers.standard_error[0]
+    assert np.linalg.norm(error) < 0.02 * np.linalg.norm(exact)
+    assert (np.abs(answers.mean[0] - exact) < 4 * error).all()
+
+
+def test_flat_is_the_limit_of_a_small_curvature():
+    fabric = load_fabric("denim")
+    for light in (60.0, 10.0, -35.0):
+        flat, bent = (
+            estimate(fabric, _queries(fabric, _direction(light, 70), _direction(40, 200), k), EXACT, 2)
+            for k in (0.0, 1e-6)
+        )
+        assert flat.mean.max() > 1e-4
+        np.testing.assert_allclose(bent.mean, flat.mean, rtol=1e-4, atol=1e-7)
+        np.testing.assert_allclose(bent.transparency, flat.transparency, rtol=1e-4)
+
+
+def test_a_low_light_reaches_more_of_a_cloth_the_more_it_is_curved():
+    """Diffuse light of a sun 3 degrees above and below the tangent plane, opposite the viewer."""
+    fabric, wo = load_fabric("polyester_lining"), _direction(70, 180)
+    for elevation in (3, -3):
+        light = _direction(elevation, 0)
+        totals = [
+            estimate(fabric, _queries(fabric, light, wo, k), EXACT, 1).mean[0, 2:].sum() for k in (0.02, 0.1, 0.5)
+        ]
+        assert (np.diff(totals) > 0).all()
