@@ -78,58 +78,57 @@ def weigh(
 
 @fast_kernel
 def borders(
-    areas: Single, diffuses: Single, speculars: Single, margins: Single, lit_margins: Single, columns: int
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """Return what the borders of shadows, found between nodes, add to the three sums, and their squared errors.
+    first: Single, second: Single, margins: Single, columns: int
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Return what the borders of shadows, found between nodes, add to the sums of two shares, and their squared errors.
 
     Where the margin changes sign from one node to the next, the border lies where its straight line crosses 0, and the
     visible node counts up to there instead of half-way. Where the margin jumps, half-way is as good as anything.
+    `columns` is the length of a row of nodes.
     """
-    area, diffuse, specular = _0, _0, _0
-    area_error, diffuse_error, specular_error = _0, _0, _0
-    for k in range(columns, len(areas) - 2 * columns - 2):
-        m, right, down = margins[k], margins[k + 1], margins[k + columns]
-        share, doubt = _crossing(margins[k - 1], m, right, margins[k + 2], abs(m - down))
-        v = areas[k] + areas[k + 1]
-        area += v * share
-        area_error += areas[k] * areas[k] * SMOOTH + v * v * doubt
-        share, doubt = _crossing(margins[k - columns], m, down, margins[k + 2 * columns], abs(m - right))
-        v = areas[k] + areas[k + columns]
-        area += v * share
-        area_error += v * v * doubt
-
-        m, right, down = lit_margins[k], lit_margins[k + 1], lit_margins[k + columns]
-        share, doubt = _crossing(lit_margins[k - 1], m, right, lit_margins[k + 2], abs(m - down))
-        v, w = diffuses[k] + diffuses[k + 1], speculars[k] + speculars[k + 1]
-        diffuse += v * share
-        specular += w * share
-        diffuse_error += diffuses[k] * diffuses[k] * SMOOTH + v * v * doubt
-        specular_error += speculars[k] * speculars[k] * SMOOTH + w * w * doubt
-        share, doubt = _crossing(lit_margins[k - columns], m, down, lit_margins[k + 2 * columns], abs(m - right))
-        v, w = diffuses[k] + diffuses[k + columns], speculars[k] + speculars[k + columns]
-        diffuse += v * share
-        specular += w * share
-        diffuse_error += v * v * doubt
-        specular_error += w * w * doubt
-    return area, diffuse, specular, area_error, diffuse_error, specular_error
+    # Neighbours as arrays of their own: indices that might be negative would keep the loop from vector units.
+    count = max(len(first) - 3 * columns, 0)
+    here, up = margins[columns : columns + count], margins[:count]
+    left, right = margins[columns - 1 : columns - 1 + count], margins[columns + 1 : columns + 1 + count]
+    further = margins[columns + 2 : columns + 2 + count]
+    down, below = margins[2 * columns : 2 * columns + count], margins[3 * columns : 3 * columns + count]
+    first_here, first_right = first[columns : columns + count], first[columns + 1 : columns + 1 + count]
+    first_down = first[2 * columns : 2 * columns + count]
+    second_here, second_right = second[columns : columns + count], second[columns + 1 : columns + 1 + count]
+    second_down = second[2 * columns : 2 * columns + count]
+    moved, moved_second, error, error_second = _0, _0, _0, _0
+    for k in range(count):
+        change_right, change_down = abs(here[k] - right[k]), abs(here[k] - down[k])
+        share, doubt = _crossing(left[k], here[k], right[k], further[k], change_right, change_down)
+        v, w = first_here[k] + first_right[k], second_here[k] + second_right[k]
+        moved += v * share
+        moved_second += w * share
+        error += first_here[k] * first_here[k] * SMOOTH + v * v * doubt
+        error_second += second_here[k] * second_here[k] * SMOOTH + w * w * doubt
+        share, doubt = _crossing(up[k], here[k], down[k], below[k], change_down, change_right)
+        v, w = first_here[k] + first_down[k], second_here[k] + second_down[k]
+        moved += v * share
+        moved_second += w * share
+        error += v * v * doubt
+        error_second += w * w * doubt
+    return moved, moved_second, error, error_second
 
 
 @fast_kernel
 def _crossing(
-    before: np.float32, m: np.float32, n: np.float32, after: np.float32, across: np.float32
+    before: np.float32, m: np.float32, n: np.float32, after: np.float32, change: np.float32, across: np.float32
 ) -> tuple[np.float32, np.float32]:
     """Return what a border between nodes of margins m and n adds to the visible one's share, and its squared error.
 
-    `before` and `after` are the margins beyond them, `across` the change of the margin at a right angle, which shares
-    the border with the links in that direction.
+    `before` and `after` are the margins beyond them, `change` how much m and n differ, and `across` the change at a
+    right angle, which shares the border with the links in that direction.
     """
-    change = abs(m - n)
-    weight = change / (change + across + _TINY)
+    weight = _1 / (change + across + _TINY)
     jump = change > _JUMP * max(abs(before - m), abs(n - after))
-    share = _0 if jump else max(m, n) / (change + _TINY) - _HALF
+    share = _0 if jump else (max(m, n) - _HALF * change) * weight
+    doubt = change * weight * (_EDGE_JUMP if jump else _EDGE)
     crossed = min(m, n) <= _0 and max(m, n) > _0
-    doubt = weight * (_EDGE_JUMP if jump else _EDGE)
-    return (weight * share if crossed else _0), (doubt if crossed else _0)
+    return (share if crossed else _0), (doubt if crossed else _0)
 
 
 @fast_kernel

@@ -233,14 +233,8 @@ def sum_rows(
                             speculars[start:stop],
                         )
                     f0, f1 = f1, f1 + count
-            a1, c1, s1, a2, c2, s2 = borders(
-                areas[start:stop],
-                diffuses[start:stop],
-                speculars[start:stop],
-                margins[start:stop],
-                lit_margins[start:stop],
-                across,
-            )
+            a1, _, a2, _ = borders(areas[start:stop], areas[start:stop], margins[start:stop], across)
+            c1, s1, c2, s2 = borders(diffuses[start:stop], speculars[start:stop], lit_margins[start:stop], across)
             moved_area += a1
             area_error += a2
             if family != GAP:
