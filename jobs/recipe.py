@@ -217,7 +217,7 @@ def _refuse_contradictions(recipe: Recipe, where: str) -> None:
             allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
             raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
     truth, training_truth = recipe.dataset.truth, recipe.dataset.truth_of("train")
-    for name in ("footprint", "frame", "normaliser", "geometry"):
+    for name in ("footprint", "frame", "normaliser", "geometry", "shadows", "variation"):
         if (value := getattr(training_truth, name)) != getattr(truth, name):
             allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
             raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)

@@ -13,15 +13,17 @@ from pipeline.scenes.gbuffer import GBuffer
 from weaves.fabric import Fabric
 
 
-def colours(fabric: Fabric) -> npt.NDArray[np.float64]:
-    """Return the linear RGB colours of the components in the order of `frames.COMPONENTS`, (4, 3)."""
-    return np.array(
-        [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb],
-        dtype=np.float64,
-    )
+def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64]:
+    """Return the linear RGB colours of the components in the order of `frames.COMPONENTS`, (4, 3).
+
+    Light that is `transmitted`, from the other side of the cloth, takes the diffuse colours k_dt.
+    """
+    yarns = (fabric.warp, fabric.weft)
+    diffuse = [yarn.diffuse_transmission_rgb if transmitted else yarn.diffuse_rgb for yarn in yarns]
+    return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
 
 
-def shade(fabric: Fabric, components: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: bool = False) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3).
 
     Parameters
@@ -30,8 +32,10 @@ def shade(fabric: Fabric, components: npt.ArrayLike) -> npt.NDArray[np.float64]:
         Whose colours are applied.
     components : array_like (N, 4)
         S_warp, S_weft, C_warp, C_weft with unit colour.
+    transmitted : bool
+        Whether light and viewer are on different sides of the cloth.
     """
-    return np.asarray(np.asarray(components, dtype=np.float64) @ colours(fabric))
+    return np.asarray(np.asarray(components, dtype=np.float64) @ colours(fabric, transmitted))
 
 
 def compose(gbuffer: GBuffer, rgb: npt.ArrayLike, background: float = 0.0) -> npt.NDArray[np.float32]:

@@ -26,3 +26,11 @@ def test_compose_scales_by_the_irradiance_and_leaves_the_rest():
     assert picture[gbuffer.lit] == pytest.approx(2.0 * rgb)
     assert (picture[gbuffer.mask & ~gbuffer.lit] == 0).all()
     assert (picture[~gbuffer.mask] == 0.5).all()
+
+
+def test_transmitted_light_takes_the_transmission_colours():
+    denim = load_fabric("denim")
+    curtain = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
+    rgb = shade(curtain, np.eye(4, dtype=np.float32), transmitted=True)
+    assert rgb[3] == pytest.approx([0.1, 0.2, 0.3]) and (rgb[2] == 0).all()
+    assert rgb[:2] == pytest.approx(shade(denim, np.eye(4, dtype=np.float32))[:2])
