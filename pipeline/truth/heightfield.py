@@ -148,9 +148,15 @@ def torus_height(
 @kernel
 def _height_top(field: HeightField, family: int, pick: int, end: int, x: float, y: float) -> tuple[float, float, float]:
     """Return height and its slopes along local x and y, for a float on top; |x| <= r."""
-    yarn, own = field.yarn[family], field.floats[pick, end, TOP]
     return torus_height(
-        yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP], x, y
+        field.yarn[family, RADIUS],
+        field.yarn[family, INVERSE_RADIUS],
+        field.yarn[family, BETA],
+        field.floats[pick, end, TOP, BEND_RADIUS],
+        field.floats[pick, end, TOP, HALF_LENGTH],
+        field.floats[pick, end, TOP, AXIS_DROP],
+        x,
+        y,
     )
 
 

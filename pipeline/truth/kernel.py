@@ -35,3 +35,6 @@ fast_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={
 NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never
 between runs, workers or orders on one.
 """
+
+inlined_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+"""Decorator of functions called once a point with many tables: a call would copy what it passes."""

@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP, GLOSS, UNDER, HeightField, surface_at
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel, kernel
 from pipeline.truth.microflake import density, sigma
 from pipeline.truth.slab import reflection, transmission, unscattered
 from pipeline.truth.visibility import Ray, ray, visible
@@ -74,7 +74,7 @@ def scene(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curv
     )
 
 
-@kernel
+@inlined_kernel
 def point_share(
     front: HeightField, back: HeightField, x: float, y: float, query: Scene, choices: Choices
 ) -> tuple[int, float, float, float, float]:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pipeline.truth.cloth import AREA, SUMS, Columns, Model
 from pipeline.truth.footprint import place_pair
 from pipeline.truth.heightfield import GAP
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel, kernel
 from pipeline.truth.patch import Scene, point_share, scene
 from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
@@ -30,7 +30,7 @@ HIDDEN_PATIENCE: Final = 16
 INDEPENDENT, JITTERED, R2, OWEN = range(4)
 
 
-@kernel
+@inlined_kernel
 def place_point(columns: Columns, row: int, model: Model, first: float, second: float) -> tuple[float, float, float]:
     """Return the point that two numbers in (0, 1) name in the footprint of a query, and its weight."""
     picks, ends = model.front.top.shape
@@ -48,7 +48,7 @@ def place_point(columns: Columns, row: int, model: Model, first: float, second: 
     )
 
 
-@kernel
+@inlined_kernel
 def add_point(
     model: Model, x: float, y: float, weight: float, query: Scene, sums: npt.NDArray[np.float64], r: int
 ) -> None:
