@@ -1,8 +1,9 @@
 """The estimators `table` and `auto`: sums over tabulated nodes, and sampling for what the table cannot say well enough.
 
-`auto` asks the table first, which costs some ten microseconds a query, and samples the queries of which the table's own
-stated error is above the one asked for, and those that it knows nothing of: tiny footprints, curved cloth, footprints
-at an angle, cloths of more than `_MOST_CELLS` different cells, and models other than the default.
+`auto` asks the table first, which costs ten to forty microseconds a query and samples its own doubtful nodes where the
+error it states is above the one asked for (nodes, refine). What is still above is sampled as a whole, and so is what
+the table knows nothing of: tiny footprints, curved cloth, footprints at an angle, cloths of more than `_MOST_CELLS`
+different cells, and models other than the default.
 """
 
 from __future__ import annotations
@@ -12,15 +13,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.cloth import Columns, Model
+from pipeline.truth.cloth import Columns, Model, Raw
 from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.nodes import sum_rows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.replicates import OWEN, sample_rows
 from pipeline.truth.table import NODES, Table, different_cells, tabulate
 from weaves.errors import BadInput
-
-Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
 
 _MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
 _SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve

@@ -21,6 +21,9 @@ AREA: Final = 5
 SUMS: Final = 6
 """Columns of every array of sums."""
 
+Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
+"""Means and standard errors (N, 5) of the components and the transparency, and points used (N,)."""
+
 FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
 
 

@@ -1,27 +1,25 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
-`mc`, `jittered`, `r2`, `owen` are sampled (pipeline.truth.replicates).
+`mc`, `jittered`, `r2`, `owen` sample the footprint (replicates); `quadrature` is Gauss-Legendre on every float; `table`
+sums over nodes with horizons, and `auto` takes it where that is good enough (auto).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final, get_args
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth import replicates
 from pipeline.truth.auto import auto_rows, table_rows
-from pipeline.truth.cloth import Columns, Model, columns_of, model_of
+from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature import quadrature_rows
 from pipeline.truth.query import Answers, Queries, validate
 from weaves.fabric import Fabric
-
-Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
-"""Means and standard errors (N, 5) of the components and the transparency, and points used (N,)."""
 
 
 def _sampled(
@@ -88,6 +86,3 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     return Answers(
         single_mean[:, :4], single_error[:, :4], count.astype(np.int32), single_mean[:, 4], single_error[:, 4]
     )
-
-
-assert set(get_args(EstimatorName)) >= set(ESTIMATORS)

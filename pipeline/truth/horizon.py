@@ -57,7 +57,7 @@ def _slope_of_top(
 ) -> float:
     """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
 
-    The slope is greatest where its tangent passes through the point, at the root of (h - z) - s h', which falls with s.
+    The slope is greatest where its tangent passes through the point, at the root of (h - z) - s h', which rises with s.
     """
     # The ray in the frame of the float.
     family = int(field.top[pick, end])

@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.cloth import AREA, SUMS, Columns, Model
+from pipeline.truth.cloth import AREA, SUMS, Columns, Model, Raw
 from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.kernel import kernel
 from pipeline.truth.options import TruthOptions
@@ -41,7 +41,6 @@ from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.replicates import OWEN, query_scene, sample_rows
 
 Floats = npt.NDArray[np.float64]
-Raw = tuple[Floats, Floats, npt.NDArray[np.int64]]
 
 SAFETY: Final = 1.5
 """Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""

@@ -1,15 +1,16 @@
 """The patch BSDF: an outside rendering, an oracle in NumPy, statistics of the estimators, and invariants."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
+from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint import BOX_SIDE
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.point_sampler import PointSampler
 from pipeline.truth.query import Queries
 from pipeline.truth.replicates import REPLICATES
@@ -282,3 +283,7 @@ def test_the_adaptive_estimate_states_its_error_on_every_preset(name):
     difference = answers.mean - exact.mean
     assert (np.abs(difference) > 3 * spread + 1e-6).mean() < 0.06
     assert 0.55 < np.median(np.abs(difference[spread > 1e-5]) / spread[spread > 1e-5]) < 0.85
+
+
+def test_every_name_has_an_estimator():
+    assert set(get_args(EstimatorName)) == set(ESTIMATORS)
