@@ -1,13 +1,14 @@
 """The estimators `table` and `auto`: sums over tabulated nodes, and sampling for what the table cannot say well enough.
 
-`auto` asks the table first, which costs ten to forty microseconds a query and samples its own doubtful nodes where the
-error it states is above the one asked for (nodes, refine). What is still above is sampled as a whole, and so is what
-the table knows nothing of: tiny footprints, curved cloth, footprints at an angle, cloths of more than `_MOST_CELLS`
-different cells, and models other than the default.
+`auto` asks a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a query
+and samples its own doubtful nodes where the error it states is above the one asked for (nodes, refine). What is still
+above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, footprints at an
+angle, cloths of more than `_MOST_CELLS` different cells, and models other than the default.
 """
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Final
 
 import numpy as np
@@ -18,36 +19,36 @@ from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.nodes import sum_rows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.replicates import OWEN, sample_rows
-from pipeline.truth.table import NODES, Table, different_cells, tabulate
+from pipeline.truth.table import NODES, WIDE, Table, different_cells, tabulate
 from weaves.errors import BadInput
 
 _MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
 _SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
+_UNBOUNDED: Final = (1.0, np.inf)  # relative and absolute error: whatever the table states will do
 _STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
 """Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
 
 
 def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
-    """Answer each query by the table if that states the error asked for, else by scrambled Sobol points."""
+    """Answer each query by the first that states the error asked for: a coarse table, a fine one, sampling."""
     rows = len(index)
     means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    known, wide = _tabulated(model, columns), _wide(columns)
     left = np.ones(rows, np.bool_)
-    known = np.flatnonzero(_tabulated(model, columns))
-    if known.size:
-        chosen = columns.take(known)
+    for coarse in (True, False):
+        asked = np.flatnonzero(known & left & (wide | (not coarse)))
+        if not asked.size:
+            continue
+        chosen = columns.take(asked)
+        bound = _UNBOUNDED if coarse else (options.relative_error, options.absolute_error)
         mean, error, count = sum_rows(
-            model,
-            _table(model, chosen),
-            chosen,
-            index[known],
-            options.relative_error,
-            options.absolute_error,
-            np.uint64(seed),
+            model, _table(model, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed)
         )
         size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
-        means[known], errors[known], counts[known] = mean, error, count
-        left[known[good]] = False
+        means[asked], errors[asked] = mean, error
+        counts[asked] += count
+        left[asked[good]] = False
     missing = np.flatnonzero(left)
     if missing.size:
         mean, error, count = sample_rows(
@@ -67,14 +68,27 @@ def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opti
 
 
 def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
-    """Answer every query by the table, whatever error that states."""
-    known = _tabulated(model, columns)
+    """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever they state."""
+    known, wide = _tabulated(model, columns), _wide(columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
         allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints along the axes of at least "
         allowed += f"{_SMALLEST:.3g} yarn spacings, and the default frame, geometry, shadows and variation: take auto"
         raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
-    return sum_rows(model, _table(model, columns), columns, index, 1.0, np.inf, np.uint64(seed))
+    rows = len(index)
+    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    for coarse in (True, False):
+        asked = np.flatnonzero(wide == coarse)
+        if asked.size:
+            chosen = columns.take(asked)
+            answer = sum_rows(model, _table(model, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed))
+            means[asked], errors[asked], counts[asked] = answer
+    return means, errors, counts
+
+
+def _wide(columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say for which queries the coarse table is good enough to be asked."""
+    return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
 
 
 def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
@@ -90,19 +104,21 @@ def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
     return np.asarray(along & wide & (columns.curvature == 0.0))
 
 
-_TABLES: dict[tuple[int, bool], tuple[Model, Table]] = {}
-_KEPT: Final = 4
+_TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}
+_KEPT: Final = 8
+_BUILDING: Final = Lock()
 
 
-def _table(model: Model, columns: Columns) -> Table:
+def _table(model: Model, columns: Columns, coarse: bool) -> Table:
     """Return the table of one side of a cloth, one of the last few built."""
     behind = bool((columns.wi[:, 2] < 0.0).any())
-    for with_behind in (True, False):
-        kept = _TABLES.get((id(model.front), with_behind))
-        if kept and kept[0].front is model.front and (with_behind or not behind):
-            return kept[1]
-    while len(_TABLES) >= _KEPT:
-        _TABLES.pop(next(iter(_TABLES)))
-    table = tabulate(model.front, model.back, behind)
-    _TABLES[id(model.front), behind] = (model, table)
+    with _BUILDING:
+        for with_behind in (True, False):
+            kept = _TABLES.get((id(model.front), with_behind, coarse))
+            if kept and kept[0].front is model.front and (with_behind or not behind):
+                return kept[1]
+        while len(_TABLES) >= _KEPT:
+            _TABLES.pop(next(iter(_TABLES)))
+        table = tabulate(model.front, model.back, behind, coarse)
+        _TABLES[id(model.front), behind, coarse] = (model, table)
     return table

@@ -34,12 +34,17 @@ from pipeline.truth.kernel import kernel
 NODES: Final = 32
 """Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
 
+WIDE: Final = 0.3
+"""Smallest standard deviation, in yarn spacings, of a footprint that a coarse table answers about as well."""
+
 AZIMUTHS: Final = 128
 """Directions in which horizons are known."""
 
 _FEW = 8
+_COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
+_SIDE = 0.25  # share of a node by which the last one along a yarn is cut in two
 _FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
 
 Single = npt.NDArray[np.float32]
@@ -90,7 +95,14 @@ class Table(NamedTuple):
     uniform: float
 
 
-def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0, azimuths: int = AZIMUTHS) -> Table:
+def tabulate(
+    front: HeightField,
+    back: HeightField,
+    behind: bool,
+    coarse: bool = False,
+    nodes: int = 0,
+    azimuths: int = AZIMUTHS,
+) -> Table:
     """Build the table of one side of a cloth.
 
     Parameters
@@ -99,12 +111,15 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0
         The side that is seen and the other one, reflected in the fabric plane.
     behind : bool
         Whether light from behind will be asked for; through gaps it always is.
+    coarse : bool
+        Whether fewer nodes will do, since footprints are `WIDE`: where a shadow's border is taken wrongly at one node,
+        as many others make up for it. At 1 % it costs a half to a fifth of the time.
     nodes, azimuths : int
-        Resolution; 0 nodes: as many as `NODES` says.
+        Resolution; 0 nodes: as many as the number of different cells asks for.
     """
     picks, ends = front.top.shape
     orbits = _orbits(front.top)
-    nodes = nodes or max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / len(orbits)))))
+    nodes = nodes or _resolution(len(orbits), coarse)
     kinds: list[tuple[float, ...]] = []
     rows, copies, grids = [], [], []
     start, fine_start = 0, 0
@@ -145,6 +160,13 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int = 0
         slope_behind=slope_behind,
         uniform=_FADED * _longest_period(front.top),
     )
+
+
+def _resolution(cells: int, coarse: bool) -> int:
+    """Return the nodes a yarn spacing, an even number: the more different cells, the more borders average out."""
+    if coarse:
+        return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
+    return max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / cells))))
 
 
 def different_cells(field: HeightField) -> int:
@@ -197,6 +219,12 @@ def _pieces(
     def straight(low: float, high: float) -> tuple[float, ...]:
         return tuple(np.linspace(low, high, max(2, math.ceil(nodes * (high - low))) + 1).tolist())
 
+    def beneath_another(low: float, high: float) -> tuple[float, ...]:
+        # The back of the cloth is a yarn across, which turns away from steep light close to its sides only.
+        places = straight(low, high)
+        step = _SIDE * (places[1] - low)
+        return (low, low + step, *places[1:-1], high - step, high)
+
     def oriented(
         family: int, across: tuple[float, ...], along: tuple[float, ...]
     ) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
@@ -204,9 +232,10 @@ def _pieces(
 
     # Nodes end where the crossing yarn does: from there on the other side of the cloth is another one.
     margin, gap = (max(0.0, 0.5 - float(field.yarn[family, RADIUS])) for family in (top, 1 - top))
-    along = straight(0.0, 1.0)
     if gap > 1e-9:
-        along = straight(0.0, gap)[:-1] + straight(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
+        along = straight(0.0, gap)[:-1] + beneath_another(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
+    else:
+        along = beneath_another(0.0, 1.0)
     found = [oriented(top, around[top], along)]
     if margin > 1e-9:
         beneath = 1 - top

@@ -34,7 +34,7 @@ def _narrow(name, width):
 )
 def test_translations_leave_one_cell_of_each_orbit(name, cells):
     model = model_of(load_fabric(name), TruthOptions())
-    table = tabulate(model.front, model.back, False, 8, 4)
+    table = tabulate(model.front, model.back, False, nodes=8, azimuths=4)
     assert len(table.pieces) == cells
     assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
     copies = {tuple(cell) for piece in table.copies for cell in piece.tolist()}
@@ -43,7 +43,7 @@ def test_translations_leave_one_cell_of_each_orbit(name, cells):
 
 def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
     model = model_of(_narrow("polyester_lining", 0.7), TruthOptions())
-    table = tabulate(model.front, model.back, False, 16, 4)
+    table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
     areas = dict.fromkeys(range(3), 0.0)
     for number, piece in enumerate(table.pieces):
         stop = table.pieces[number + 1, 0] if number + 1 < len(table.pieces) else table.evenly.size
