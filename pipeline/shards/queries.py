@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from pipeline.truth.query import Queries
+from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 
 _DRAWS = 8  # numbers reserved for each row; Philox yields four a step
+_SHAPES = 1 << 64  # added to the key: the stream of what makes a query other than round, flat, and lit from the front
 
 
 class QueryOptions(BaseModel):
@@ -30,12 +31,29 @@ class QueryOptions(BaseModel):
     max_angle: float = Field(default=89.0, gt=0, le=89.9)
     """Largest angle of either direction to the macro normal, in degrees."""
 
+    behind: float = Field(default=0.0, ge=0, le=1)
+    """Share of the queries with the light on the other side of the cloth: they ask for its transmission."""
+    stretch: float = Field(default=1.0, ge=1, le=1024)
+    """Largest ratio of a footprint's axes; drawn log-uniformly from 1, the longer axis in any direction. The drawn
+    standard deviation is then the root of the product of both."""
+    curvature: tuple[float, float] = (0.0, 0.0)
+    """Range of the curvature, in 1/yarn spacings; drawn log-uniformly. [0, 0]: flat cloth."""
+
     @model_validator(mode="after")
-    def _sigma_is_a_range(self) -> QueryOptions:
+    def _ranges(self) -> QueryOptions:
         low, high = self.sigma
         if not 0 < low <= high:
             raise ValueError(f"sigma must be [low, high] with 0 < low <= high, got [{low}, {high}]")
+        low, high = self.curvature
+        if (low, high) != (0.0, 0.0) and not 0 < low <= high <= STEEPEST_CURVATURE:
+            allowed = f"[0, 0] or [low, high] with 0 < low <= high <= {STEEPEST_CURVATURE:g}"
+            raise ValueError(f"curvature must be {allowed}, got [{low}, {high}]")
         return self
+
+    @property
+    def plain(self) -> bool:
+        """Whether all footprints are round, the cloth is flat, and the light is on the viewer's side."""
+        return self.behind == 0.0 and self.stretch == 1.0 and self.curvature == (0.0, 0.0)
 
 
 def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, start: int, count: int) -> Queries:
@@ -55,12 +73,32 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
     generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
     draws = generator.random((count, _DRAWS))
     low, high = (math.log(bound) for bound in options.sigma)
-    return Queries.round(
+    queries = Queries.round(
         u=(draws[:, 0] * repeat[0]).astype(np.float32),
         v=(draws[:, 1] * repeat[1]).astype(np.float32),
         sigma=np.exp(low + (high - low) * draws[:, 2]).astype(np.float32),
         wi=_directions(options, draws[:, 3], draws[:, 4]),
         wo=_directions(options, draws[:, 5], draws[:, 6]),
+    )
+    return queries if options.plain else _shaped(options, queries, seed, start)
+
+
+def _shaped(options: QueryOptions, queries: Queries, seed: int, start: int) -> Queries:
+    """Return queries with the light behind some of them, their footprints stretched and the cloth curved."""
+    generator = np.random.Generator(np.random.Philox(key=seed + _SHAPES).advance(start))
+    draws = generator.random((len(queries.u), 4))
+    side = np.where(draws[:, 0] < options.behind, -1.0, 1.0).astype(np.float32)
+    half = np.exp(0.5 * math.log(options.stretch) * draws[:, 1])
+    curvature = np.zeros(len(draws))
+    if options.curvature[1] > 0:
+        low, high = (math.log(bound) for bound in options.curvature)
+        curvature = np.clip(np.exp(low + (high - low) * draws[:, 3]), *options.curvature)
+    return queries._replace(
+        wi=queries.wi * np.stack([np.ones_like(side), np.ones_like(side), side], axis=-1),
+        sigma=(queries.sigma * half).astype(np.float32),
+        sigma_minor=(queries.sigma / half).astype(np.float32),
+        angle=(math.pi * draws[:, 2] if options.stretch > 1.0 else np.zeros(len(draws))).astype(np.float32),
+        curvature=curvature.astype(np.float32),
     )
 
 

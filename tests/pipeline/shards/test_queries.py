@@ -12,15 +12,32 @@ from scipy import stats
 from pipeline.shards.queries import QueryOptions, draw_queries
 
 LEVEL = 1e-4
+SHAPED = QueryOptions(behind=0.3, stretch=8.0, curvature=(0.01, 0.5))
 
 
 @settings(max_examples=40, deadline=None)
 @given(start=st.integers(0, 10**9), count=st.integers(1, 50), seed=st.integers(0, 2**64 - 1))
 def test_a_row_does_not_depend_on_its_neighbours(start, count, seed):
-    together = draw_queries(QueryOptions(), (4, 3), seed, start, count)
-    alone = draw_queries(QueryOptions(), (4, 3), seed, start + count - 1, 1)
-    for whole, row in zip(together, alone, strict=True):
-        np.testing.assert_array_equal(whole[-1], row[0])
+    for options in (QueryOptions(), SHAPED):
+        together = draw_queries(options, (4, 3), seed, start, count)
+        alone = draw_queries(options, (4, 3), seed, start + count - 1, 1)
+        for whole, row in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(whole[-1], row[0])
+
+
+def test_shapes_are_drawn_as_stated_and_leave_the_rest_as_it_was():
+    """Kolmogorov-Smirnov for stretch, angle and curvature, a binomial test for the side; Sidak over four at LEVEL."""
+    queries, plain = (draw_queries(options, (4, 3), 5, 0, 40_000) for options in (SHAPED, QueryOptions()))
+    np.testing.assert_array_equal(np.abs(queries.wi), np.abs(plain.wi))
+    np.testing.assert_allclose(np.sqrt(queries.sigma * queries.sigma_minor), plain.sigma, rtol=1e-6)
+    uniforms = [
+        np.log(queries.sigma / queries.sigma_minor) / math.log(8.0),
+        queries.angle / math.pi,
+        np.log(queries.curvature / 0.01) / math.log(50.0),
+    ]
+    values = [stats.kstest(values, "uniform").pvalue for values in uniforms]
+    values.append(stats.binomtest(int((queries.wi[:, 2] < 0).sum()), 40_000, 0.3).pvalue)
+    assert min(values) > 1 - (1 - LEVEL) ** (1 / len(values)), values
 
 
 @pytest.mark.parametrize("directions", ["projected_disc", "hemisphere"])
@@ -41,7 +58,8 @@ def test_distributions(directions):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"sigma": (0, 1)}, {"sigma": (2, 1)}, {"max_angle": 90}, {"directions": "up"}, {"x": 1}]
+    "bad",
+    [{"sigma": (0, 1)}, {"sigma": (2, 1)}, {"max_angle": 90}, {"directions": "up"}, {"x": 1}, {"curvature": (0, 0.1)}],
 )
 def test_impossible_options_are_refused(bad):
     with pytest.raises(ValidationError):
