@@ -2,5 +2,5 @@
 
 from typing import Final
 
-VERSION: Final = 2
+VERSION: Final = 3
 """Raised by hand when any number of a shard changes (truth, sequences, queries); part of every shard's identity."""

@@ -10,7 +10,7 @@ Components
     `S_warp, S_weft` (specular) and `C_warp, C_weft` (diffuse), each with unit colour, all over one denominator:
     f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft.
 Gaps and transmission
-    Where no yarn covers the fabric plane is a gap, at z = 0; its area counts in the denominator and it returns nothing.
+    Where no yarn covers the fabric plane is a gap, at z = 0; what is seen through it counts in the denominator only.
     `transparency` is the share of light from straight behind (-wo) that reaches the viewer unscattered: through gaps,
     and through yarns as exp(-T Lambda). wi and wo on different sides ask for transmission: specular components then
     take k_s, diffuse ones the colour k_dt. A viewer behind the cloth sees `Fabric.back()`, reflected in the plane.

@@ -5,6 +5,7 @@ Every test returns records of what was measured, what it should be and whether i
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from itertools import product
@@ -181,8 +182,8 @@ def projected_area(fabric: Fabric) -> list[Invariant]:
     """
     rng = np.random.default_rng(_SEED + 5)
     found = []
-    for theta in (0.0, 30.0, 60.0, 80.0):
-        wo = _turned(np.full(REPLICATES, theta), np.full(REPLICATES, 0.7))
+    for theta, turn in ((0.0, 0.0), *itertools.product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
+        wo = _turned(np.full(REPLICATES, theta), np.full(REPLICATES, turn))
         queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _repeat_sigma(fabric), rng)
         projected, visible = (
             estimate(fabric, queries, _fixed(16_384, normaliser=normaliser), 5)
@@ -192,7 +193,7 @@ def projected_area(fabric: Fabric) -> list[Invariant]:
         )
         share = projected / visible
         spread = share.std(ddof=1) / math.sqrt(REPLICATES)
-        name = f"visible area / cos: {theta:.0f}°"
+        name = f"visible area / cos: {theta:.0f}°" + (f", azimuth {turn:g}" if theta else "")
         found.append(worst(name, share.mean(), 1.0, spread if spread > ROUNDING else 0.0, REPLICATES - 1, "<="))
     return found
 

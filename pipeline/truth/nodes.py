@@ -109,22 +109,24 @@ def sum_rows(
                 continue
             counts[row] += count
             yarn = front.yarn[min(family, 1)]
+            # What passes a gap must clear both sides of the cloth on its straight way: it is lit by its own ray.
+            gap = family == GAP
             a, c = weigh(
                 table.normal[0, start:stop],
                 table.normal[1, start:stop],
                 table.normal[2, start:stop],
                 table.normal[3, start:stop],
                 share,
-                ix,
-                iy,
-                iz,
+                -ox if gap else ix,
+                -oy if gap else iy,
+                oz if gap else iz,
                 ox,
                 oy,
                 oz,
-                slope_i,
-                horizon_i[i0, start:stop],
-                horizon_i[i1, start:stop],
-                ti,
+                slope_o if gap else slope_i,
+                table.slope_behind[b0, start:stop] if gap else horizon_i[i0, start:stop],
+                table.slope_behind[b1, start:stop] if gap else horizon_i[i1, start:stop],
+                tb if gap else ti,
                 slope_o,
                 table.slope[o0, start:stop],
                 table.slope[o1, start:stop],
@@ -136,38 +138,12 @@ def sum_rows(
                 margins[start:stop],
                 lit_margins[start:stop],
             )
-            area += a
             speculars[start:stop] = _0
-            if family == GAP:
-                # What passes a gap must clear both sides of the cloth on its straight way.
-                _, through = weigh(
-                    table.normal[0, start:stop],
-                    table.normal[1, start:stop],
-                    table.normal[2, start:stop],
-                    table.normal[3, start:stop],
-                    share,
-                    -ox,
-                    -oy,
-                    oz,
-                    ox,
-                    oy,
-                    oz,
-                    slope_o,
-                    table.slope_behind[b0, start:stop],
-                    table.slope_behind[b1, start:stop],
-                    tb,
-                    slope_o,
-                    table.slope[o0, start:stop],
-                    table.slope[o1, start:stop],
-                    to,
-                    _0,
-                    lit[start:stop],
-                    areas[start:stop],
-                    diffuses[start:stop],
-                    margins[start:stop],
-                    lit_margins[start:stop],
-                )
-                sums[4] += through / wo[2]
+            if gap:
+                areas[start:stop] = oz * lit[start:stop]
+                margins[start:stop] = lit_margins[start:stop]
+                a = c / oz
+                sums[4] += a
             else:
                 square = np.float32(yarn[ALPHA] ** 2)
                 f0 = piece[FINE_START]
@@ -186,7 +162,8 @@ def sum_rows(
                     thickness,
                     areas[start:stop],
                 )
-            if family != GAP and c > 0.0:
+            area += a
+            if not gap and c > 0.0:
                 sums[2 + family] += c / math.pi
                 counts[row] += count * (piece[FINE] - 1)
                 scale = np.float32(yarn[ALPHA] ** 3 / (4.0 * math.pi * piece[FINE]))
@@ -237,7 +214,7 @@ def sum_rows(
             c1, s1, c2, s2 = borders(diffuses[start:stop], speculars[start:stop], lit_margins[start:stop], across)
             moved_area += a1
             area_error += a2
-            if family != GAP:
+            if not gap:
                 moved[family] += s1
                 moved[2 + family] += c1 / math.pi
                 squares[family] += s2

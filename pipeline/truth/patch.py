@@ -101,10 +101,12 @@ def point_share(
     light, viewer = query.light, query.viewer
     family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y), choices.linear)
     if family == GAP:
-        if choices.shadows and not visible(front, x, y, 0.0, UNDER, viewer):
+        # A ray that enters a gap and ends on a yarn further down counts there, not here.
+        if choices.shadows and not (
+            visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, query.viewer_behind)
+        ):
             return family, 0.0, 0.0, 0.0, 0.0
-        hidden = choices.shadows and not visible(back, x, y, 0.0, UNDER, query.viewer_behind)
-        return family, viewer.z, 0.0, 0.0, 0.0 if hidden else viewer.z
+        return family, viewer.z, 0.0, 0.0, viewer.z
 
     # What the viewer sees of the point.
     cos_o = viewer.x * nx + viewer.y * ny + viewer.z * nz

@@ -27,7 +27,7 @@ from pipeline.truth.heightfield import (
 )
 from pipeline.truth.kernel import kernel
 
-_STRIP_POINTS = 8
+_STRIP_POINTS = 16
 _MAX_CELLS = 100_000  # a ray this long is as good as parallel to the cloth
 _NARROWINGS = 40
 
