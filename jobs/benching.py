@@ -5,16 +5,19 @@ They write their Records beside those of the recipes, so that the next page show
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
-from weaves.errors import WorkFailed
+from pipeline.fingerprint import file_sha256
+from weaves.errors import BadInput, WorkFailed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from reports.stability import Finding
+
+Measurement = TypeVar("Measurement")
 
 STABILITY: Final = "records/stability.json"
 """File of the Records of `bench stability`, under the folder of all products."""
@@ -24,6 +27,27 @@ TRUTH: Final = "records/truth.json"
 
 RECORDS: Final = (STABILITY, TRUTH)
 """Files of Records that any page shows, if they exist."""
+
+
+def measured_alone(out: Path) -> dict[str, str]:
+    """Return the files of `RECORDS` that exist, each with its hash: a page is made of them."""
+    return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
+
+
+def bench_alone(name: str, out: Path, scheduler: str = "", workers: int = 0) -> None:
+    """Do one of `BENCHES`.
+
+    Raises
+    ------
+    BadInput
+        If a scheduler or workers are given.
+    WorkFailed
+        If what is measured does not hold.
+    """
+    for option, value in (("--scheduler", scheduler), ("--workers", workers)):
+        if value:
+            raise BadInput(f"bench {name}", option, value, "leave it out: this process on this machine is measured")
+    BENCHES[name](out)
 
 
 def stability(out: Path) -> None:
@@ -55,28 +79,51 @@ def stability(out: Path) -> None:
 
 
 def truth(out: Path) -> None:
-    """Measure points and queries a second, print each as it comes, and write the Records."""
+    """Measure speed, accuracy, bias and where the time goes; print the tables and write the Records."""
     from rich.console import Console
-    from rich.table import Table
 
+    from reports import accuracy, bias, cells, effort, throughput
     from reports.record import this_machine, write_records
-    from reports.throughput import measure, to_records
 
     console = Console()
-    rates = []
-    with console.status("speed of the truth") as status:
-        for rate in measure():
-            rates.append(rate)
-            status.update(f"speed of the truth: {rate.what} {rate.fabric}")
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for name in ("what", "fabric", "rate", "unit", "note"):
-        table.add_column(name, justify="right" if name == "rate" else "left")
-    for rate in rates:
-        table.add_row(rate.what, rate.fabric, f"{rate.value:,.3g}", rate.unit, rate.note)
-    console.print(table)
+    with console.status("the truth") as status:
+
+        def all_of(about: str, found: Iterable[Measurement]) -> list[Measurement]:
+            result = []
+            status.update(f"the truth: {about}")
+            for one in found:
+                result.append(one)
+                status.update(f"the truth: {about}, {len(result)} numbers")
+            return result
+
+        rates = all_of("speed", throughput.measure())
+        accuracies = all_of("accuracy", accuracy.measure())
+        biases = all_of("bias", bias.measure())
+        efforts = all_of("where the time goes", effort.measure())
+    records = throughput.to_records(rates) + accuracy.to_records(accuracies)
+    records += bias.to_records(biases) + effort.to_records(efforts)
     path = out / TRUTH
-    write_records(path, to_records(rates), this_machine(1))
-    console.print(f"\n{path}: {len(rates)} rates", soft_wrap=True, highlight=False)
+    write_records(path, records, this_machine(1))
+    console.print(_columns(("what", "fabric", "rate", "note"), cells.rate_rows(records)))
+    for fabric, rows in cells.accuracy_rows(accuracies).items():
+        console.print(_columns((fabric, *cells.ACCURACY), rows))
+    console.print(_columns(("fabric", *cells.BIAS), cells.bias_rows(biases)))
+    console.print(_columns(("fabric", *cells.EFFORT), cells.effort_rows(efforts)))
+    console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
+    """Show rows of cells, each table after an empty line."""
+    from rich.padding import Padding
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    for name in names:
+        text = name == names[0] or name in ("fabric", "rate", "note", "light", "how")
+        table.add_column(name, justify="left" if text else "right")
+    for row in rows:
+        table.add_row(*row)
+    return Padding(table, (1, 0, 0, 0))
 
 
 def _table(findings: Sequence[Finding]) -> RenderableType:

@@ -127,6 +127,7 @@ def evaluate(
     frame: Annotated[str | None, Parameter(help="Cosines inside the yarns: ply or macro.")] = None,
     normaliser: Annotated[str | None, Parameter(help="Denominator: visible or projected.")] = None,
     seed: Annotated[int, Parameter(help="Name of the random numbers.")] = 0,
+    workers: Annotated[int, Parameter(help="Threads that answer; 0: one a core.")] = 0,
     skip_bad: Annotated[bool, Parameter(help="List rows without an answer, instead of stopping at them.")] = False,
 ) -> None:
     """Answer any list of questions about a fabric: the file's rows with their answers."""
@@ -143,7 +144,7 @@ def evaluate(
         frame=frame,
         normaliser=normaliser,
     )
-    answer(load_fabric(fabric), queries, out, options, seed, skip_bad)
+    answer(load_fabric(fabric), queries, out, options, seed, workers, skip_bad)
 
 
 @app.command(sort_key=6)
@@ -175,18 +176,21 @@ def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", work
 @app.command(sort_key=8)
 def bench(
     recipe: Annotated[
-        str, Parameter(help="Recipe; or `stability`: rounding at the extremes; or `truth`: how fast it is.")
+        str,
+        Parameter(
+            help="Recipe; or `stability`: rounding at the extremes; or `truth`: how fast and how accurate it is."
+        ),
     ],
     *,
     out: Out = OUT,
     scheduler: Scheduler = "",
     workers: Workers = 0,
 ) -> None:
-    """Measure error, aliasing and time of every method, or how stable and how fast the truth itself is."""
-    from jobs.benching import BENCHES
+    """Measure error, aliasing and time of every method, or how stable, fast and accurate the truth itself is."""
+    from jobs.benching import BENCHES, bench_alone
 
     if recipe in BENCHES:
-        BENCHES[recipe](out)
+        bench_alone(recipe, out, scheduler, workers)
         return
     from jobs.work import work
 
@@ -215,12 +219,13 @@ def status(recipe: RecipeName, *, out: Out = OUT) -> None:
     """Show what is done, what failed and why, and what is missing."""
     from rich.console import Console
 
+    from jobs.benching import measured_alone
     from jobs.ledger import Ledger
     from jobs.plan import plan as tasks_of
     from jobs.recipe import load_recipe
     from jobs.tables import status_table
 
-    Console().print(status_table(tasks_of(load_recipe(recipe)), Ledger(out)))
+    Console().print(status_table(tasks_of(load_recipe(recipe), measured_alone(out)), Ledger(out)))
 
 
 def main(tokens: Sequence[str] | None = None) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from rich.console import Console
@@ -38,14 +39,18 @@ def truth_options(**chosen: object) -> TruthOptions:
         raise BadInput(WHERE, f"--{error.key.replace('_', '-')}", error.value, error.allowed) from error
 
 
-def evaluate(fabric: Fabric, queries: Path, out: Path, options: TruthOptions, seed: int, skip_bad: bool) -> None:
-    """Answer the questions of a file and tell in a few lines what was done.
+def evaluate(
+    fabric: Fabric, queries: Path, out: Path, options: TruthOptions, seed: int, workers: int, skip_bad: bool
+) -> None:
+    """Answer the questions of a file on some threads, 0: one a core, and tell in a few lines what was done.
 
     Raises
     ------
     BadInput
-        As `pipeline.shards.evaluate.evaluate_file`, and if the seed cannot be used.
+        As `pipeline.shards.evaluate.evaluate_file`, and if the seed or the number of threads cannot be used.
     """
+    if workers < 0:
+        raise BadInput(WHERE, "--workers", workers, "must be 0, for one a core, or more")
     if not 0 <= seed < 2**64:
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
     console = Console(stderr=True)
@@ -54,7 +59,14 @@ def evaluate(fabric: Fabric, queries: Path, out: Path, options: TruthOptions, se
         bar = bars.add_task("evaluating", total=1.0)
         try:
             summary = evaluate_file(
-                fabric, queries, out, options, seed, skip_bad, progress=lambda share: bars.update(bar, completed=share)
+                fabric,
+                queries,
+                out,
+                options,
+                seed,
+                skip_bad,
+                threads=workers or os.cpu_count() or 1,
+                progress=lambda share: bars.update(bar, completed=share),
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None

@@ -9,20 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from jobs.dataset import SECONDS_A_POINT, Shard, fingerprint_of, folder_of, points_a_row
 from jobs.recipe import ModelRecipe, Recipe
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
-from pipeline.models.options import VERSIONS, PointSampledOptions
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import Fabric
 
-SECONDS_A_PREDICTION: Final = {"woven": 3e-6, "neumip": 1.5e-6}
-"""One query answered by a trained model, on one core of a server of 2021."""
 _TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
 
 
@@ -138,18 +135,14 @@ def _method_task(
     """Return the measurements of a method on a fabric: errors, pictures, aliasing."""
     options, bench, name = model.options, recipe.bench, subject.fabric.name
     spec = {
-        "measure": VERSIONS[options.model],
+        "measure": options.version,
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in trainings],
         **_asked(recipe, subject, parts),
     }
     stem = f"{options.name}-{name}-{identity('bench', spec)[:8]}"
-    shown = [""]
-    points = 0
-    if isinstance(options, PointSampledOptions):
-        # All counts are measured; pictures are made of those that the recipe wants to see.
-        shown = [f"k = {count}" for count in options.counts if count in bench.picture_counts]
-        points = sum(options.counts)
+    # All knobs are measured; pictures are made of those that the recipe wants to see.
+    shown = [f"k = {knob}" for knob in options.knobs if knob in bench.picture_counts] if options.knobs else [""]
     pictures = {
         setting: {
             scene: "records/" + "-".join(filter(None, (stem, setting.replace(" = ", ""), scene))) + ".exr"
@@ -166,7 +159,7 @@ def _method_task(
         spec,
         (*_records(stem), *(path for scenes in pictures.values() for path in scenes.values())),
         (*subject.needs, *(training.id for training in trainings)),
-        cost=1.0 + queries * SECONDS_A_PREDICTION.get(options.model, points * SECONDS_A_POINT),
+        cost=1.0 + queries * options.seconds[1] * (sum(options.knobs) or 1),
         size=len(shown) * pixels * 10,
         setting={
             "make": "method",
@@ -190,7 +183,7 @@ def _timing_task(
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
         "options": bench.model_dump(mode="json", include={"rows", *_TIMED}),
-        "models": [[VERSIONS[model.options.model], model.options.model_dump(mode="json")] for model in recipe.models],
+        "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
         "trainings": [task.id for task in trainings],
     }
     return Task(

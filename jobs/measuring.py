@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from jobs.benching import RECORDS
 from jobs.task import Task
 from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
@@ -76,9 +75,8 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
 def page(task: Task, out: Path, progress: Progress) -> None:
     """Write the page of a recipe."""
     setting = task.setting
-    # What was measured without a recipe is shown if it is there; no page waits for it.
-    alone = [path for path in RECORDS if (out / path).is_file()]
-    records = read_records(out / path for path in (*setting["records"], *alone))
+    # What was measured without a recipe is shown if it was there when the page was planned; no page waits for it.
+    records = read_records(out / path for path in (*setting["records"], *task.spec["alone"]))
     # What is measured is the same whoever asks; whose page this is enters here.
     asked = {"recipe": task.spec["recipe"], "recipe_fingerprint": task.id}
     records = [

@@ -1,34 +1,40 @@
 """Plan: a recipe as the list of its tasks; pure, and made without any of the libraries that do the work.
 
 Every task is listed after those it needs. What enters an identity is written out here: shards by their fabric's optics,
-models by their options and the shards they read, benchmarks by the models, the shards and the fabrics with colours.
+models by their options and the shards they read, benchmarks by the models, the shards and the fabrics with colours, the
+page by the benchmarks and by what was measured without a recipe.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from types import MappingProxyType
+from typing import Any
 
 from jobs.dataset import Shard, fingerprint_of, folder_of, shards
 from jobs.measurements import bench_tasks
 from jobs.recipe import ModelRecipe, Recipe
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
-from pipeline.models.options import VERSIONS, PointSampledOptions
 from pipeline.training.options import VERSION as TRAINING_VERSION
 from reports.options import VERSION as BENCH_VERSION
 
-SECONDS_A_QUERY: Final = {"woven": 2e-5, "neumip": 1.2e-5}
-"""Forward and backward pass of one query in the small batches of `quick`, on one core of a server of 2022."""
 
+def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> list[Task]:
+    """Return the tasks of a recipe.
 
-def plan(recipe: Recipe) -> list[Task]:
-    """Return the tasks of a recipe."""
+    Parameters
+    ----------
+    recipe : Recipe
+        What is asked for.
+    alone : mapping
+        Files of Records that no task writes and the page shows, each with its hash.
+    """
     parts = shards(recipe)
     trained = {model.options.name: train_tasks(recipe, model, parts) for model in recipe.models if model.learns}
     trainings = [task for tasks in trained.values() for task in tasks.values()]
     benches = list(bench_tasks(recipe, parts, trained))
-    return [*(part.task for part in parts), *trainings, *benches, _report_task(recipe, parts, trained, benches)]
+    return [*(part.task for part in parts), *trainings, *benches, _report_task(recipe, parts, trained, benches, alone)]
 
 
 def train_tasks(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Task]:
@@ -41,7 +47,11 @@ def train_tasks(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> d
 
 
 def _report_task(
-    recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]], benches: Sequence[Task]
+    recipe: Recipe,
+    parts: Sequence[Shard],
+    trained: Mapping[str, Mapping[str, Task]],
+    benches: Sequence[Task],
+    alone: Mapping[str, str],
 ) -> Task:
     """Return the task that writes the page of all measurements."""
     pictures = []
@@ -63,6 +73,7 @@ def _report_task(
             "recipe": recipe.name,
             "about": recipe.about,
             "measured": [task.id for task in benches],
+            "alone": dict(alone),
             "fabrics": [[fabric.name, fabric.source] for fabric, _ in fabrics],
         },
         (f"report/{recipe.name}/index.html",),
@@ -89,7 +100,7 @@ def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
         first = next(iter(trainings.values()))
         what = "each fabric by itself" if model.of_one_material else f"{len(first.spec['fabrics'])} fabrics at once"
         about = f"{what}, {training.steps:,} steps of {training.batch:,} queries"
-        if not isinstance(options, PointSampledOptions) and options.departures:
+        if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
     return {
         "name": options.model,
@@ -105,7 +116,7 @@ def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Se
     read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split != "test"]
     needs = tuple(part.task.id for part in read)
     spec: dict[str, Any] = {
-        "versions": [VERSIONS[options.model], TRAINING_VERSION],
+        "versions": [options.version, TRAINING_VERSION],
         "options": options.model_dump(mode="json"),
         "training": training.model_dump(mode="json", exclude={"device", "checkpoint_every"}),
         "fabrics": fabrics,
@@ -120,7 +131,7 @@ def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Se
         spec,
         (f"{folder}/model.safetensors", f"{folder}/card.json"),
         needs,
-        cost=training.steps * training.batch * SECONDS_A_QUERY[options.model],
+        cost=training.steps * training.batch * options.seconds[0],
         size=500_000,
         setting={
             "dataset": folder_of(parts),

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
-from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions
+from pipeline.models.options import ModelOptions
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
@@ -83,12 +83,12 @@ class ModelRecipe(_Section):
     @property
     def of_one_material(self) -> bool:
         """Whether a trained model knows a single fabric."""
-        return isinstance(self.options, NeumipOptions)
+        return self.options.of_one_material
 
     @property
     def learns(self) -> bool:
         """Whether there is anything to train."""
-        return not isinstance(self.options, PointSampledOptions)
+        return self.options.learns
 
     @model_validator(mode="before")
     @classmethod
@@ -222,6 +222,7 @@ def _refuse_contradictions(recipe: Recipe, where: str) -> None:
             allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
             raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
     for index, model in enumerate(recipe.models):
-        if isinstance(model.options, PointSampledOptions) and model.options.footprint != truth.footprint:
+        footprint = getattr(model.options, "footprint", truth.footprint)
+        if footprint != truth.footprint:
             key = f"models.{index}.footprint"
-            raise BadInput(where, key, model.options.footprint, f"must be that of dataset.truth, {truth.footprint!r}")
+            raise BadInput(where, key, footprint, f"must be that of dataset.truth, {truth.footprint!r}")

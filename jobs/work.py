@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
+from jobs.benching import measured_alone
 from jobs.dataset import ManifestFile, shards
 from jobs.executor import execute
 from jobs.ledger import Ledger
@@ -30,7 +31,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
         If any task failed; the others were done nevertheless.
     """
     recipe = load_recipe(recipe_name)
-    tasks = plan(recipe)
+    tasks = plan(recipe, measured_alone(out))
     console = Console()
     ledger = Ledger(out)
     with ledger.held():

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
+from reports.accuracy import Accuracy
+from reports.bias import Bias
+from reports.effort import Effort
 from reports.record import TRUTH, Record
 from reports.stability import Finding
 from reports.style import display
@@ -20,6 +23,7 @@ from weaves.fabric import Fabric
 
 Row = dict[str, Any]
 NONE = "–"
+COMPONENT_TITLES: Final = ("S warp", "S weft", "C warp", "C weft")
 
 
 def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, list[Row]]:
@@ -146,6 +150,60 @@ def rate_rows(records: Sequence[Record]) -> list[list[str]]:
         [record.setting, record.fabric or NONE, f"{record.value:,.3g} {record.unit}", record.note]
         for record in records
         if record.metric == "rate"
+    ]
+
+
+ACCURACY: Final = ("RMSE", "error", "stated", "points", "queries a second", "× fewer than mc")
+"""Columns of `accuracy_rows` after the setting."""
+
+
+def accuracy_rows(found: Sequence[Accuracy]) -> dict[str, list[list[str]]]:
+    """Return the rows of the tables of accuracy by fabric: setting, then `ACCURACY`."""
+    result: dict[str, list[list[str]]] = {}
+    for row in found:
+        numbers = [percent(row.rmse, 2), percent(row.true_error, 2), percent(row.stated_error, 2)]
+        numbers += [f"{row.points:,.0f}", f"{row.rate:,.0f}", times(row.saved)]
+        result.setdefault(row.fabric, []).append([row.setting, *numbers])
+    return result
+
+
+BIAS: Final = ("light", *COMPONENT_TITLES)
+"""Columns of `bias_rows` after the fabric."""
+
+
+def bias_rows(found: Sequence[Bias]) -> list[list[str]]:
+    """Return the rows of the table of bias: fabric, then `BIAS`; a cell ends in ✓ if it is small, in ✗ if it is not."""
+    marks = {"below": " ✓", "above": " ✗", "open": ""}
+    lines: dict[tuple[str, str], dict[str, str]] = {}
+    for bias in found:
+        value = round(100 * bias.value, 2) + 0.0  # no zero is negative
+        text = f"{value:+.2f} ± {100 * bias.standard_error:.2f} %{marks[bias.verdict]}".replace("-", "−")
+        lines.setdefault((bias.fabric, bias.side), {})[bias.component] = text
+    return [
+        [plain(fabric), side.removeprefix("light "), *(cells.get(name, NONE) for name in COMPONENTS)]
+        for (fabric, side), cells in lines.items()
+    ]
+
+
+EFFORT: Final = ("how", "queries", "points", "µs a query", "time")
+"""Columns of `effort_rows` after the fabric."""
+
+
+def effort_rows(found: Sequence[Effort]) -> list[list[str]]:
+    """Return the rows of the table of where the time goes: fabric, then `EFFORT`; shares are of the fabric's."""
+    whole: dict[str, float] = {}
+    for row in found:
+        whole[row.fabric] = whole.get(row.fabric, 0.0) + row.share * row.seconds
+    return [
+        [
+            plain(row.fabric),
+            row.kind,
+            percent(row.share),
+            f"{row.points:,.0f}",
+            f"{1e6 * row.seconds:,.0f}",
+            percent(row.share * row.seconds / whole[row.fabric], 0) if whole[row.fabric] else NONE,
+        ]
+        for row in found
     ]
 
 

@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
 from pipeline.scenes.options import Scene
-from reports import cells, figures, summary, tiles
+from reports import accuracy, bias, cells, effort, figures, summary, tiles
 from reports.exr import read_exr
 from reports.options import BenchOptions
 from reports.record import TRUTH, Machine, Record, Role, to_table
@@ -108,6 +108,9 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     findings = from_records(page.records)
     if findings:
         tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
+    for name, measured in _of_the_truth(page.records).items():
+        if measured:
+            tables[name] = pd.DataFrame([asdict(one) for one in measured])
     for name, table in tables.items():
         write_table(folder / "tables" / name, table)
     progress(0.1)
@@ -129,6 +132,15 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
     buffer = io.BytesIO()
     table.to_parquet(buffer, index=False, compression="zstd")
     atomic_write(path.with_suffix(".parquet"), buffer.getvalue())
+
+
+def _of_the_truth(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
+    """Return what `bench truth` measured beside speeds, by the name of its table."""
+    return {
+        "truth_accuracy": accuracy.from_records(records),
+        "truth_bias": bias.from_records(records),
+        "truth_effort": effort.from_records(records),
+    }
 
 
 def _plots(tables: dict[str, pd.DataFrame], records: Sequence[Record]) -> Iterator[tuple[str, bytes]]:
@@ -178,6 +190,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         lstrip_blocks=True,
     )
     fabrics = [cells.fabric_card(fabric, role) for fabric, role in page.fabrics]
+    measured = _of_the_truth(page.records)
     shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
     return environment.get_template("page.html.j2").render(
         page=page,
@@ -189,6 +202,15 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         timing=cells.timing_rows(timing),
         stability=cells.stability_rows(findings),
         rates=cells.rate_rows(page.records),
+        accuracies=cells.accuracy_rows(measured["truth_accuracy"]),
+        reference=cells.percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
+        accuracy_count=max((row.count for row in measured["truth_accuracy"]), default=0),
+        biases=cells.bias_rows(measured["truth_bias"]),
+        efforts=cells.effort_rows(measured["truth_effort"]),
+        limit=cells.percent(bias.LIMIT),
+        asked=cells.percent(effort.RELATIVE_ERROR),
+        columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT},
+        titles={name: cells.plain(name) for name in cells.accuracy_rows(measured["truth_accuracy"])},
         strips=_strips(page, tables["pictures"]),
         fabrics=fabrics,
         shown=shown,

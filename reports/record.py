@@ -57,8 +57,20 @@ Metric = Literal[
     "negative",
     "naive_not_finite",
     "rate",
+    "true_rmse",
+    "true_error",
+    "stated_error",
+    "points",
+    "query_rate",
+    "points_saved",
+    "reference_error",
+    "bias",
+    "kind_share",
+    "kind_points",
+    "kind_time",
 ]
-"""Everything that is measured; defined in `reports.page`, the last seven in `reports.stability` and `throughput`."""
+"""Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
+`accuracy`, `bias` and `effort`."""
 
 
 class Provenance(BaseModel):
@@ -211,6 +223,16 @@ def read_machine(path: Path) -> Machine:
         return Machine.model_validate_json(beside.read_bytes())
     except (FileNotFoundError, ValidationError) as error:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
+
+
+def by_subject(records: Iterable[Record], metrics: Iterable[Metric]) -> dict[tuple[str, str], dict[Metric, Record]]:
+    """Group records by fabric and setting; subjects that lack one of the metrics are left out."""
+    wanted = list(metrics)
+    found: dict[tuple[str, str], dict[Metric, Record]] = {}
+    for record in records:
+        if record.metric in wanted:
+            found.setdefault((record.fabric, record.setting), {})[record.metric] = record
+    return {subject: numbers for subject, numbers in found.items() if len(numbers) == len(wanted)}
 
 
 def to_table(records: Iterable[Record]) -> pd.DataFrame:

@@ -1,8 +1,8 @@
 """Any list of questions answered: Parquet in, the same rows with their answers out, in bounded memory.
 
 Row i of the result is row i of the file, and its numbers depend on the seed and on i alone, not on how the file is cut
-into row groups or chunks. Rows that have no answer stop everything before anything is computed, or, if they are to be
-skipped, have null answers and are listed beside the result.
+into row groups or chunks, nor on how many threads answer these. Rows that have no answer stop everything before
+anything is computed, or, if they are to be skipped, have null answers and are listed beside the result.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ from __future__ import annotations
 import csv
 import json
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -43,7 +44,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 CHUNK: Final = 2048
-"""Rows between two signs of progress; no row depends on it."""
+"""Rows that a thread answers at a time, at most; no row depends on it."""
 
 _KEY = b"twillight"
 
@@ -58,7 +59,7 @@ class Summary:
     points : int
         Points evaluated.
     seconds : float
-        Time that the answers took.
+        Time that the answers took, on all threads together.
     """
 
     _EDGES = np.linspace(-8.0, 2.0, 5001)  # of log10: a median to 0.25 %
@@ -92,6 +93,7 @@ def evaluate_file(
     seed: int,
     skip_bad: bool = False,
     chunk: int = CHUNK,
+    threads: int = 1,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Summary:
     """Answer every row of a Parquet file; the result appears whole or not at all.
@@ -111,7 +113,9 @@ def evaluate_file(
     skip_bad : bool
         Leave the answers of bad rows null and list these in ``out`` with the suffix ``.bad.csv``.
     chunk : int
-        Rows answered at a time.
+        Rows that a thread answers at a time.
+    threads : int
+        Threads that answer; kernels run without the interpreter's lock.
     progress : callable
         Told the share done.
 
@@ -137,13 +141,14 @@ def evaluate_file(
             listing = csv.writer(stack.enter_context(path.open("w", encoding="utf-8", newline="")))
             listing.writerow(BadRow._fields)
         summary = Summary()
+        crew = _Crew(fabric, options, seed, stack.enter_context(_threads(threads)))
         for block in blocks(queries, file):
             questions, bad = questions_of(block, summary.rows, fabric.weave.repeat)
             if listing:
                 listing.writerows(bad)
             good = np.ones(len(questions.u), np.bool_)
             good[[row.row - summary.rows for row in bad]] = False
-            answers = _answers(fabric, questions, good, options, seed, summary, chunk, file.metadata.num_rows, progress)
+            answers = _answers(crew, questions, good, summary, chunk, file.metadata.num_rows, progress)
             writer.write_table(pa.table([*block.columns, *_arrays(answers, good)], schema=schema), ROW_GROUP)
         return summary
 
@@ -153,37 +158,68 @@ def bad_list(out: Path) -> Path:
     return out.with_suffix(".bad.csv")
 
 
+class _Crew:
+    """Threads that answer questions about one fabric."""
+
+    def __init__(self, fabric: Fabric, options: TruthOptions, seed: int, pool: Executor) -> None:
+        self.fabric, self.options, self.seed, self.pool = fabric, options, seed, pool
+        self._met: set[tuple[bool, bool]] = set()
+
+    def prepare(self, questions: Queries) -> None:
+        """Load kernels and tabulate each side of the fabric that is asked about, before threads would do so at once."""
+        sides = np.stack([questions.wi[:, 2] < 0, questions.wo[:, 2] < 0], axis=1)
+        for row in np.unique(sides, axis=0, return_index=True)[1].tolist():
+            key = bool(sides[row, 0]), bool(sides[row, 1])
+            if key not in self._met:
+                self._met.add(key)
+                # A wide footprint and a narrow one, for they may ask different tables.
+                wi, wo = (np.repeat(w[row : row + 1], 2, axis=0) for w in (questions.wi, questions.wo))
+                centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.1], np.float32)
+                estimate(self.fabric, Queries.round(centre, centre, widths, wi, wo), self.options, self.seed, 0)
+
+    def answers(self, runs: Iterable[tuple[Queries, int]]) -> Iterator[Answers]:
+        """Answer runs of questions, each with the place of its first row in the file; in their order."""
+        return self.pool.map(lambda run: estimate(self.fabric, run[0], self.options, self.seed, run[1]), runs)
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[Executor]:
+    """Hold a pool of threads; what is stopped early begins nothing more."""
+    pool = ThreadPoolExecutor(count)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
 def _answers(
-    fabric: Fabric,
+    crew: _Crew,
     questions: Queries,
     good: npt.NDArray[np.bool_],
-    options: TruthOptions,
-    seed: int,
     summary: Summary,
     chunk: int,
     total: int,
     progress: Callable[[float], None],
 ) -> Answers:
     """Answer the good rows of a block, in runs of neighbours that are no longer than a chunk."""
-    rows = len(good)
+    rows, first = len(good), summary.rows
     whole = Answers.opaque(np.zeros((rows, 4), np.float32), np.zeros((rows, 4), np.float32), np.zeros(rows, np.int32))
     cuts = {0, rows, *range(0, rows, chunk), *(np.flatnonzero(np.diff(good)) + 1).tolist()}
-    edges = sorted(cuts)
-    for start, stop in pairwise(edges):
+    edges = list(pairwise(sorted(cuts)))
+    # Kernels are loaded and the fabric is tabulated outside the clock.
+    crew.prepare(questions.take(good))
+    begun = time.perf_counter()
+    parts = crew.answers((questions.take(slice(start, stop)), first + start) for start, stop in edges if good[start])
+    for start, stop in edges:
         if good[start]:
-            run = questions.take(slice(start, stop))
-            if not summary.points:
-                # Kernels are loaded and the fabric is tabulated outside the clock.
-                estimate(fabric, run.take(slice(0, 1)), options, seed, summary.rows)
-            begun = time.perf_counter()
-            part = estimate(fabric, run, options, seed, summary.rows)
-            summary.seconds += time.perf_counter() - begun
+            part = next(parts)
             summary.add(part)
             for column, values in zip(whole, part, strict=True):
                 column[start:stop] = values
         summary.rows += stop - start
         summary.bad += 0 if good[start] else stop - start
         progress(summary.rows / total)
+    summary.seconds += time.perf_counter() - begun
     return whole
 
 

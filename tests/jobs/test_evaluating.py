@@ -50,8 +50,10 @@ def test_a_summary_tells_what_was_done(twillight, tmp_path):
     assert cells[:2] == [str(ROWS), str(ROWS)] and cells[2].endswith("%")
     assert float(cells[3].replace(",", "")) == pytest.approx(table["count"].to_numpy().mean(), rel=0.01)
     assert "deep/result.parquet" in text
-    # The same command writes the same bytes; another seed, estimator or footprint does not.
+    # The same command writes the same bytes on any number of threads; another seed, estimator or footprint does not.
     first = (tmp_path / "deep" / "result.parquet").read_bytes()
+    twillight("queries.parquet", "--out", "deep/one.parquet", "--relative-error", "0.1", "--workers", "1")
+    assert (tmp_path / "deep" / "one.parquet").read_bytes() == first
     for choice in ((), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
         twillight("queries.parquet", "--out", "deep/result.parquet", "--relative-error", "0.1", *choice)
         assert ((tmp_path / "deep" / "result.parquet").read_bytes() == first) == (not choice), choice
@@ -86,6 +88,7 @@ def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
         (["queries.parquet", "--max-count", "1000"], "must be a power of two"),
         (["queries.parquet", "--seed", "-1"], "--seed = -1: must be from 0"),
         (["queries.parquet", "--seed", "one"], "one"),
+        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be 0, for one a core, or more"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, tokens, said):

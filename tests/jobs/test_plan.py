@@ -153,6 +153,14 @@ def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):
     assert changed == set(touched)
 
 
+def test_what_was_measured_without_a_recipe_touches_the_page_alone(files, tasks):
+    after = plan(load_recipe(files.path), {"records/truth.json": "0" * 64})
+    changed = {task.id for task in after} ^ {task.id for task in tasks}
+    assert changed == {key for one in (tasks, after) for key in ids(one, "report")}
+    other = plan(load_recipe(files.path), {"records/truth.json": "1" * 64})
+    assert ids(other, "report") != ids(after, "report")
+
+
 def test_no_two_tasks_write_one_file(tasks):
     products = [path for task in tasks for path in task.products]
     assert len(set(products)) == len(products)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from reports import accuracy, bias, effort
 from reports.exr import write_exr
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
@@ -172,3 +173,34 @@ def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path)
     assert len(pd.read_csv(tmp_path / "tables" / "stability.csv")) == 2
     # Nothing else on the page takes the two arithmetics for methods.
     assert page.words.count("float32") == 1
+
+
+def test_what_accuracy_costs_is_shown_where_it_was_measured(written, page_input, tmp_path):
+    assert "accuracy" not in written[1].ids
+    accuracies = [
+        accuracy.Accuracy(f"{name} points", fabric, 0.05, error, 0.03, 64.0, 5000.0, saved, 0.0007, 150)
+        for fabric in ("denim", "twill_4_4")
+        for name, error, saved in (("mc, 64", 0.08, 1.0), ("owen, 64", 0.04, 4.2))
+    ]
+    biases = [
+        bias.Bias("denim", side, component, value, 0.0005, 900)
+        for side in bias.SIDES
+        for component, value in (("specular_warp", -0.001), ("diffuse_weft", 0.006), ("diffuse_warp", 0.0025))
+    ]
+    efforts = [
+        effort.Effort("table alone", "denim", 0.75, 4000.0, 2e-5, 900),
+        effort.Effort("sampled", "denim", 0.25, 9000.0, 2e-3, 900),
+    ]
+    records = [*page_input.records, *accuracy.to_records(accuracies), *bias.to_records(biases)]
+    more = PageInput(**{**page_input.__dict__, "records": [*records, *effort.to_records(efforts)]})
+    page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
+    assert "accuracy" in page.ids and "#accuracy" in page.targets
+    assert "150 queries a fabric" in page.words and "state 0.07 % themselves" in page.words
+    words = page.words.replace(" ", "")
+    assert "owen,64points5.00%4.00%3.00%645,0004.2×" in words
+    assert "deniminfront−0.10±0.05%✓–+0.25±0.05%+0.60±0.05%✗" in words
+    assert "denimtablealone75.0%4,000203%" in words and "denimsampled25.0%9,0002,00097%" in words
+    assert len(pd.read_csv(tmp_path / "tables" / "truth_accuracy.csv")) == 4
+    assert all((tmp_path / link).is_file() for link in page.files)
+    # Nothing else on the page takes them for rates or for methods.
+    assert "rates" not in page.ids and page.words.count("owen, 64 points") == 2
