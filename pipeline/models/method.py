@@ -60,8 +60,12 @@ class Batch(NamedTuple):
         Footprint, in yarn spacings.
     wi, wo : float32 (F, n, 3)
         Directions.
+    sigma_minor, angle, curvature : float32 (F, n)
+        The rest of the query, as in `Queries`.
     target : float32 (F, n, 4)
         Components.
+    transparency : float32 (F, n)
+        Share of light from straight behind that passes unscattered.
     """
 
     fabric: Tensor
@@ -70,7 +74,11 @@ class Batch(NamedTuple):
     sigma: Tensor
     wi: Tensor
     wo: Tensor
+    sigma_minor: Tensor
+    angle: Tensor
+    curvature: Tensor
     target: Tensor
+    transparency: Tensor
 
 
 class Network(Protocol):

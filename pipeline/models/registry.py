@@ -19,23 +19,20 @@ from safetensors import SafetensorError
 from torch import Tensor
 
 from pipeline.models.method import Method
-from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.models.options import CLASSES, ModelOptions
 from weaves.errors import BadInput, nearest
 
-MODELS = ("woven", "neumip", "point_sampled")
 WEIGHTS, CARD = "model.safetensors", "card.json"
 
 
 def module_of(model: str) -> ModuleType:
     """Import the file of a model; BadInput, with the nearest name, if there is none."""
-    if model not in MODELS:
-        raise BadInput("models", "model", model, nearest(model, MODELS))
+    if model not in CLASSES:
+        raise BadInput("models", "model", model, nearest(model, CLASSES))
     return import_module(f"pipeline.models.{model}")
 
 
-def load_methods(
-    options: WovenOptions | NeumipOptions | PointSampledOptions, folders: Sequence[Path] = ()
-) -> list[Method]:
+def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:
     """Return the methods that options describe.
 
     Parameters

@@ -36,6 +36,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import Domain, domain_of
 from pipeline.models.encodings import encoded_size, one_blob, periodic_blob
 from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, in_chunks, in_repeat
@@ -336,12 +337,14 @@ class Woven:
     ----------
     network : WovenNetwork
         Trained weights.
+    domain : Domain, optional
+        What it was taught; anything if left out.
     device : torch.device
         Where it computes.
     """
 
-    def __init__(self, network: WovenNetwork, device: torch.device | None = None) -> None:
-        self.name, self.setting = network.options.name, ""
+    def __init__(self, network: WovenNetwork, domain: Domain | None = None, device: torch.device | None = None) -> None:
+        self.name, self.setting, self.domain = network.options.name, "", domain
         self._device = device or torch.device("cpu")
         self._network = network.eval().to(self._device)
         self._encoded: dict[str, tuple[Tensor, Placement]] = {}
@@ -355,7 +358,9 @@ class Woven:
         self._encode(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
         network = self._network
         latent, place = self._encode(fabric)
 
@@ -387,8 +392,8 @@ def build(options: WovenOptions, fabrics: Sequence[Fabric]) -> WovenNetwork:
 def restore(options: WovenOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Woven]:
     """Return the method that a trained network is."""
     methods = []
-    for _, weights in trained:
+    for card, weights in trained:
         network = WovenNetwork(options)
         network.load_state_dict(weights)
-        methods.append(Woven(network))
+        methods.append(Woven(network, domain_of(card)))
     return methods

@@ -23,8 +23,11 @@ from pipeline.models.method import Batch
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.query import Answers, Queries
 
-COLUMNS = 13
-"""u, v, sigma, wi (3), wo (3), components (4)."""
+COLUMNS = 17
+"""u, v, sigma, wi (3), wo (3), sigma_minor, angle, curvature, components (4), transparency."""
+
+TARGET = slice(12, 16)
+"""The columns of the components."""
 
 _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
@@ -72,8 +75,8 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
 
 def as_table(queries: Queries, answers: Answers) -> npt.NDArray[np.float32]:
     """Return queries and answers side by side, float32 (N, COLUMNS)."""
-    centre = np.stack([queries.u, queries.v, queries.sigma], axis=-1)
-    return np.concatenate([centre, queries.wi, queries.wo, answers.mean], axis=-1).astype(np.float32)
+    columns = [*queries, answers.mean, answers.transparency]
+    return np.concatenate([c.reshape(len(c), -1) for c in columns], axis=-1).astype(np.float32)
 
 
 class Order:
@@ -156,5 +159,7 @@ class Batches:
         else:
             table = torch.from_numpy(self.rows.table[index]).to(self.device)
         u, v, sigma = table[..., :3].unbind(dim=-1)
+        minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
+        wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
         fabric = torch.from_numpy(fabrics).to(self.device)
-        return Batch(fabric, u, v, sigma, table[..., 3:6], table[..., 6:9], table[..., 9:])
+        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])

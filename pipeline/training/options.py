@@ -29,6 +29,15 @@ class TrainingOptions(BaseModel):
     """Decoupled weight decay of AdamW."""
     gradient_clip: float = Field(default=1.0, gt=0, le=1e6)
     """Largest Euclidean norm of the gradient."""
+    average: float = Field(default=0.998, ge=0, lt=1)
+    """Share of the exponential moving average of the weights that a step keeps; the average is what is shipped. 0: the
+    last weights are."""
+    precision: Literal["auto", "single", "mixed"] = "auto"
+    """`mixed` multiplies in bfloat16 and sums in single precision; `auto` does so on a GPU only."""
+    compile: bool = False
+    """Compile the loss with torch.compile: minutes at first, faster steps on a GPU; the last bits change."""
+    stop_at_noise: bool = True
+    """Stop once the model's own squared error on held-out queries is below the noise of the truth there."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the initial weights and of the order of the queries."""
     threads: int = Field(default=1, ge=1, le=1024)
@@ -39,9 +48,11 @@ class TrainingOptions(BaseModel):
     """Steps between checkpoints, from which an interrupted training goes on."""
     curve_points: int = Field(default=40, ge=1, le=10_000)
     """Points of the loss curve on the model card."""
+    held_out_points: int = Field(default=8, ge=1, le=10_000)
+    """Looks at held-out queries along the curve."""
     validation_rows: int = Field(default=16_384, ge=1)
     """Most held-out queries used for the figures on the model card."""
 
 
-VERSION = 1
+VERSION = 2
 """Raised by hand when the loop's numbers change; part of the fingerprint of every trained model."""

@@ -6,6 +6,8 @@ are on the card.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,30 +17,73 @@ from torch import Tensor
 
 from pipeline.models.registry import module_of
 from pipeline.shards.manifest import Manifest
-from pipeline.training.options import TrainingOptions
 from pipeline.truth.frames import COMPONENTS
-from pipeline.truth.query import Answers
+from pipeline.truth.query import Answers, Queries
+
+FOOTPRINTS = (0.1, 0.3, 1.0, 4.0)
+"""Edges between the bins of footprints, in yarn spacings."""
+
+_LOOK_ROWS = 2048  # most queries of a look during the training
 
 
-def validation_figures(
-    options: Any,
-    card: dict[str, Any],
-    weights: dict[str, Tensor],
-    manifest: Manifest,
-    folder: Path,
-    training: TrainingOptions,
-) -> dict[str, Any]:
-    """Return ``{fabric: {component: figures}}`` for the trained fabrics that have validation rows."""
-    (method,) = module_of(options.model).restore(options, [(card, weights)])
-    held_out = {shard.fabric for shard in manifest.shards if shard.split == "validation"}
-    names = [entry["name"] for entry in card["fabrics"] if entry["name"] in held_out]
-    figures = {}
-    for name in names:
-        queries, answers = manifest.read(folder, name, "validation")
-        share = slice(max(training.validation_rows // len(names), 1))
-        prediction = method.predict(manifest.fabrics[name], queries.take(share))
-        figures[name] = component_figures(prediction, answers.take(share))
-    return figures
+class HeldOut:
+    """Held-out queries of the trained fabrics.
+
+    Parameters
+    ----------
+    options, card : model options, dict
+        What `restore` needs beside the weights.
+    manifest, folder : Manifest, Path
+        The data set.
+    rows : int
+        Most queries in all.
+    """
+
+    def __init__(self, options: Any, card: dict[str, Any], manifest: Manifest, folder: Path, rows: int) -> None:
+        self._options, self._card, self._manifest = options, card, manifest
+        held_out = {shard.fabric for shard in manifest.shards if shard.split == "validation"}
+        names = [entry["name"] for entry in card["fabrics"] if entry["name"] in held_out]
+        self._rows = {name: manifest.read(folder, name, "validation") for name in names}
+        self._share = max(rows // max(len(names), 1), 1)
+
+    def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
+        """Return the mean squared error over all components, as measured, and the truth's own; 0 without queries."""
+        if not self._rows:
+            return 1.0, 0.0
+        share = max(min(self._share, _LOOK_ROWS // len(self._rows)), 1)
+        sums = np.zeros(2)
+        for name, prediction, _, answers in self._answered(weights, share):
+            del name
+            sums += [np.square(prediction - answers.mean).mean(), np.square(answers.standard_error).mean()]
+        error, noise = (sums / len(self._rows)).tolist()
+        return float(f"{error:.6g}"), float(f"{noise:.6g}")
+
+    def figures(self, weights: dict[str, Tensor]) -> dict[str, Any]:
+        """Return ``{fabric: {component: figures, "footprints": {bin: {component: figures}}}}``."""
+        found: dict[str, Any] = {}
+        for name, prediction, queries, answers in self._answered(weights, self._share):
+            place = np.digitize(np.minimum(queries.sigma, queries.sigma_minor), FOOTPRINTS)
+            bins = {}
+            for number, label in enumerate(footprint_labels()):
+                inside = place == number
+                if inside.any():
+                    bins[label] = component_figures(prediction[inside], answers.take(inside))
+            found[name] = component_figures(prediction, answers) | {"footprints": bins}
+        return found
+
+    def _answered(
+        self, weights: dict[str, Tensor], share: int
+    ) -> Iterator[tuple[str, npt.NDArray[np.float32], Queries, Answers]]:
+        (method,) = module_of(self._options.model).restore(self._options, [(self._card, weights)])
+        for name, (queries, answers) in self._rows.items():
+            few = queries.take(slice(share))
+            yield name, method.predict(self._manifest.fabrics[name], few), few, answers.take(slice(share))
+
+
+def footprint_labels() -> list[str]:
+    """Name the bins of footprints."""
+    inner = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(FOOTPRINTS)]
+    return [f"below {FOOTPRINTS[0]:g}", *inner, f"above {FOOTPRINTS[-1]:g}"]
 
 
 def component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:

@@ -2,13 +2,13 @@ import json
 
 import pytest
 
-from pipeline.models.options import NeumipOptions, PointSampledOptions, WovenOptions
-from pipeline.models.registry import MODELS, load_methods, load_model, module_of
+from pipeline.models.options import CLASSES, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.models.registry import load_methods, load_model, module_of
 from weaves.errors import BadInput
 
 
 def test_every_model_is_the_file_of_its_name():
-    for model in MODELS:
+    for model in CLASSES:
         assert module_of(model).__name__ == f"pipeline.models.{model}"
 
 

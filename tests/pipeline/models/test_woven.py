@@ -95,7 +95,8 @@ def test_training_sees_what_rendering_sees(one_blob, twill):
     network.start_at(torch.full((2, 4), 2.0))  # far from 0, where outputs would be clamped
     asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 64)
     answers = Woven(network).predict(twill, asked)
-    batch = Batch(torch.tensor([1]), *(torch.from_numpy(column)[None] for column in (*asked[:5], answers)))
+    columns = (*asked, answers, np.zeros(64, np.float32))
+    batch = Batch(torch.tensor([1]), *(torch.from_numpy(column)[None] for column in columns))
     assert network.loss(batch, np.random.default_rng(0)).item() < 1e-10
 
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.training.dataset import COLUMNS, Batches, Order, Rows
+from pipeline.training.dataset import COLUMNS, Batches, Order, Rows, as_table
+from pipeline.truth.query import Answers, Queries
 
 
 def rows_of(*counts):
@@ -64,6 +65,22 @@ def test_batches_hold_the_rows_of_their_fabrics():
     np.testing.assert_array_equal(batch.v, numbers)
     assert batch.wi.shape == batch.wo.shape == (2, 6, 3)
     assert batch.target.shape == (2, 6, 4)
+    assert batch.sigma_minor.shape == batch.angle.shape == batch.curvature.shape == batch.transparency.shape == (2, 6)
+
+
+def test_columns_are_where_batches_look_for_them():
+    numbers = iter(np.arange(17, dtype=np.float32))
+    column = lambda width: np.array([[next(numbers) for _ in range(width)]], np.float32)  # noqa: E731
+    scalar = lambda: column(1)[0]  # noqa: E731
+    queries = Queries(scalar(), scalar(), scalar(), column(3), column(3), scalar(), scalar(), scalar())
+    answers = Answers.opaque(column(4), np.zeros((1, 4), np.float32), np.ones(1, np.int32))
+    table = as_table(queries, answers._replace(transparency=scalar()))
+    np.testing.assert_array_equal(table, np.arange(17)[None])
+    batch = Batches(Rows(table, [1]), Order([1], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
+    for name in Queries._fields:
+        np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
+    np.testing.assert_array_equal(batch.target[0], answers.mean)
+    assert batch.transparency.item() == 16
 
 
 @pytest.mark.parametrize("step", [0, 11])

@@ -10,9 +10,10 @@ from pipeline.models.method import Method
 from pipeline.models.options import NeumipOptions, WovenOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.shards.manifest import Manifest
-from pipeline.training import loop
+from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
 from pipeline.training.loop import rate_factor, train
 from pipeline.training.options import TrainingOptions
+from pipeline.training.validation import HeldOut, footprint_labels
 from weaves.errors import BadInput, WorkFailed
 
 # The closed form of conftest is small in value: its loss is weighted for it, whatever suits real cloth.
@@ -46,7 +47,7 @@ def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path):
     train(OPTIONS[model], SHORT, folder, FABRICS[model], whole)
     with pytest.raises(Killed):
         train(OPTIONS[model], SHORT, folder, FABRICS[model], resumed, killed_at(20 / 30))
-    assert torch.load(resumed / loop.CHECKPOINT, weights_only=True)["step"] == 16
+    assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
     shares = []
     train(OPTIONS[model], SHORT, folder, FABRICS[model], resumed, shares.append)
     assert shares[0] == pytest.approx(17 / 30)
@@ -63,7 +64,7 @@ def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path):
     assert contents(other)["model.safetensors"] == contents(whole)["model.safetensors"]
     half = tmp_path / "half"
     half.mkdir()
-    (half / loop.CHECKPOINT).write_bytes(b"PK\x03\x04 cut short")
+    (half / CHECKPOINT).write_bytes(b"PK\x03\x04 cut short")
     train(NEUMIP, SHORT, folder, FABRICS["neumip"], half)
     assert contents(half) == contents(whole)
 
@@ -103,6 +104,33 @@ def test_the_card_tells_what_was_trained_and_how_well(folder, tmp_path):
         assert figures["noise"] == pytest.approx(1e-6, rel=1e-3)  # the tiny data set's standard error is 1e-3
         assert figures["relative_rmse"] == pytest.approx(math.sqrt(figures["mse"]) / figures["mean"], rel=1e-4)
 
+    curve = card["curve"]
+    assert card["steps_taken"] == 30
+    assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in curve[:-1])
+    assert set(card["validation"]["cotton_twill"]["footprints"]) <= set(footprint_labels())
+
+
+def test_a_training_stops_where_the_truth_is_all_noise(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(HeldOut, "error_and_noise", lambda self, weights: (1.9e-6, 1e-6))
+    train(NEUMIP, SHORT, folder, FABRICS["neumip"], tmp_path)
+    assert json.loads((tmp_path / "card.json").read_text())["steps_taken"] == 6
+    train(NEUMIP, SHORT.model_copy(update={"stop_at_noise": False}), folder, FABRICS["neumip"], tmp_path)
+    assert json.loads((tmp_path / "card.json").read_text())["steps_taken"] == 30
+
+
+def test_the_average_follows_its_closed_form(tmp_path):
+    """Weights 1, 2, 3, ... averaged with share min(keep, (1 + t) / (10 + t)), computed here step by step."""
+    network = torch.nn.Linear(1, 1)
+    torch.nn.init.constant_(network.weight, 0.0)
+    state = State(network, torch.optim.AdamW(network.parameters()), 0.5, "", tmp_path / "none")
+    expected = 0.0
+    for step in range(20):
+        torch.nn.init.constant_(network.weight, float(step + 1))
+        state.add(step, torch.tensor(1.0), torch.tensor(1.0))
+        keep = min(0.5, (1 + step) / (10 + step))
+        expected = keep * expected + (1 - keep) * (step + 1)
+    assert state.weights()["weight"].item() == pytest.approx(expected, rel=1e-6)
+
 
 def test_weights_survive_the_file(folder, tmp_path):
     train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
@@ -128,9 +156,9 @@ def test_a_diverging_training_stops_and_keeps_its_checkpoint(folder, tmp_path, m
     monkeypatch.setattr(network, "loss", broken)
     with pytest.raises(WorkFailed, match=r"diverged by step 24.*learning_rate.*checkpoint"):
         train(NEUMIP, SHORT, folder, FABRICS["neumip"], tmp_path)
-    kept = torch.load(tmp_path / loop.CHECKPOINT, weights_only=True)
-    assert kept["step"] == 16
-    assert all(tensor.isfinite().all() for tensor in kept["network"].values())
+    about, tensors = read_checkpoint(tmp_path / CHECKPOINT)
+    assert about["step"] == 16
+    assert all(tensor.isfinite().all() for tensor in tensors.values())
 
 
 def test_a_gpu_that_is_not_there_is_bad_input(folder, tmp_path, monkeypatch):

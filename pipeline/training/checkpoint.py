@@ -1,0 +1,127 @@
+"""What a training remembers, written whole or not at all: tensors and JSON; nothing that could run is ever loaded."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import safetensors
+import safetensors.torch
+import torch
+from safetensors import SafetensorError
+from torch import Tensor, nn
+
+from pipeline.atomic import atomic_path
+from weaves.errors import WorkFailed
+
+CHECKPOINT: Final = "checkpoint.safetensors"
+
+_DIVERGED = 100.0  # times the first losses
+_KEY: Final = "twillight"
+
+
+class State:
+    """Weights, their running average, the optimiser, the step, and the losses so far.
+
+    Parameters
+    ----------
+    network : nn.Module
+        What learns.
+    optimiser : torch.optim.Optimizer
+        How.
+    average : float
+        Share of the running average of the weights kept at a step; it is less in the first steps, which no average
+        should remember. 0: the average is the weights.
+    identity : str
+        Fingerprint of everything that shapes the weights: a checkpoint of another training is not gone on from.
+    path : Path
+        The checkpoint.
+    """
+
+    def __init__(
+        self, network: nn.Module, optimiser: torch.optim.Optimizer, average: float, identity: str, path: Path
+    ) -> None:
+        self.network, self.optimiser, self.identity, self.path = network, optimiser, identity, path
+        self.curve: list[dict[str, float]] = []
+        self._keep = average
+        self._learning = [tensor for tensor in network.state_dict().values() if tensor.is_floating_point()]
+        self._average = [tensor.clone() for tensor in self._learning]
+        self._sums = torch.zeros(2, dtype=torch.float64)  # losses and gradient norms since the last mark
+        self._since = 0
+
+    def add(self, step: int, loss: Tensor, norm: Tensor) -> None:
+        """Note a step's loss and gradient norm, and average its weights."""
+        self._sums = self._sums.to(loss.device) + torch.stack([loss, norm]).to(torch.float64)
+        self._since += 1
+        keep = min(self._keep, (1.0 + step) / (10.0 + step))
+        with torch.no_grad():
+            torch._foreach_lerp_(self._average, self._learning, 1.0 - keep if self._keep > 0.0 else 1.0)
+
+    def mark(self, step: int) -> None:
+        """Put the mean loss since the last mark on the curve."""
+        self.check(step)
+        self.curve.append({"step": step, "loss": round(float(self._sums[0]) / self._since, 9)})
+        self._sums, self._since = torch.zeros_like(self._sums), 0
+        self.check(step)
+
+    def check(self, step: int) -> None:
+        """Stop a training that has left the finite numbers or its own beginnings."""
+        finite = bool(self._sums.isfinite().all())
+        if finite and (len(self.curve) < 2 or self.curve[-1]["loss"] <= _DIVERGED * self.curve[0]["loss"]):
+            return
+        kept = f"; the checkpoint before is kept in {self.path}" if self.path.exists() else ""
+        raise WorkFailed(f"the training loss diverged by step {step}: try a lower learning_rate{kept}")
+
+    def weights(self) -> dict[str, Tensor]:
+        """Return the averaged weights by name, on the CPU."""
+        averaged = iter(self._average)
+        return {
+            name: (next(averaged) if tensor.is_floating_point() else tensor).detach().cpu().contiguous().clone()
+            for name, tensor in self.network.state_dict().items()
+        }
+
+    def save(self, step: int) -> None:
+        """Write the checkpoint of a step; WorkFailed if the training has diverged."""
+        self.check(step)
+        tensors = {f"network/{name}": tensor for name, tensor in self.network.state_dict().items()}
+        tensors |= {f"average/{index}": tensor for index, tensor in enumerate(self._average)}
+        for index, entries in self.optimiser.state_dict()["state"].items():
+            tensors |= {f"optimiser/{index}/{name}": torch.as_tensor(value) for name, value in entries.items()}
+        tensors["sums"] = self._sums
+        about = {"identity": self.identity, "step": step, "curve": self.curve, "since": self._since}
+        with atomic_path(self.path) as temporary:
+            copies = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+            safetensors.torch.save_file(copies, temporary, metadata={_KEY: json.dumps(about)})
+
+    def restore(self, device: torch.device) -> int:
+        """Load the checkpoint if it is one of this training; return the step to go on with."""
+        content = read_checkpoint(self.path)
+        if content is None or content[0].get("identity") != self.identity:
+            return 0
+        about, tensors = content
+        network = {name: tensors[f"network/{name}"] for name in self.network.state_dict()}
+        self.network.load_state_dict(network)
+        moments: dict[int, dict[str, Tensor]] = {}
+        for name, tensor in tensors.items():
+            if name.startswith("optimiser/"):
+                _, parameter, entry = name.split("/")
+                moments.setdefault(int(parameter), {})[entry] = tensor
+        groups = self.optimiser.state_dict()["param_groups"]
+        self.optimiser.load_state_dict({"state": moments, "param_groups": groups})
+        with torch.no_grad():
+            for index, average in enumerate(self._average):
+                average.copy_(tensors[f"average/{index}"])
+        self.curve = about["curve"]
+        self._sums, self._since = tensors["sums"].to(device), int(about["since"])
+        return int(about["step"])
+
+
+def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]] | None:
+    """Return what a checkpoint says of itself and its tensors; None if there is none or it is damaged."""
+    try:
+        with safetensors.safe_open(path, framework="pt") as file:
+            about = json.loads((file.metadata() or {}).get(_KEY, "{}"))
+            return about, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (OSError, ValueError, SafetensorError):
+        return None
