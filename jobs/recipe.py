@@ -211,7 +211,9 @@ def _refuse_contradictions(recipe: Recipe, where: str) -> None:
                 raise BadInput(where, key, name, "names must differ, because files are called by them")
     if recipe.population and not recipe.dataset.rows.population:
         raise BadInput(where, "dataset.rows.population", 0, "must be > 0 when dataset.population.count is")
-    unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen}
+    # Where a seen fabric has the same draft, it is the yarns that are unseen.
+    seen = {fabric.weave.canonical() for fabric in recipe.seen}
+    unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen if fabric.weave.canonical() not in seen}
     for member in recipe.population:
         if fabric := unseen.get(member.weave.canonical()):
             allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"

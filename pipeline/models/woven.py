@@ -26,7 +26,7 @@ one-blobs tell the place within the yarn. The decoder has 8,192 parameters more,
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +47,6 @@ from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
 _SLOPE = 0.01
-_PARAMETERS = 4
 _DIRECTIONS = 5
 _FUSED = 64
 _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
@@ -55,6 +54,11 @@ _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 def _activate(x: Tensor) -> Tensor:
     return functional.leaky_relu(x, _SLOPE)
+
+
+def _counts(options: WovenOptions) -> tuple[int, int]:
+    """Return how many parameters a fabric has and how many numbers an answer."""
+    return (7, 5) if options.transmission else (4, 4)
 
 
 class _Residual(nn.Module):
@@ -91,7 +95,7 @@ class _Encoder(nn.Module):
         self.local, self.bins = options.one_blob == "local", options.bins
         flat = channels[-1] if self.local else channels[-1] * (options.map_texels // 16) ** 2
         self.flat = nn.Linear(flat, options.latent)
-        self.join = nn.Linear(options.latent + _PARAMETERS, options.hidden)
+        self.join = nn.Linear(options.latent + _counts(options)[0], options.hidden)
         self.mix = _Residual(options.hidden)
         self.last = nn.Linear(options.hidden, options.latent)
         if self.local:
@@ -137,10 +141,10 @@ class _Decoder(nn.Module):
             self.fusion = nn.ModuleList(layers)
         self.mix = _Residual(hidden)
         self.narrow = nn.Linear(hidden, _FUSED)
-        self.last = nn.Linear(_FUSED, 4)
+        self.last = nn.Linear(_FUSED, _counts(options)[1])
 
     def forward(self, latent: Tensor, where: Tensor | None, patch: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-        """Answer in network space, (F, n, 4).
+        """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt.
 
         Parameters
         ----------
@@ -179,8 +183,8 @@ class Cloth(NamedTuple):
     ----------
     maps : Tensor (F, 6, side, side)
         Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x.
-    parameters : Tensor (F, 4)
-        alpha_warp, alpha_weft, beta_warp, beta_weft.
+    parameters : Tensor (F, 4 or 7)
+        alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness.
     placement : Placement
         How queries about the fabrics get there.
     """
@@ -220,7 +224,9 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions) -> Cloth:
         ends, picks = seen.weave.repeat
         surface = surface_at(seen, centre[None, :] * ends, centre[:, None] * picks)
         maps.append(np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1))
-        parameters.append([seen.warp.roughness, seen.weft.roughness, seen.warp.relief, seen.weft.relief])
+        numbers = [seen.warp.roughness, seen.weft.roughness, seen.warp.relief, seen.weft.relief]
+        more = [seen.warp.width, seen.weft.width, seen.optical_thickness / 2.0]
+        parameters.append(numbers + (more if options.transmission else []))
         placements.append(placement(fabric, symmetry, start))
     together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
     return Cloth(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
@@ -272,8 +278,9 @@ class WovenNetwork(nn.Module):
 
         Returns
         -------
-        Tensor (F, n, 4)
-            Of the fabric in standard position: `placement.swap` gives the fabric's own.
+        Tensor (F, n, 4 or 5)
+            Of the fabric in standard position: `placement.swap` gives the fabric's own components. With `transmission`
+            the fifth is the transparency.
         """
         u, v, wi, wo = placement.move(u, v, wi, wo)
         options, bins, extent = self.options, self.options.bins, placement.repeat
@@ -305,12 +312,15 @@ class WovenNetwork(nn.Module):
         u, v = batch.u / own[:, :1], batch.v / own[:, 1:]
         output = self.decode(self.encode(cloth), cloth.placement, u, v, batch.sigma, batch.wi, batch.wo)
         target = to_network(cloth.placement.swap(batch.target), options.log_k)
-        return weighted_error(output, target, options.specular_weight, options.diffuse_weight)
+        error = weighted_error(output[..., :4], target, options.specular_weight, options.diffuse_weight)
+        if options.transmission:
+            error = error + options.transparency_weight * (output[..., 4] - batch.transparency).square().mean()
+        return error
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, and the last weights small: a leaky ReLU can stall far from it."""
         with torch.no_grad():
-            self.decoder.last.bias.copy_(to_network(target, self.options.log_k).mean(dim=0))
+            self.decoder.last.bias[:4].copy_(to_network(target, self.options.log_k).mean(dim=0))
             self.decoder.last.weight.mul_(0.01)
 
     def schedule(self, progress: float) -> None:
@@ -361,12 +371,27 @@ class Woven:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        network = self._network
+        swap = self._encode(fabric)[1].swap
+        log_k = self._network.options.log_k
+        return self._answer(fabric, queries, lambda output: to_components(swap(output[..., :4])[0], log_k))
+
+    def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Return the share of light from straight behind that passes unscattered, float32 (N,) in [0, 1].
+
+        0 if `transmission` was not learnt.
+        """
+        if not self._network.options.transmission:
+            return np.zeros(len(queries.u), np.float32)
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+        share = self._answer(fabric, queries, lambda output: output[0, :, 4:].clamp(0.0, 1.0).expand(-1, 4))
+        return share[:, 0].copy()
+
+    def _answer(self, fabric: Fabric, queries: Queries, read: Callable[[Tensor], Tensor]) -> npt.NDArray[np.float32]:
         latent, place = self._encode(fabric)
 
         def answer(*columns: Tensor) -> Tensor:
-            output = network.decode(latent, place, *(column.unsqueeze(0) for column in columns))
-            return to_components(place.swap(output)[0], network.options.log_k)
+            return read(self._network.decode(latent, place, *(column.unsqueeze(0) for column in columns)))
 
         return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
 

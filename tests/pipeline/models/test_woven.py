@@ -179,3 +179,19 @@ def test_start_at_sets_the_bias_to_the_mean_in_network_space():
     expected = [(math.log1p(k * 0.02) + math.log1p(k * 0.04)) / 2, (math.log1p(k * 0.01) + math.log1p(k * 0.03)) / 2]
     assert network.decoder.last.bias.tolist() == pytest.approx([*expected, 0.1, 0.3], rel=1e-5)
     assert network.decoder.last.weight.abs().max() < 0.05 * before.abs().max()
+
+
+def test_transmission_sees_widths_and_answers_transparency():
+    """Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0."""
+    options = SMALL.model_copy(update={"transmission": True})
+    voile = load_fabric("voile")
+    narrow = voile.model_copy(update={"warp": voile.warp.model_copy(update={"width": 0.6})})
+    network = WovenNetwork(options)
+    cloth = read_cloth([voile, narrow], options)
+    assert cloth.parameters.shape == (2, 7)
+    assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
+    asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
+    share = Woven(network).transparency(voile, asked)
+    assert share.shape == (64,) and ((share >= 0) & (share <= 1)).all()
+    assert Woven(network).predict(voile, asked).shape == (64, 4)
+    assert not Woven(WovenNetwork(SMALL)).transparency(voile, asked).any()

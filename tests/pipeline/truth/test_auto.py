@@ -26,7 +26,7 @@ RANDOM = population_fabrics(Population(count=10, seed=2031, plain=WILD, twill=WI
 @pytest.mark.slow
 @pytest.mark.parametrize("relative_error", [0.02, 0.01])
 def test_ten_thousand_true_errors_lie_within_three_stated_ones(relative_error, tmp_path):
-    """Ten random fabrics, most with gaps, and the ten presets, 500 queries each, against 32,768 points or more.
+    """Ten random fabrics, most with gaps, and the presets, 500 queries each, against 32,768 points or more.
 
     The error of a query is the norm over its four components; 99 % must lie within three stated ones, the reference's
     own included.
@@ -51,6 +51,6 @@ def test_ten_thousand_true_errors_lie_within_three_stated_ones(relative_error, t
         worst += [(float(z[k]), fabric.name, int(k), float(error[k]), float(size[k])) for k in np.argsort(-z)[:3]]
     worst.sort(reverse=True)
     (tmp_path / "worst.json").write_text(json.dumps(worst[:30]))
-    assert asked == 10_000
+    assert asked >= 10_000
     assert beyond / asked <= 0.01, (beyond, worst[:10])
     assert reached / asked >= 0.95, reached
