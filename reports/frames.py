@@ -17,9 +17,10 @@ from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from reports.aliasing import excess_energy, flicker, spectrum, temporal_variance
 from reports.exr import read_exr, write_exr
-from reports.metrics import LUMINANCE, colour_noise
+from reports.metrics import colour_noise
 from reports.options import BenchOptions
 from reports.record import TRUTH, Provenance, Record, Role
+from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Floats:
 
 def _luminance(fabric: Fabric) -> Floats:
     """Return the luminance of each component's colour, (4, 1)."""
-    return np.asarray(colours(fabric) @ LUMINANCE[:, None])
+    return np.asarray(colours(fabric) @ np.array(LUMINANCE)[:, None])
 
 
 def _subject(method: str, setting: str, fabric: Fabric, role: Role, provenance: Provenance | None) -> Record:

@@ -30,9 +30,6 @@ Floats = npt.NDArray[np.float64]
 COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 """Colours of the colour measure: one channel, (4, 1)."""
 
-LUMINANCE: Final = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of linear sRGB primaries (Rec. 709)."""
-
 
 @dataclass(frozen=True)
 class Error:

@@ -17,9 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from reports.exr import Exr
-from reports.metrics import LUMINANCE
 from reports.pictures import RGB
-from weaves.colour import linear_rgb
+from weaves.colour import LUMINANCE, linear_rgb
 from weaves.fabric import Fabric
 from weaves.surface import GAP, surface_maps
 
@@ -42,7 +41,7 @@ def picture(exr: Exr) -> bytes:
 
 def difference(exr: Exr, truth: Exr) -> bytes:
     """Return luminance minus the truth's: blue too dark, red too bright, in full colour from `DIFFERENCE_RANGE` on."""
-    shown, reference = ((e.stack(*RGB).astype(np.float64) @ LUMINANCE) for e in (exr, truth))
+    shown, reference = ((e.stack(*RGB).astype(np.float64) @ np.array(LUMINANCE)) for e in (exr, truth))
     cloth = truth.channels["A"] > 0
     scale = DIFFERENCE_RANGE * reference[cloth].mean() if cloth.any() else 1.0
     share = 0.5 + 0.5 * np.clip((shown - reference) / scale, -1.0, 1.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, model_validator
@@ -18,6 +18,10 @@ Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
 Rgb = tuple[float, float, float]
 
 EXPECTED = 'a colour is three numbers from 0 to 1 (linear RGB), "#rrggbb" (sRGB), or a spectrum { wavelengths, values }'
+
+
+LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
+"""Luminance of linear sRGB primaries (Rec. 709)."""
 
 
 class Spectrum(BaseModel):
@@ -63,6 +67,11 @@ Colour = Annotated[
     | Annotated[Spectrum, Tag("spectrum")],
     Discriminator(_notation, custom_error_type="colour", custom_error_message=EXPECTED),
 ]
+
+
+def luminance(rgb: Rgb) -> float:
+    """Return the luminance of a linear sRGB colour."""
+    return sum(weight * value for weight, value in zip(LUMINANCE, rgb, strict=True))
 
 
 @lru_cache(maxsize=1024)
