@@ -1,4 +1,4 @@
-"""Point sampling at a fixed number of independent points: the aliased baseline [Jin2022Woven]."""
+"""Point sampling with a fixed number of points, independent or of the R2 sequence: it aliases [Jin2022Woven]."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.truth.kernel import kernel
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.replicates import add_point, place_point, query_scene
-from pipeline.truth.sequences import derive, independent_pair
+from pipeline.truth.sequences import derive, independent_pair, r2_pair
 from weaves.fabric import Fabric
 
 
@@ -28,9 +28,13 @@ class PointSampler:
     def __init__(self, fabric: Fabric, options: TruthOptions | None = None) -> None:
         self.model = model_of(fabric, options or TruthOptions())
 
-    def sample(self, queries: Queries, count: int, seed: int) -> npt.NDArray[np.float32]:
-        """Return the components from `count` points a query, (N, 4); the viewer is in front."""
-        return _sample(self.model, columns_of(queries), count, np.uint64(seed))
+    def sample(self, queries: Queries, count: int, seed: int, r2: bool = False) -> npt.NDArray[np.float32]:
+        """Return the components from `count` points a query, (N, 4); the viewer is in front.
+
+        The points are independent, or with `r2` the first of that sequence, shifted at random once a query
+        [Roberts2018R2].
+        """
+        return _sample(self.model, columns_of(queries), count, np.uint64(seed), r2)
 
     def bytes_stored(self) -> int:
         """Return the bytes of the tables that the point model reads."""
@@ -38,7 +42,7 @@ class PointSampler:
 
 
 @kernel
-def _sample(model: Model, columns: Columns, count: int, seed: np.uint64) -> npt.NDArray[np.float32]:
+def _sample(model: Model, columns: Columns, count: int, seed: np.uint64, r2: bool) -> npt.NDArray[np.float32]:
     rows = len(columns.u)
     mean = np.zeros((rows, 4), np.float32)
     sums = np.zeros((1, SUMS))
@@ -47,7 +51,7 @@ def _sample(model: Model, columns: Columns, count: int, seed: np.uint64) -> npt.
         query = query_scene(columns, row)
         sums[:] = 0.0
         for k in range(count):
-            first, second = independent_pair(key, k)
+            first, second = r2_pair(key, k) if r2 else independent_pair(key, k)
             x, y, weight = place_point(columns, row, model, first, second)
             add_point(model, x, y, weight, query, sums, 0)
         if sums[0, AREA] > 0.0:

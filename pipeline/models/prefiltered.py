@@ -1,0 +1,63 @@
+"""The habit of prefiltering normals: MIP maps of normal and tangent, one point model a query and family, no shadows.
+
+Formulas, and what widens the roughness, stand in pipeline.truth.prefiltered_maps. What it cannot see: that points hide
+one another, and that the mean of a product is not the product of the means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.options import PrefilteredOptions
+from pipeline.models.plain import refuse_other
+from pipeline.truth.prefiltered_maps import WIDENINGS, PrefilteredMaps
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+
+class Prefiltered:
+    """Averaged maps.
+
+    Parameters
+    ----------
+    options : PrefilteredOptions
+        The design.
+    """
+
+    def __init__(self, options: PrefilteredOptions) -> None:
+        self.name, self.setting = options.name, ""
+        self._options = options
+        self._maps: dict[str, PrefilteredMaps] = {}
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Say yes: nothing is learnt."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Average the fabric's maps, once."""
+        self._of(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
+        refuse_other(queries, self.name)
+        return self._of(fabric).answer(queries, WIDENINGS[self._options.widening])
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of all levels."""
+        return self._of(fabric).bytes_stored()
+
+    def _of(self, fabric: Fabric) -> PrefilteredMaps:
+        key = fingerprint(fabric.optics())
+        if key not in self._maps:
+            self._maps[key] = PrefilteredMaps(fabric, self._options.texels_per_yarn)
+        return self._maps[key]
+
+
+def restore(options: PrefilteredOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[Prefiltered]:
+    """Return the one method."""
+    return [Prefiltered(options)]

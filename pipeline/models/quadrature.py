@@ -1,0 +1,75 @@
+"""Gauss-Legendre nodes on every piece of yarn, k across it: the patch integral by a fixed rule.
+
+Single precision, folded by the cloth's periodicity; see pipeline.truth.gauss_nodes. What is not smooth is left over:
+the line where a yarn turns away from the light, shadows, taken as ramps as wide as horizons spread over a node, and
+highlights narrower than a node's box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.options import QuadratureOptions
+from pipeline.models.plain import refuse_other
+from pipeline.truth.gauss_nodes import GaussQuadrature
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+
+class Quadrature:
+    """The rule with a fixed number of nodes.
+
+    Parameters
+    ----------
+    nodes : int
+        Nodes across a yarn.
+    options : QuadratureOptions
+        The design.
+    """
+
+    def __init__(self, nodes: int, options: QuadratureOptions) -> None:
+        self.name, self.setting = options.name, f"k = {nodes}"
+        self._nodes, self._options = nodes, options
+        self._rules: dict[str, GaussQuadrature] = {}
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Say yes: nothing is learnt."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Tabulate nodes and horizons, once."""
+        self._rule(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
+        refuse_other(queries, self.name)
+        return self._rule(fabric).answer(queries)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of nodes and horizons."""
+        return self._rule(fabric).bytes_stored()
+
+    def _rule(self, fabric: Fabric) -> GaussQuadrature:
+        key, options = fingerprint(fabric.optics()), self._options
+        if key not in self._rules:
+            along = max(2, round(options.along * self._nodes))
+            self._rules[key] = GaussQuadrature(
+                fabric,
+                self._nodes,
+                along,
+                options.shadows != "none",
+                options.shadows == "soft",
+                options.horizon_nodes,
+                options.azimuths,
+            )
+        return self._rules[key]
+
+
+def restore(options: QuadratureOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[Quadrature]:
+    """Return one method for each number of nodes."""
+    return [Quadrature(nodes, options) for nodes in options.nodes]

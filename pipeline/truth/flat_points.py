@@ -1,0 +1,320 @@
+"""Shading of many points at once, in single precision and without branches: surface, horizons, both slabs.
+
+A point is a lane: all loops are flat, over as many lanes as whole queries fill, so that two points a query and two
+hundred cost the same each. The formulas are those of heightfield, patch, microflake and slab; the flakes need cosines
+with the tangent only, since |w x t|^2 = 1 - (w.t)^2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
+from pipeline.truth.horizon_map import ALONG, BOUND, CURVE, SCALE, SLOTS, START, HorizonMap, Single
+from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.single import absorbed
+
+LANES: Final = 2048
+"""Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""
+
+ROWS: Final = 26
+"""Rows of the scratch that points are passed in; named below."""
+
+# Written by who places the points: position in the repeat and weight; directions of the query, squared half vector's
+# inverse, where between two azimuths they lie. Then what `locate` finds, and the shares that `shade` writes.
+(X, Y, WEIGHT, IX, IY, IZ, OX, OY, OZ, SIZE, TURN_I, TURN_O, SINE, DISTANCE, CURVATURE, LIMIT, WARPNESS, WEFTNESS,
+ SEEN, BOTH, STEP_V, STEP_Y, STEEPNESS, AREA, DIFFUSE, SPECULAR) = range(ROWS)  # fmt: skip
+
+# Rows of the scratch of integers: the azimuths' rows around wi and wo, and the node.
+I0, I1, O0, O1, NODE = range(5)
+INTEGERS: Final = 5
+
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_TINY = np.float32(1e-20)
+_DEEPEST = np.float32(80.0)
+_INVERSE_PI = np.float32(1.0 / math.pi)
+_FOURTH_PI = np.float32(1.0 / (4.0 * math.pi))
+_AS0, _AS1, _AS2, _AS3 = (np.float32(c) for c in (1.5707288, -0.2121144, 0.0742610, -0.0187293))
+
+
+@fast_kernel
+def arcsine(x: np.float32) -> np.float32:
+    """Return asin x to 7e-5 [Abramowitz1964Handbook, 4.4.45]."""
+    size = min(abs(x), _1)
+    angle = np.float32(0.5 * math.pi) - np.sqrt(_1 - size) * (_AS0 + size * (_AS1 + size * (_AS2 + size * _AS3)))
+    signed: np.float32 = angle if x >= _0 else -angle
+    return signed
+
+
+@kernel
+def azimuth_rows(x: float, y: float, count: int) -> tuple[int, int, float]:
+    """Return the two azimuths around a direction, and where between them it lies."""
+    place = math.atan2(y, x) / (2.0 * math.pi) * count
+    row = math.floor(place)
+    return int(row) % count, int(row + 1) % count, place - row
+
+
+@kernel
+def query_rows(
+    wi: Single, wo: Single, azimuths: int, nodes: int, values: Single, rows: npt.NDArray[np.int32], at: int
+) -> None:
+    """Write what a query's lanes share to column `at`: nine numbers from IX on, and four rows from I0 on.
+
+    `nodes` is the number of nodes a block.
+    """
+    i0, i1, turn_i = azimuth_rows(wi[0], wi[1], azimuths)
+    o0, o1, turn_o = azimuth_rows(wo[0], wo[1], azimuths)
+    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
+    for c in range(3):
+        values[c, at], values[3 + c, at] = wi[c], wo[c]
+    values[6, at] = _1 / (hx * hx + hy * hy + hz * hz)
+    values[7, at], values[8, at] = np.float32(turn_i), np.float32(turn_o)
+    rows[I0, at], rows[I1, at] = np.int32(i0 * nodes), np.int32(i1 * nodes)
+    rows[O0, at], rows[O1, at] = np.int32(o0 * nodes), np.int32(o1 * nodes)
+
+
+@kernel
+def fill_lanes(
+    lanes: Single, places: npt.NDArray[np.int32], values: Single, rows: npt.NDArray[np.int32], queries: int, count: int
+) -> None:
+    """Copy what queries share to their `count` lanes each.
+
+    Row by row, for a slice of every row and query would cost more than a query of few points.
+    """
+    for r in range(9):
+        _repeat(values[r], queries, count, lanes[IX + r])
+    for r in range(4):
+        _repeat(rows[r], queries, count, places[I0 + r])
+
+
+@kernel
+def _repeat(source: npt.NDArray[Any], queries: int, count: int, out: npt.NDArray[Any]) -> None:
+    for q in range(queries):
+        out[q * count : (q + 1) * count] = source[q]
+
+
+@fast_kernel
+def locate(
+    count: int,
+    x: Single,
+    y: Single,
+    ends: np.int32,
+    last_end: np.float32,
+    last_pick: np.float32,
+    top: npt.NDArray[np.int32],
+    pieces: Single,
+    blocks: npt.NDArray[np.int32],
+    grid: np.int32,
+    warp_radius: np.float32,
+    weft_radius: np.float32,
+    sine: Single,
+    distance: Single,
+    curvature: Single,
+    limit: Single,
+    warpness: Single,
+    weftness: Single,
+    node: npt.NDArray[np.int32],
+) -> None:
+    """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node."""
+    size = np.float32(grid)
+    for k in range(count):
+        column, line = min(np.floor(x[k]), last_end), min(np.floor(y[k]), last_pick)
+        cell = np.int32(line) * ends + np.int32(column)
+        fx, fy = x[k] - column - _HALF, y[k] - line - _HALF
+        in_warp, in_weft = abs(fx) <= warp_radius, abs(fy) <= weft_radius
+        warp_top = top[cell] == np.int32(0)
+        covered = in_warp if warp_top else in_weft
+        beneath = in_weft if warp_top else in_warp
+        warp = warp_top if covered else not warp_top
+        gap = not (covered or beneath)
+        along = fy if warp else fx
+        slot = np.int32(0) if covered else (np.int32(3) if gap else (np.int32(1) if along < _0 else np.int32(2)))
+        piece = cell * np.int32(SLOTS) + slot
+        row = piece * np.int32(5)
+        across = (fx if warp else fy) / (warp_radius if warp else weft_radius)
+        across = min(max(across, -_1), _1)
+        place = (along + _HALF - pieces[row + np.int32(START)]) * pieces[row + np.int32(SCALE)] * size
+        turn = (arcsine(across) * _INVERSE_PI + _HALF) * size
+        i = np.int32(min(max(turn, _0), size - _HALF))
+        j = np.int32(min(max(place, _0), size - _HALF))
+        node[k] = blocks[piece] + j * grid + i
+        sine[k] = across
+        distance[k] = (along if warp else -along) + pieces[row + np.int32(ALONG)]
+        curvature[k] = pieces[row + np.int32(CURVE)]
+        limit[k] = pieces[row + np.int32(BOUND)]
+        warpness[k] = _1 if (warp and not gap) else _0
+        weftness[k] = _0 if (warp or gap) else _1
+
+
+@kernel
+def uncover(
+    count: int,
+    places: npt.NDArray[np.int32],
+    horizon: Single,
+    iz: Single,
+    oz: Single,
+    turn_i: Single,
+    turn_o: Single,
+    steepness: Single,
+    seen: Single,
+    both: Single,
+) -> None:
+    """Write how far points are seen, and seen and lit: ramps of a given steepness, in sines of elevation, from 0 to 1.
+
+    A loop of its own: no vector unit may store while it looks up places that it does not know beforehand.
+    """
+    nodes, low_i, high_i, low_o, high_o = places[NODE], places[I0], places[I1], places[O0], places[O1]
+    for k in range(count):
+        at = np.uint32(nodes[k])
+        first, second = horizon[at + np.uint32(low_o[k])], horizon[at + np.uint32(high_o[k])]
+        viewed = min(max(_HALF + (oz[k] - first - turn_o[k] * (second - first)) * steepness[k], _0), _1)
+        first, second = horizon[at + np.uint32(low_i[k])], horizon[at + np.uint32(high_i[k])]
+        lit = min(max(_HALF + (iz[k] - first - turn_i[k] * (second - first)) * steepness[k], _0), _1)
+        seen[k], both[k] = viewed, viewed * lit
+
+
+@fast_kernel
+def shade(
+    count: int,
+    weight: Single,
+    ix: Single,
+    iy: Single,
+    iz: Single,
+    ox: Single,
+    oy: Single,
+    oz: Single,
+    size: Single,
+    sine: Single,
+    distance: Single,
+    curvature: Single,
+    limit: Single,
+    warpness: Single,
+    weftness: Single,
+    seen: Single,
+    both: Single,
+    step_v: Single,
+    step_y: Single,
+    warp: Single,
+    weft: Single,
+    thickness: np.float32,
+    area: Single,
+    diffuse: Single,
+    specular: Single,
+) -> None:
+    """Write each point's shares of area, diffuse and specular sums."""
+    # Read once: a load under a condition would keep the loop from vector units.
+    radius_a, alpha_a, beta_a, blend_a = warp[RADIUS], warp[ALPHA], warp[BETA], warp[BLEND]
+    radius_b, alpha_b, beta_b, blend_b = weft[RADIUS], weft[ALPHA], weft[BETA], weft[BLEND]
+    sin_a, cos_a, sin_b, cos_b = warp[SIN_TWIST], warp[COS_TWIST], weft[SIN_TWIST], weft[COS_TWIST]
+    for k in range(count):
+        viewed, lit = seen[k], both[k]
+        is_warp = warpness[k] > _0
+        yarns = warpness[k] + weftness[k]
+        radius = radius_a if is_warp else radius_b
+        alpha = alpha_a if is_warp else alpha_b
+        beta = beta_a if is_warp else beta_b
+        blend = blend_a if is_warp else blend_b
+        sin_t = sin_a if is_warp else sin_b
+        cos_t = cos_a if is_warp else cos_b
+        # The yarn's frame.
+        ix_k, iy_k, iz_k, ox_k, oy_k, oz_k = ix[k], iy[k], iz[k], ox[k], oy[k], oz[k]
+        lix, liy = (ix_k if is_warp else iy_k), (iy_k if is_warp else -ix_k)
+        lox, loy = (ox_k if is_warp else oy_k), (oy_k if is_warp else -ox_k)
+        sv = sine[k]
+        cv = np.sqrt(max((_1 - sv) * (_1 + sv), np.float32(1e-6)))
+        su = distance[k] * curvature[k] / (_1 + radius * curvature[k] * cv)
+        su = min(max(su, -limit[k]), limit[k])
+        cu = np.sqrt((_1 - su) * (_1 + su))
+        nx, ny, nz = beta * sv, beta * su * cv, cu * cv
+        n = _1 / np.sqrt(nx * nx + ny * ny + nz * nz)
+        tx, ty, tz = -cv * sin_t, cu * cos_t + su * sv * sin_t, beta * (cu * sv * sin_t - su * cos_t)
+        t = _1 / np.sqrt(tx * tx + ty * ty + tz * tz)
+        cos_o = max((lox * nx + loy * ny + oz_k * nz) * n, _0)
+        cos_i = max((lix * nx + liy * ny + iz_k * nz) * n, _0)
+        along_i = (lix * tx + liy * ty + iz_k * tz) * t
+        along_o = (lox * tx + loy * ty + oz_k * tz) * t
+        square = alpha * alpha
+        rest = _1 - square
+        h = along_i + along_o
+        sigma_i = np.sqrt(max(_1 - rest * along_i * along_i, square))
+        sigma_o = np.sqrt(max(_1 - rest * along_o * along_o, square))
+        crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
+        # Changes of the half vector's cosine along and across the yarn, over a box around the point, as two places.
+        inner = curvature[k] / (_1 + radius * curvature[k] * cv)
+        hx, hy, hz = lix + lox, liy + loy, iz_k + oz_k
+        uy, uz = cu * sv * sin_t - su * cos_t, -beta * (cu * cos_t + su * sv * sin_t)
+        vx, vy, vz = sv * sin_t, su * cv * sin_t, beta * cu * cv * sin_t
+        du = step_y[k] * inner / cu * t * (hy * uy + hz * uz - h * t * (uy * ty + uz * tz))
+        dv = step_v[k] * t * (hx * vx + hy * vy + hz * vz - h * t * (vx * tx + vy * ty + vz * tz))
+        spread = np.sqrt(du * du + dv * dv)
+        q0, q1 = (
+            square + rest * size[k] * (h - spread) * (h - spread),
+            square + rest * size[k] * (h + spread) * (h + spread),
+        )
+        q0, q1 = q0 * q0, q1 * q1
+        flakes = _HALF * (q0 + q1) / (q0 * q1 * crossed)
+        cosines = cos_i * cos_o
+        depth = min(thickness * crossed / (cosines + _TINY), _DEEPEST)
+        wide = weight[k] / (nz * n)
+        a = wide * cos_o
+        bare = weight[k] * oz_k
+        area[k] = (a if yarns > _0 else bare) * viewed
+        lit = lit * yarns
+        faces = _1 if cos_i > _0 else _0
+        diffuse[k] = a * lit * faces * _INVERSE_PI * (blend * cos_i + (_1 - blend) * iz_k)
+        specular[k] = wide * lit * alpha * square * _FOURTH_PI * cosines * absorbed(depth) * flakes
+
+
+@kernel
+def shade_all(table: HorizonMap, count: int, lanes: Single, places: npt.NDArray[np.int32], shadows: bool) -> None:
+    """Write the shares of `count` located lanes; without `shadows` nothing hides them."""
+    if shadows:
+        uncover(
+            count, places, table.horizon, lanes[IZ], lanes[OZ], lanes[TURN_I], lanes[TURN_O], lanes[STEEPNESS],
+            lanes[SEEN], lanes[BOTH],
+        )  # fmt: skip
+    else:
+        lanes[SEEN, :count], lanes[BOTH, :count] = _1, _1
+    shade(
+        count, lanes[WEIGHT], lanes[IX], lanes[IY], lanes[IZ], lanes[OX], lanes[OY], lanes[OZ], lanes[SIZE],
+        lanes[SINE], lanes[DISTANCE], lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], lanes[SEEN],
+        lanes[BOTH], lanes[STEP_V], lanes[STEP_Y], table.yarn[0], table.yarn[1], table.thickness,
+        lanes[AREA], lanes[DIFFUSE], lanes[SPECULAR],
+    )  # fmt: skip
+
+
+@fast_kernel
+def gather(
+    count: int,
+    first: int,
+    area: Single,
+    diffuse: Single,
+    specular: Single,
+    warpness: Single,
+    weftness: Single,
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """Return the sums of area and of the four components over `count` lanes from `first` on."""
+    a, s_warp, s_weft, c_warp, c_weft = _0, _0, _0, _0, _0
+    last = first + count
+    area, diffuse, specular = area[first:last], diffuse[first:last], specular[first:last]
+    warpness, weftness = warpness[first:last], weftness[first:last]
+    for k in range(count):
+        a += area[k]
+        s_warp += specular[k] * warpness[k]
+        s_weft += specular[k] * weftness[k]
+        c_warp += diffuse[k] * warpness[k]
+        c_weft += diffuse[k] * weftness[k]
+    return a, s_warp, s_weft, c_warp, c_weft
+
+
+@fast_kernel
+def plain_sum(values: Single, count: int) -> np.float32:
+    """Return the sum of the first `count` values."""
+    total = _0
+    for k in range(count):
+        total += values[k]
+    return total
