@@ -119,6 +119,8 @@ def evaluate(
     queries: Annotated[Path, Parameter(help="Parquet file of questions, in the columns of a shard.")],
     *,
     out: Annotated[Path, Parameter(help="Parquet file to write.")],
+    model: Annotated[str | None, Parameter(help="Ask a trained model, by name or folder, not the truth.")] = None,
+    extrapolate: Annotated[bool, Parameter(help="Ask it about yarns unlike those it was trained on, too.")] = False,
     estimator: Annotated[str | None, Parameter(help="How a value is computed: auto, table, owen, mc, …")] = None,
     relative_error: Annotated[float | None, Parameter(help="Error to stop at, as a share of the value.")] = None,
     absolute_error: Annotated[float | None, Parameter(help="Or to stop at in 1/sr, for dark rows.")] = None,
@@ -144,7 +146,13 @@ def evaluate(
         frame=frame,
         normaliser=normaliser,
     )
-    answer(load_fabric(fabric), queries, out, options, seed, workers, skip_bad)
+    cloth = load_fabric(fabric)
+    other = None
+    if model is not None:
+        from jobs.answering import answerer
+
+        other = answerer(model, cloth, extrapolate)
+    answer(cloth, queries, out, options, seed, workers, skip_bad, other)
 
 
 @app.command(sort_key=6)

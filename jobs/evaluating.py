@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from jobs.tables import evaluation_table
-from pipeline.shards.evaluate import bad_list, evaluate_file
+from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput, nearest
@@ -40,9 +40,18 @@ def truth_options(**chosen: object) -> TruthOptions:
 
 
 def evaluate(
-    fabric: Fabric, queries: Path, out: Path, options: TruthOptions, seed: int, workers: int, skip_bad: bool
+    fabric: Fabric,
+    queries: Path,
+    out: Path,
+    options: TruthOptions,
+    seed: int,
+    workers: int,
+    skip_bad: bool,
+    other: Answerer | None = None,
 ) -> None:
     """Answer the questions of a file on some threads, 0: one a core, and tell in a few lines what was done.
+
+    `other` answers in place of the ground truth.
 
     Raises
     ------
@@ -67,6 +76,7 @@ def evaluate(
                 skip_bad,
                 threads=workers or os.cpu_count() or 1,
                 progress=lambda share: bars.update(bar, completed=share),
+                other=other,
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None

@@ -353,7 +353,7 @@ class BtfAutoencoderOptions(BtfOptions):
     """One autoencoder of angular samples for each fabric [Rainer2019Neural]."""
 
     of_one_material: ClassVar[bool] = True
-    seconds: ClassVar[tuple[float, float]] = (4e-5, 1.5e-6)
+    seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"
     name: Name = "btf_autoencoder"
@@ -366,7 +366,7 @@ class BtfAutoencoderOptions(BtfOptions):
 
 
 class TableOptions(_Options):
-    """The ground truth's own table as a method: sums over k nodes a yarn spacing, exact horizons; nothing is trained."""
+    """The ground truth's own table as a method: sums over k nodes a yarn spacing; nothing is trained."""
 
     learns: ClassVar[bool] = False
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
@@ -433,7 +433,7 @@ class PrefilteredOptions(_Options):
     texels_per_yarn: int = Field(default=16, ge=1, le=128)
     """Texels of the finest level along one yarn spacing, at least; a repeat's sides are powers of two."""
     widening: Literal["none", "toksvig", "lean"] = "lean"
-    """What widens the roughness: nothing, the length of the mean tangent, or the variance of the half vector's cosine."""
+    """What widens the roughness: nothing, the mean tangent's length, or the half vector's variance."""
 
 
 ModelOptions = Annotated[

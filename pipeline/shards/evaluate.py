@@ -15,7 +15,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +47,21 @@ CHUNK: Final = 2048
 """Rows that a thread answers at a time, at most; no row depends on it."""
 
 _KEY = b"twillight"
+
+
+class Answerer(NamedTuple):
+    """Something else than the ground truth that answers questions about a fabric; it states no errors.
+
+    Attributes
+    ----------
+    answer : callable
+        Takes questions, returns components (N, 4) and transparency (N,), float32. BadInput if it cannot.
+    about : dict
+        What the result's metadata says of it.
+    """
+
+    answer: Callable[[Queries], tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]
+    about: dict[str, Any]
 
 
 class Summary:
@@ -95,6 +110,7 @@ def evaluate_file(
     chunk: int = CHUNK,
     threads: int = 1,
     progress: Callable[[float], None] = lambda fraction: None,
+    other: Answerer | None = None,
 ) -> Summary:
     """Answer every row of a Parquet file; the result appears whole or not at all.
 
@@ -118,6 +134,8 @@ def evaluate_file(
         Threads that answer; kernels run without the interpreter's lock.
     progress : callable
         Told the share done.
+    other : Answerer, optional
+        Who answers in place of the ground truth. Errors are then null; `options`, `seed` and `threads` mean nothing.
 
     Raises
     ------
@@ -132,7 +150,8 @@ def evaluate_file(
         check_columns(queries, file.schema_arrow)
         if not skip_bad:
             refuse_bad(queries, file, fabric.weave.repeat)
-        schema = _schema(file.schema_arrow, _about(fabric, queries, file.schema_arrow, options, seed), skip_bad)
+        about = _about(fabric, queries, file.schema_arrow, options, seed, other)
+        schema = _schema(file.schema_arrow, about, skip_bad or other is not None)
         result = stack.enter_context(atomic_path(out))
         writer = stack.enter_context(_writer(result, schema))
         listing = None
@@ -141,7 +160,7 @@ def evaluate_file(
             listing = csv.writer(stack.enter_context(path.open("w", encoding="utf-8", newline="")))
             listing.writerow(BadRow._fields)
         summary = Summary()
-        crew = _Crew(fabric, options, seed, stack.enter_context(_threads(threads)))
+        crew = _Crew(fabric, options, seed, stack.enter_context(_threads(1 if other else threads)), other)
         for block in blocks(queries, file):
             questions, bad = questions_of(block, summary.rows, fabric.weave.repeat)
             if listing:
@@ -149,7 +168,9 @@ def evaluate_file(
             good = np.ones(len(questions.u), np.bool_)
             good[[row.row - summary.rows for row in bad]] = False
             answers = _answers(crew, questions, good, summary, chunk, file.metadata.num_rows, progress)
-            writer.write_table(pa.table([*block.columns, *_arrays(answers, good)], schema=schema), ROW_GROUP)
+            writer.write_table(
+                pa.table([*block.columns, *_arrays(answers, good, other is None)], schema=schema), ROW_GROUP
+            )
         return summary
 
 
@@ -161,12 +182,16 @@ def bad_list(out: Path) -> Path:
 class _Crew:
     """Threads that answer questions about one fabric."""
 
-    def __init__(self, fabric: Fabric, options: TruthOptions, seed: int, pool: Executor) -> None:
-        self.fabric, self.options, self.seed, self.pool = fabric, options, seed, pool
+    def __init__(
+        self, fabric: Fabric, options: TruthOptions, seed: int, pool: Executor, other: Answerer | None
+    ) -> None:
+        self.fabric, self.options, self.seed, self.pool, self.other = fabric, options, seed, pool, other
         self._met: set[tuple[bool, bool]] = set()
 
     def prepare(self, questions: Queries) -> None:
         """Load kernels and tabulate each side of the fabric that is asked about, before threads would do so at once."""
+        if self.other:
+            return
         sides = np.stack([questions.wi[:, 2] < 0, questions.wo[:, 2] < 0], axis=1)
         for row in np.unique(sides, axis=0, return_index=True)[1].tolist():
             key = bool(sides[row, 0]), bool(sides[row, 1])
@@ -179,7 +204,15 @@ class _Crew:
 
     def answers(self, runs: Iterable[tuple[Queries, int]]) -> Iterator[Answers]:
         """Answer runs of questions, each with the place of its first row in the file; in their order."""
-        return self.pool.map(lambda run: estimate(self.fabric, run[0], self.options, self.seed, run[1]), runs)
+        return self.pool.map(self._answer, runs)
+
+    def _answer(self, run: tuple[Queries, int]) -> Answers:
+        questions, first = run
+        if self.other is None:
+            return estimate(self.fabric, questions, self.options, self.seed, first)
+        mean, transparency = self.other.answer(questions)
+        nothing = np.zeros_like(mean)
+        return Answers.opaque(mean, nothing, np.zeros(len(mean), np.int32))._replace(transparency=transparency)
 
 
 @contextmanager
@@ -223,14 +256,15 @@ def _answers(
     return whole
 
 
-def _about(fabric: Fabric, path: Path, schema: pa.Schema, options: TruthOptions, seed: int) -> dict[str, Any]:
+def _about(
+    fabric: Fabric, path: Path, schema: pa.Schema, options: TruthOptions, seed: int, other: Answerer | None
+) -> dict[str, Any]:
     """Return what makes a result understood when it is read alone."""
+    truth = {"version": VERSION, "truth": options.model_dump(mode="json"), "seed": seed}
     return {
         "schema_version": SCHEMA_VERSION,
-        "version": VERSION,
         "fabric": fabric.model_dump(mode="json"),
-        "truth": options.model_dump(mode="json"),
-        "seed": seed,
+        **(truth if other is None else other.about),
         "queries": path.name,
         "queries_sha256": file_sha256(path),
         "left_out": {name: value for name, value in OPTIONAL.items() if name not in schema.names},
@@ -255,8 +289,10 @@ def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
     )
 
 
-def _arrays(answers: Answers, good: npt.NDArray[np.bool_]) -> list[pa.Array]:
-    columns = [*answers.mean.T, *answers.standard_error.T]
-    columns += [answers.transparency, answers.transparency_standard_error, answers.count]
+def _arrays(answers: Answers, good: npt.NDArray[np.bool_], errors_known: bool) -> list[pa.Array]:
+    values, errors = [*answers.mean.T], [*answers.standard_error.T]
     mask = None if good.all() else ~good
-    return [pa.array(np.ascontiguousarray(column), mask=mask) for column in columns]
+    unknown = mask if errors_known else np.ones(len(good), np.bool_)
+    columns = [(column, mask) for column in values] + [(column, unknown) for column in errors]
+    columns += [(answers.transparency, mask), (answers.transparency_standard_error, unknown), (answers.count, mask)]
+    return [pa.array(np.ascontiguousarray(column), mask=hidden) for column, hidden in columns]

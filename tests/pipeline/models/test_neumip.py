@@ -3,35 +3,12 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.neumip import Neumip, NeumipNetwork, level_shapes, read_texture
+from pipeline.models.neumip import Neumip, NeumipNetwork
 from pipeline.models.options import NeumipOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 SMALL = NeumipOptions(texels_per_yarn=4)
-
-
-def test_pyramid_halves_down_to_one_texel():
-    assert level_shapes(SMALL, (5, 2)) == [(8, 20), (4, 10), (2, 5), (1, 3), (1, 2), (1, 1)]
-    assert level_shapes(SMALL.model_copy(update={"levels": 2}), (5, 2)) == [(8, 20), (4, 10)]
-
-
-def test_texture_is_read_bilinearly_and_wraps():
-    texture = torch.arange(12.0).reshape(1, 3, 4)
-    level = [torch.zeros(4, dtype=torch.int64)]
-    # A texel's centre; half way to the next; half way across the right edge; the same a repeat further.
-    u = torch.tensor([1.5 / 4, 2.0 / 4, 1.0, 2.0])
-    v = torch.full((4,), 1.5 / 3)
-    expected = [[5.0], [5.5], [(7 + 4) / 2], [(7 + 4) / 2]]
-    torch.testing.assert_close(read_texture([texture], u, v, level), torch.tensor(expected))
-
-
-def test_levels_are_blended():
-    fine, coarse = torch.full((2, 4, 4), 1.0), torch.full((2, 2, 2), 3.0)
-    levels = [torch.tensor([0]), torch.tensor([1])]
-    shares = [torch.tensor([0.25]), torch.tensor([0.75])]
-    read = read_texture([fine, coarse], torch.tensor([0.1]), torch.tensor([0.9]), levels, shares)
-    torch.testing.assert_close(read, torch.full((1, 2), 2.5))
 
 
 def test_footprint_chooses_the_levels():
@@ -43,18 +20,6 @@ def test_footprint_chooses_the_levels():
     zero = torch.zeros(5)
     read = network._read_pyramid(zero, zero, sigma)[:, 0]
     torch.testing.assert_close(read, torch.tensor([0.0, 0.0, 0.5, 1.0, len(network.levels) - 1.0]))
-
-
-def test_blur_keeps_the_mean_and_spreads_as_a_gaussian():
-    network = NeumipNetwork(NeumipOptions(texels_per_yarn=16, blur=2.0), (4, 4)).train()
-    network.schedule(0.0)
-    texture = torch.zeros(1, 64, 64, dtype=torch.float64)
-    texture[0, 32, 32] = 1.0
-    blurred = network._blurred(texture, 0)[0]
-    distance = torch.arange(64) - 32.0
-    assert blurred.sum().item() == pytest.approx(1.0)
-    assert (blurred.sum(0) * distance**2).sum().item() == pytest.approx(4.0, rel=1e-3)
-    torch.testing.assert_close(network.eval()._blurred(texture, 0), texture)
 
 
 def test_blur_halves_and_the_offset_freezes():

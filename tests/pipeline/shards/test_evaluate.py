@@ -128,6 +128,36 @@ def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, mon
     assert case.result().equals(table)
 
 
+@pytest.mark.parametrize("estimator", ["owen", "auto"])
+def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
+    """Blocks of 64 rows in chunks of 5 from both sides, lit from both, some rows bad."""
+    case.options = OPTIONS.model_copy(update={"estimator": estimator})
+    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
+    columns = questions()
+    columns["wi_z"][::5] *= -1.0
+    columns["wo_z"][::7] *= -1.0
+    columns["sigma"][[9, 10, 200]] = 0.0
+    shares = []
+    summary = case.write(columns).run(skip_bad=True, chunk=5)
+    whole, listed = case.out.read_bytes(), bad_list(case.out).read_bytes()
+    for threads in (2, 3, 8):
+        again = case.run(skip_bad=True, chunk=5, threads=threads, progress=shares.append)
+        assert (case.out.read_bytes(), bad_list(case.out).read_bytes()) == (whole, listed)
+        assert (again.rows, again.bad, again.points) == (summary.rows, summary.bad, summary.points)
+        assert shares == sorted(shares) and shares[-1] == 1.0
+        shares.clear()
+
+
+def test_what_stops_a_thread_stops_everything(case):
+    """The table knows nothing of tiny footprints: the first such row in the file is named, whoever meets it first."""
+    case.options = OPTIONS.model_copy(update={"estimator": "table"})
+    columns = questions()
+    columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 1.0)
+    with pytest.raises(BadInput, match="row 150"):
+        case.write(columns).run(chunk=10, threads=4)
+    assert not list(case.out.parent.iterdir())
+
+
 @pytest.mark.parametrize("row_group_size", [10, 1000])
 def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, monkeypatch, row_group_size):
     case.write(questions(), row_group_size)
@@ -147,7 +177,7 @@ def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, mo
     case.run(chunk=16)
     assert [rows for rows, _ in blocks] == [64, 64, 64, 64, 44]
     assert max(nbytes for _, nbytes in blocks) <= 9 * (64 * 8 + 64 // 8)  # nine columns, and a bit a null
-    assert max(asked) == 16 and sum(asked) == ROWS + 1  # one for the compiler, outside the clock
+    assert max(asked) == 16 and sum(asked) == ROWS + 2  # two for the compiler, outside the clock
 
 
 def test_single_precision_and_missing_columns_are_what_they_stand_for(case):

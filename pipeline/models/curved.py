@@ -1,0 +1,309 @@
+"""A neural material for curved surfaces: reflectance with the curvature as an input, and opacity [Kuznetsov2022Curved].
+
+Cloth on a curved surface lies wholly below its boundary. A camera ray enters the boundary, and may leave it again
+without a hit: that share is the transparency, and it makes the silhouette. Three modules, each a texture over the
+repeat and a perceptron; the first two do not know the light:
+
+    opacity       texture 7 + wo + kappa -> 24 -> 24 -> 24 -> 1, through a sigmoid
+    offset        texture 7 + wo + kappa -> 24 -> 24 -> 24 -> 1, which shifts the centre along the view
+    reflectance   texture 7 at the shifted centre + wi + wo + kappa -> 24 -> 24 -> 24 -> 4
+
+`silhouette = "grazing"` predicts the cosine at which a ray just touches the cloth in place of the opacity, which is a
+step in it. Over a footprint that cosine has a distribution: its mean and deviation are learnt, in units of
+sqrt(kappa), from `pipeline.truth.curved.grazing_cosine`, and the opacity is that Gaussian's share below wo.z. For that
+variant gaps count as filled, as they do in its truth.
+
+The transparency of a shard is another thing: what goes straight through the cloth at the points that the viewer sees.
+So the truth of the silhouette is asked when a network is built (pipeline.models.silhouettes). ADAPTED as in `neumip`:
+four components, specular ones in log space, counts of texels and steps. The paper has one level and no footprint:
+`levels = 1` is its network.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import Domain, domain_of
+from pipeline.models.losses import to_components, to_network, weighted_error
+from pipeline.models.method import CHUNK, GPU_CHUNK, Batch, in_repeat
+from pipeline.models.options import CurvedOptions
+from pipeline.models.silhouettes import Silhouettes, View, draw_silhouettes
+from pipeline.models.texture import FEATURE_SCALE, Perceptron, level_shapes, read_pyramid, shifted
+from pipeline.truth.cloth import model_of
+from pipeline.truth.curved import has_gaps
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+_TEXTURES = ("opacity_levels", "depth", "levels")
+_SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): a step of no width cannot be learnt
+_NO_FALL = -1.0  # finite, because weights are averaged
+
+
+class CurvedNetwork(nn.Module):
+    """Textures and perceptrons of one fabric.
+
+    Parameters
+    ----------
+    options : CurvedOptions
+        The design.
+    repeat : tuple of int
+        Extent of the fabric's repeat in x and y, in yarn spacings.
+    silhouettes : Silhouettes, optional
+        What the opacity is learnt from; needed for training alone.
+    fall : float
+        Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
+    """
+
+    fall: Tensor
+
+    def __init__(
+        self,
+        options: CurvedOptions,
+        repeat: tuple[int, int],
+        silhouettes: Silhouettes | None = None,
+        fall: float = _NO_FALL,
+    ) -> None:
+        super().__init__()
+        self.options, self.repeat, self.silhouettes = options, repeat, silhouettes
+        self.register_buffer("fall", torch.tensor(fall, dtype=torch.float32))
+        shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)
+        channels, hidden, view = options.channels, options.hidden, _view_inputs(options)
+        coarse = level_shapes(options.silhouette_texels_per_yarn, options.levels, repeat)
+        self.opacity_levels = _features(channels, coarse)
+        self.opacity = Perceptron(channels + view, hidden, 2 if options.silhouette == "grazing" else 1)
+        self.levels = _features(channels, shapes)
+        self.decoder = Perceptron(channels + view + _axes(options), hidden, 4)
+        self.depth: nn.Parameter | None = None
+        self.offset: Perceptron | None = None
+        if options.offset:
+            self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
+            self.offset = Perceptron(channels + view, hidden, 1)
+        self._blur = 0.0  # standard deviation, in finest texels
+
+    def forward(self, view: View, wi: Tensor) -> Tensor:
+        """Answer in network space, (n, 4), for light from wi (n, 3)."""
+        seen = self._view(view)
+        u, v = view.u, view.v
+        if self.offset is not None and self.depth is not None:
+            here = self._read([self.depth], u, v, view.sigma)
+            u, v = shifted(self.offset(torch.cat([here, seen], dim=-1)), u, v, view.wo, self.repeat)
+        features = self._read(list(self.levels), u, v, view.sigma)
+        output: Tensor = self.decoder(torch.cat([features, seen, wi[:, : _axes(self.options)]], dim=-1))
+        return output
+
+    def cover(self, view: View) -> Tensor:
+        """Return the opacity in [0, 1], (n,)."""
+        if self.options.silhouette == "grazing":
+            mean, deviation = self.grazing(view)
+            unit = view.curvature.sqrt().clamp_min(1e-6)  # on flat cloth every ray sinks: 1
+            share: Tensor = torch.special.ndtr((view.wo[:, 2] / unit - mean) / deviation)
+        else:
+            share = torch.sigmoid(self._silhouette(view)[:, 0])
+        if not self.options.certain:
+            return share
+        # A ray so steep that it sinks below every yarn has hit one: tan^2 >= 2 kappa fall.
+        cosine = view.wo[:, 2].square()
+        sinks = cosine >= 2.0 * view.curvature * self.fall * (1.0 - cosine)
+        return torch.where(sinks & (self.fall >= 0.0), torch.ones_like(share), share)
+
+    def grazing(self, view: View) -> tuple[Tensor, Tensor]:
+        """Return mean and deviation (n,) of the cosine at which a ray just touches, in units of sqrt(kappa)."""
+        mean, width = self._silhouette(view).unbind(dim=-1)
+        return mean, _SHARPEST + functional.softplus(width)
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the weighted squared error of the components, and the silhouette's own loss at random questions."""
+        options = self.options
+        ends, picks = self.repeat
+        columns = (batch.u / ends, batch.v / picks, batch.sigma, batch.wo, batch.curvature)
+        view = View(*(column.flatten(0, 1) for column in columns))
+        target = to_network(batch.target.flatten(0, 1), options.log_k)
+        output = self(view, batch.wi.flatten(0, 1))
+        error = weighted_error(output, target, options.specular_weight, options.diffuse_weight)
+        if self.silhouettes is None or options.silhouette_weight == 0:
+            return error
+        return error + options.silhouette_weight * self._edge_loss(*self.silhouettes.draw(len(view.u), random))
+
+    def _edge_loss(self, view: View, target: Tensor) -> Tensor:
+        """Cross entropy of opacities; or minus the log likelihood of grazing cosines, above the sharpest Gaussian's."""
+        if self.options.silhouette == "opacity":
+            return functional.binary_cross_entropy_with_logits(self._silhouette(view)[:, 0], target[:, 0])
+        mean, deviation = self.grazing(view)
+        square = (target[:, 0] - mean).square() + target[:, 1]
+        return ((deviation / _SHARPEST).log() + 0.5 * square / deviation.square()).mean()
+
+    def start_at(self, target: Tensor) -> None:
+        """Set the last bias to the mean target."""
+        with torch.no_grad():
+            last = self.decoder[-1]
+            assert isinstance(last, nn.Linear)
+            last.bias.copy_(to_network(target, self.options.log_k).mean(dim=0))
+
+    def schedule(self, progress: float) -> None:
+        """Halve the blur again and again, and freeze the offset texture, at `progress` in [0, 1)."""
+        options = self.options
+        self._blur = options.blur * 2.0 ** (-progress / options.blur_halving)
+        if self.depth is not None:
+            self.depth.requires_grad_(progress < options.offset_frozen)
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return two groups: perceptrons at `rate`, textures faster."""
+        textures = [weight for name, weight in self.named_parameters() if name.split(".")[0] in _TEXTURES]
+        chosen = {id(weight) for weight in textures}
+        others = [weight for weight in self.parameters() if id(weight) not in chosen]
+        return [{"params": others, "lr": rate}, {"params": textures, "lr": rate * self.options.texture_rate}]
+
+    def architecture(self) -> dict[str, Any]:
+        """Count parameters and name the layers."""
+        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
+        total = sum(math.prod(shape) for shape in layers.values())
+        textures = sum(math.prod(shape) for name, shape in layers.items() if name.split(".")[0] in _TEXTURES)
+        counts = {"textures": textures, "perceptrons": total - textures, "total": total}
+        return {"parameters": counts, "layers": layers}
+
+    def _silhouette(self, view: View) -> Tensor:
+        texels = self.options.silhouette_texels_per_yarn
+        features = self._read(list(self.opacity_levels), view.u, view.v, view.sigma, texels)
+        if self.options.silhouette == "grazing":
+            # The edge lies in a direction, not at an angle: of the view its azimuth alone.
+            level = functional.normalize(view.wo * view.wo.new_tensor([1.0, 1.0, 0.0]), dim=-1, eps=1e-6)
+            view = view._replace(wo=level)
+        output: Tensor = self.opacity(torch.cat([features, self._view(view)], dim=-1))
+        return output
+
+    def _view(self, view: View) -> Tensor:
+        """Return what the perceptrons see of viewer and curvature."""
+        options, curvature = self.options, view.curvature.unsqueeze(-1)
+        seen = [view.wo[:, : _axes(options)], curvature if options.curvature_input == "linear" else curvature.sqrt()]
+        if options.curvature_input == "touch":
+            square = view.wo[:, 2:].square()
+            seen.append((square / (square + 2.0 * curvature * (1.0 - square)).clamp_min(1e-12)).sqrt())
+        return torch.cat(seen, dim=-1)
+
+    def _read(self, levels: list[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels: int = 0) -> Tensor:
+        finest = self.options.texels_per_yarn
+        texels = texels or finest
+        blur = self._blur * texels / finest if self.training else 0.0
+        return read_pyramid(levels, u, v, sigma, texels, blur)
+
+
+def _features(channels: int, shapes: Sequence[tuple[int, int]]) -> nn.ParameterList:
+    return nn.ParameterList(nn.Parameter(FEATURE_SCALE * torch.randn(channels, *shape)) for shape in shapes)
+
+
+def _axes(options: CurvedOptions) -> int:
+    return 3 if options.directions == "vector" else 2
+
+
+def _view_inputs(options: CurvedOptions) -> int:
+    return _axes(options) + (2 if options.curvature_input == "touch" else 1)
+
+
+class Curved:
+    """Trained materials for curved surfaces, one network for each fabric.
+
+    Parameters
+    ----------
+    name : str
+        Name of the method.
+    networks : dict
+        From the fingerprint of a fabric's optics to its network.
+    domain : Domain, optional
+        What they were taught; anything if left out.
+    device : torch.device
+        Where they compute.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        networks: dict[str, CurvedNetwork],
+        domain: Domain | None = None,
+        device: torch.device | None = None,
+    ) -> None:
+        self.name, self.setting, self.domain = name, "", domain
+        self._device = device or torch.device("cpu")
+        self._networks = {key: network.eval().to(self._device) for key, network in networks.items()}
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Tell whether this fabric was trained."""
+        return fingerprint(fabric.optics()) in self._networks
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Do nothing: the textures are in memory."""
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        network = self._asked(fabric, queries)
+        return self._in_chunks(
+            fabric, queries, lambda view, wi: to_components(network(view, wi), network.options.log_k)
+        )
+
+    def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
+        network = self._asked(fabric, queries)
+        return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1))[:, 0]
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of textures and perceptrons, float32."""
+        return 4 * sum(weight.numel() for weight in self._networks[fingerprint(fabric.optics())].parameters())
+
+    def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
+        """Return the fabric's network; BadInput for what it was not taught."""
+        network = self._networks[fingerprint(fabric.optics())]
+        limit = network.options.largest_curvature
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+            limit = min(limit, self.domain.queries.curvature[1])
+        beyond = np.flatnonzero(queries.curvature > limit * (1.0 + 1e-6))
+        if beyond.size:
+            where, value = f"curvature[{beyond[0]}]", float(queries.curvature[beyond[0]])
+            raise BadInput("queries", where, value, f"the model {self.name} was trained up to {limit:g} only")
+        return network
+
+    def _in_chunks(
+        self, fabric: Fabric, queries: Queries, answer: Callable[[View, Tensor], Tensor]
+    ) -> npt.NDArray[np.float32]:
+        """Answer some rows at a time, without gradients; a chunk is what the cache holds."""
+        near = in_repeat(queries, fabric.weave.repeat)
+        columns = (near.u, near.v, near.sigma, near.wo, near.curvature, near.wi)
+        chunk = CHUNK if self._device.type == "cpu" else GPU_CHUNK
+        # One chunk at least, so that no rows have answers of the right width too.
+        answers = []
+        with torch.inference_mode():
+            for start in range(0, max(len(near.u), 1), chunk):
+                rows = slice(start, start + chunk)
+                *view, wi = (torch.from_numpy(np.array(c[rows], np.float32)).to(self._device) for c in columns)
+                answers.append(answer(View(*view), wi).numpy(force=True))
+        return np.concatenate(answers)
+
+
+def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
+    """Return an untrained network with its questions about the silhouette; there must be exactly one fabric."""
+    (fabric,) = fabrics
+    front = model_of(fabric, TruthOptions()).front
+    fall = _NO_FALL if has_gaps(front) else float(front.highest - front.lowest)
+    return CurvedNetwork(options, fabric.weave.repeat, draw_silhouettes(options, fabric), fall)
+
+
+def restore(options: CurvedOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Curved]:
+    """Return one method that holds all trained fabrics."""
+    networks, domain = {}, None
+    for card, weights in trained:
+        domain = domain_of(card)
+        (fabric,) = card["fabrics"]
+        ends, picks = fabric["repeat"]
+        networks[fabric["optics"]] = CurvedNetwork(options, (ends, picks))
+        networks[fabric["optics"]].load_state_dict(weights)
+    return [Curved(options.name, networks, domain)]

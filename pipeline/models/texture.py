@@ -1,0 +1,148 @@
+"""Neural textures over one repeat: pyramids of features that wrap, read bilinearly, and blurred early in a training.
+
+Level 0 is the finest; each following one is half as fine. A footprint sigma reads between the two levels around
+log2(sigma / sigma_0), sigma_0 = half a finest texel, with linear weights. The blur is a Gaussian around the repeat, and
+is annealed, so that coarse structure is learnt first [Kuznetsov2021NeuMIP].
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+FEATURE_SCALE = 0.1
+"""Standard deviation of the first features."""
+
+_NO_BLUR = 0.25  # standard deviation, in texels, below which a blur is skipped
+_DEPTH_SCALE = 0.1
+_STEEPEST = 0.6  # smallest wo.z that parallax is computed with
+
+
+class Perceptron(nn.Sequential):
+    """Three hidden layers of ReLU."""
+
+    def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
+        widths = [inputs, hidden, hidden, hidden]
+        layers: list[nn.Module] = []
+        for a, b in itertools.pairwise(widths):
+            layers += [nn.Linear(a, b), nn.ReLU()]
+        super().__init__(*layers, nn.Linear(hidden, outputs))
+        for layer in self:
+            if isinstance(layer, nn.Linear):
+                nn.init.kaiming_normal_(layer.weight)
+                nn.init.zeros_(layer.bias)
+
+
+def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
+    """Return (rows, columns) of each level over a repeat (ends, picks), finest first, each half as fine, at least 1.
+
+    With `levels` 0 they go down to one texel.
+    """
+    columns, rows = (extent * texels_per_yarn for extent in repeat)
+    shapes = [(rows, columns)]
+    while shapes[-1] != (1, 1) and len(shapes) != levels:
+        shapes.append((math.ceil(shapes[-1][0] / 2), math.ceil(shapes[-1][1] / 2)))
+    return shapes
+
+
+def shifted(output: Tensor, u: Tensor, v: Tensor, wo: Tensor, repeat: tuple[int, int]) -> tuple[Tensor, Tensor]:
+    """Shift centres u, v (n,), in repeats, along the view as parallax does.
+
+    The shift is 0.1 output wo.xy / max(wo.z, 0.6), in mean sides of the repeat; `output` (n, 1) is the learnt depth.
+    """
+    shift = _DEPTH_SCALE * output * wo[:, :2] / wo[:, 2:].clamp_min(_STEEPEST)
+    ends, picks = repeat
+    side = math.sqrt(ends * picks)
+    return u + shift[:, 0] * (side / ends), v + shift[:, 1] * (side / picks)
+
+
+def blurred(texture: Tensor, deviation: float) -> Tensor:
+    """Blur a texture (channels, rows, columns) around the repeat, exactly, in the frequency domain.
+
+    `deviation` is the Gaussian's, in texels; below a quarter nothing is done.
+    """
+    if deviation < _NO_BLUR or texture.shape[-2:].numel() == 1:
+        return texture
+    rows, columns = texture.shape[-2:]
+    spectrum = torch.fft.rfft2(texture)
+    frequency = (
+        torch.fft.fftfreq(rows, device=texture.device).square().unsqueeze(-1)
+        + torch.fft.rfftfreq(columns, device=texture.device).square()
+    )
+    decay = torch.exp(-2.0 * math.pi**2 * deviation**2 * frequency)
+    smooth: Tensor = torch.fft.irfft2(spectrum * decay, s=(rows, columns))
+    return smooth
+
+
+def read_pyramid(
+    levels: Sequence[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels_per_yarn: int, blur: float = 0.0
+) -> Tensor:
+    """Read a pyramid at footprints: (n, channels).
+
+    Parameters
+    ----------
+    levels : sequence of Tensor (channels, rows, columns)
+        Finest first.
+    u, v : Tensor (n,)
+        Where to read, in repeats.
+    sigma : Tensor (n,)
+        Footprint, in yarn spacings.
+    texels_per_yarn : int
+        Texels of the finest level along one yarn spacing.
+    blur : float
+        Standard deviation of the blur, in finest texels.
+    """
+    level = torch.log2(sigma / (0.5 / texels_per_yarn)).clamp(0.0, len(levels) - 1.0)
+    below = level.floor().clamp_max(max(len(levels) - 2, 0))
+    share = (level - below).unsqueeze(-1)
+    low = below.to(torch.int64)
+    textures = [blurred(texture, blur / 2**index) for index, texture in enumerate(levels)]
+    if len(textures) == 1:
+        return read_texture(textures, u, v, [low])
+    return read_texture(textures, u, v, [low, low + 1], [1.0 - share[:, 0], share[:, 0]])
+
+
+def read_texture(
+    textures: list[Tensor], u: Tensor, v: Tensor, levels: list[Tensor], shares: list[Tensor] | None = None
+) -> Tensor:
+    """Read wrapped textures bilinearly and blend levels.
+
+    Parameters
+    ----------
+    textures : list of Tensor (channels, rows, columns)
+        Textures over one repeat; texel (r, c) has its centre at v = (r + 1/2)/rows, u = (c + 1/2)/columns.
+    u, v : Tensor (n,)
+        Where to read, in repeats; any real number.
+    levels : list of int64 Tensor (n,)
+        Textures to read for each query.
+    shares : list of Tensor (n,), optional
+        Weight of each entry of `levels`; 1 if left out.
+
+    Returns
+    -------
+    Tensor (n, channels)
+    """
+    table = torch.cat([texture.flatten(1) for texture in textures], dim=1).t().contiguous()
+    rows, columns = (torch.tensor([t.shape[axis] for t in textures], device=u.device) for axis in (-2, -1))
+    start = functional.pad((rows * columns).cumsum(0), (1, 0))[:-1]
+    indices, weights = [], []
+    for position, level in enumerate(levels):
+        height, width, first = rows[level], columns[level], start[level]
+        x, y = u * width - 0.5, v * height - 0.5
+        left, low = x.floor(), y.floor()
+        right_share, up_share = x - left, y - low
+        column, row = left.to(torch.int64), low.to(torch.int64)
+        share = 1.0 if shares is None else shares[position]
+        for dy, weight_y in ((0, 1.0 - up_share), (1, up_share)):
+            of_row = first + torch.remainder(row + dy, height) * width
+            for dx, weight_x in ((0, 1.0 - right_share), (1, right_share)):
+                indices.append(of_row + torch.remainder(column + dx, width))
+                weights.append(weight_x * weight_y * share)
+    return functional.embedding_bag(
+        torch.stack(indices, -1), table, per_sample_weights=torch.stack(weights, -1), mode="sum"
+    )
