@@ -15,6 +15,7 @@ from pipeline.models.registry import load_methods
 from pipeline.shards.manifest import Manifest
 from reports.bench import measure_errors, measure_timing, measure_truth
 from reports.frames import measure_aliasing, measure_truth_frames, render_frames
+from reports.furnace import measure_furnace
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
@@ -55,6 +56,7 @@ def method(task: Task, out: Path, progress: Progress) -> None:
     methods = _methods(setting["model"], setting["models"], out)
     for index, one in enumerate(methods):
         records += measure_errors(one, manifest, folder, name, role, options, provenance)
+        records += measure_furnace(one, fabric, role, provenance)
         records += measure_aliasing(one, fabric, role, options, out / setting["truth"]["frames"], provenance)
         for scene, path in setting["pictures"].get(one.setting, {}).items():
             reference = out / setting["truth"][scene]

@@ -35,13 +35,13 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
             {
                 "method": row.method,
                 "label": display(row.method, row.setting) + (" *" if known else ""),
-                "baseline": row.setting == BASELINE,
+                "baseline": (row.method, row.setting) == BASELINE,
                 "cells": [
                     scientific(row.mse),
                     f"{scientific(row.low)} … {scientific(row.high)}",
                     percent(row.noise_share),
-                    times(row.ratio) if row.setting != BASELINE else "1",
-                    _interval(row.ratio_low, row.ratio_high) if row.setting != BASELINE else NONE,
+                    times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
+                    _interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
                     fixed(row.colour_rrmse),
                     *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
                 ],
@@ -69,7 +69,7 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     for row in rows(aliasing):
         key = (row.method, row.setting)
         found = lines.setdefault(key, {"method": row.method, "label": display(*key), "by_role": {}})
-        found["baseline"] = row.setting == BASELINE
+        found["baseline"] = (row.method, row.setting) == BASELINE
         found["by_role"][row.role] = [signed(row.flicker), signed(row.excess_energy)]
     return {
         "rows": list(lines.values()),
@@ -78,13 +78,26 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     }
 
 
+def energy_rows(energy: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of energies; what sends back more than arrives is marked."""
+    return [
+        {
+            "method": row.method,
+            "label": display(row.method, row.setting),
+            "baseline": (row.method, row.setting) == BASELINE,
+            "cells": [f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in (row.diffuse, row.specular, row.colour)],
+        }
+        for row in rows(energy)
+    ]
+
+
 def timing_rows(timing: pd.DataFrame) -> list[Row]:
     """Return the rows of the timing table."""
     return [
         {
             "method": row.method,
             "label": display(row.method, row.setting),
-            "baseline": row.setting == BASELINE,
+            "baseline": (row.method, row.setting) == BASELINE,
             "cells": [
                 f"{row.median_ns:,.0f}",
                 f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",

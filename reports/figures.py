@@ -19,7 +19,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from reports.aliasing import HALF_NYQUIST
 from reports.record import TRUTH
 from reports.style import Scheme, display, new_figure
-from reports.summary import BASELINE, PAPER, rows
+from reports.summary import PAPER, of_baseline, rows
 
 _ROLES: Final = ("seen", "unseen")
 
@@ -88,7 +88,7 @@ def error_against_time(scheme: Scheme, table: pd.DataFrame, timing: pd.DataFrame
                 fontweight="normal" if points else "bold", color=colours[row.method],
                 path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)],
             )  # fmt: skip
-        for row in rows(joined[joined["setting"] == BASELINE]):
+        for row in rows(joined[of_baseline(joined)]):
             _paper_arrow(axes, scheme, row.median_ns, row.mse)
         axes.set(
             title=f"{role.capitalize()} fabrics", xlabel="time of a query, ns (one process, side by side)",

@@ -104,6 +104,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "pictures": summary.picture_table(page.records),
         "aliasing": summary.aliasing_table(page.records),
         "timing": summary.timing_table(page.records),
+        "energy": summary.energy_table(page.records),
     }
     findings = from_records(page.records)
     if findings:
@@ -199,6 +200,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         errors=cells.error_rows(errors, per_material),
         by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
         aliasing=cells.aliasing_rows(tables["aliasing"], page.records),
+        energy=cells.energy_rows(tables["energy"]),
         timing=cells.timing_rows(timing),
         stability=cells.stability_rows(findings),
         rates=cells.rate_rows(page.records),

@@ -16,8 +16,8 @@ import pandas as pd
 from reports.metrics import ratio
 from reports.record import TRUTH, Record, to_table
 
-BASELINE: Final = "k = 2"
-"""Setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
+BASELINE: Final = ("point_sampled", "k = 2")
+"""Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
 
 PAPER: Final = (4.1, 0.83)
 """How much lower the published network's MSE is, and its time relative to the baseline's [Chen2024Woven]."""
@@ -25,6 +25,11 @@ PAPER: Final = (4.1, 0.83)
 COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
 
 _KEYS: Final = ["method", "setting"]
+
+
+def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
+    """Say which rows of a table with `method` and `setting` are the baseline's."""
+    return (table["method"] == BASELINE[0]) & (table["setting"] == BASELINE[1])
 
 
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -84,6 +89,17 @@ def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
     return table.reset_index()
 
 
+def energy_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the worst furnace figures over all fabrics, one row a method: diffuse, specular, colour, fabrics."""
+    wide = _wide(records, "queries")
+    names = [name for name in wide.columns if str(name).startswith("furnace_")]
+    if not names:
+        return pd.DataFrame(columns=[*_KEYS, "diffuse", "specular", "colour", "fabrics"])
+    groups = wide[wide[names[0]].notna()].groupby(_KEYS, sort=False)
+    worst = {name: (f"furnace_{name}", "max") for name in ("diffuse", "specular", "colour")}
+    return groups.agg(**worst, fabrics=("fabric", "size")).reset_index()
+
+
 def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the cost of a query: median and quartiles in nanoseconds, bytes stored, time over that of 2 points."""
     table = to_table(records)
@@ -93,7 +109,7 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
         columns={"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
     )
     result = result.join(stored).reset_index()
-    base = result.loc[result["setting"] == BASELINE, "median_ns"]
+    base = result.loc[of_baseline(result), "median_ns"]
     result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
     return result
 
@@ -164,5 +180,5 @@ def _mean_error(group: pd.DataFrame) -> tuple[float, float]:
 
 def _baseline(wide: pd.DataFrame, role: object, fabrics: set[str]) -> pd.DataFrame:
     """Return the baseline's rows; empty unless it was measured on every one of the fabrics."""
-    rows = wide[(wide["setting"] == BASELINE) & (wide["role"] == role) & wide["fabric"].isin(fabrics)]
+    rows = wide[of_baseline(wide) & (wide["role"] == role) & wide["fabric"].isin(fabrics)]
     return rows if set(rows["fabric"]) == fabrics else rows.iloc[:0]

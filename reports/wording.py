@@ -15,7 +15,7 @@ from pipeline.scenes.options import ViewOptions
 from reports.options import BenchOptions
 from reports.record import TRUTH
 from reports.style import display
-from reports.summary import BASELINE, PAPER, rows
+from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
 
 DEFINITIONS: Final = {
@@ -64,7 +64,7 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
 def learnt(errors: pd.DataFrame) -> list[tuple[str, str]]:
     """Return the methods that are not point sampling."""
     keys = dict.fromkeys(zip(errors["method"], errors["setting"], strict=True))
-    baseline = {method for method, setting in keys if setting == BASELINE}
+    baseline = {key[0] for key in keys if key == BASELINE}
     return [key for key in keys if key[0] not in baseline and key[0] != TRUTH]
 
 
@@ -84,7 +84,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
         f"in full colour from ±{DIFFERENCE_RANGE:.0%} of the truth's mean.",
     ]
-    black = errors[(errors["setting"] == BASELINE) & (errors["zero_answers"] > 0)] if len(errors) else errors
+    black = errors[of_baseline(errors) & (errors["zero_answers"] > 0)] if len(errors) else errors
     if len(black):
         share = float(black["zero_answers"].mean())
         notes.append(

@@ -1,0 +1,71 @@
+"""The white furnace: how much of even light from everywhere a method sends back; never more than arrives.
+
+    E(wo) = integral of f_P(wi, wo) over all wi on the viewer's side = 2 pi <f_P> over directions even in solid angle
+
+The directions are a shifted R2 sequence, the same for every method. Three figures, each the worst over positions,
+footprints and angles of the viewer: the diffuse components with k_d = 1, the specular ones with k_s = 1, the brightest
+channel of the fabric in its own colours.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pipeline.scenes.shade import colours
+from pipeline.truth.query import Queries
+from reports.record import Metric, Provenance, Record, Role
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
+"""Angles of the viewer to the normal, degrees."""
+
+FOOTPRINTS: Final = (0.06, 0.3, 1.5, 8.0)
+"""Standard deviations, yarn spacings."""
+
+DIRECTIONS: Final = 256
+"""Directions of light for each patch: an integral of a highlight of alpha = .1 is good to about 1 %."""
+
+_AZIMUTHS = (0.4, 2.1)
+_PLACES = 4
+_METRICS: Final[tuple[Metric, ...]] = ("furnace_diffuse", "furnace_specular", "furnace_colour")
+
+
+def furnace_queries(repeat: tuple[int, int]) -> Queries:
+    """Return the questions: `DIRECTIONS` lights in turn for every patch."""
+    steps = np.arange(1, DIRECTIONS + 1)[:, None] * (0.7548776662466927, 0.5698402909980532)
+    z, turn = (0.5 + steps).T % 1.0
+    z = np.maximum(z, 1e-3)
+    sine, turn = np.sqrt(1.0 - z * z), 2.0 * math.pi * turn
+    wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
+    places = np.random.default_rng(0).random((_PLACES, 2)) * repeat
+    patches = list(itertools.product(places.tolist(), FOOTPRINTS, ANGLES, _AZIMUTHS))
+    centre = np.array([[*place, sigma] for place, sigma, _, _ in patches])
+    theta, phi = np.radians([p[2] for p in patches]), np.array([p[3] for p in patches])
+    wo = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    u, v, sigma = (np.repeat(column, DIRECTIONS).astype(np.float32) for column in centre.T)
+    every = np.tile(wi, (len(patches), 1)).astype(np.float32)
+    return Queries.round(u, v, sigma, every, np.repeat(wo, DIRECTIONS, axis=0).astype(np.float32))
+
+
+def measure_furnace(method: Method, fabric: Fabric, role: Role, provenance: Provenance | None = None) -> list[Record]:
+    """Return the three worst figures of a method on a fabric."""
+    method.prepare(fabric)
+    values = method.predict(fabric, furnace_queries(fabric.weave.repeat), 0).astype(np.float64)
+    energy = 2.0 * math.pi * values.reshape(-1, DIRECTIONS, 4).mean(axis=1)
+    figures = (energy[:, 2:].sum(axis=1), energy[:, :2].sum(axis=1), (energy @ colours(fabric)).max(axis=1))
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric.name,
+        role=role,
+        scene="queries",
+        provenance=provenance or Provenance(),
+    )
+    return [subject.of(m, float(x.max()), len(x)) for m, x in zip(_METRICS, figures, strict=True)]
