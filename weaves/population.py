@@ -80,6 +80,8 @@ class Population(BaseModel):
         default=("plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"), min_length=1
     )
     """Weave families, equally likely; write one twice to double its share."""
+    solid: float = Field(default=0.0, ge=0, le=1)
+    """Share of the fabrics whose yarns are as wide as their spacing, whatever the ranges say."""
     exclude: tuple[str, ...] = ()
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
     plain: Ranges = Ranges()
@@ -123,6 +125,8 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
     ends, picks = draft.repeat
     shift = int(random() * ends), int(random() * picks)
     ranges = _ranges(population, family)
+    # A stream of its own, so that the other numbers are what they were without it.
+    solid = np.random.default_rng([population.seed, index, 1]).random() < population.solid
 
     def between(bounds: Range) -> float:
         # Six decimals: a number that a person can copy from a manifest.
@@ -131,10 +135,11 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
     def spin(roughness: Range, twist: float) -> Yarn:
         low, high = np.sqrt(roughness).tolist()
         alpha = min(max(round(between((low, high)) ** 2, 6), roughness[0]), roughness[1])
+        relief, width = between(ranges.relief), between(ranges.width)
         return Yarn(
             roughness=alpha,
-            relief=between(ranges.relief),
-            width=between(ranges.width),
+            relief=relief,
+            width=1.0 if solid else width,
             bend=between(ranges.bend),
             twist=twist,
         )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from weaves.fabric import Fabric
 from weaves.population import FamilyName, Population, Ranges, population_fabrics
@@ -87,3 +88,20 @@ def test_families_are_equally_likely():
 def test_a_population_without_drafts_is_refused():
     with pytest.raises(ValueError, match="at least one draft must be left"):
         Population(count=1, families=("plain",), exclude=("plain",))
+
+
+def test_a_share_of_solid_cloth_changes_nothing_but_widths():
+    """A binomial test at .1 % on the share; all else is as without it."""
+    narrow = Ranges(width=(0.6, 0.9))
+    loose, mixed = (
+        Population(count=200, seed=3, solid=solid, plain=narrow, twill=narrow, satin=narrow) for solid in (0.0, 0.4)
+    )
+    pairs = list(zip(population_fabrics(loose), population_fabrics(mixed), strict=True))
+    solid = [b for _, b in pairs if b.warp.width == b.weft.width == 1.0]
+    assert stats.binomtest(len(solid), 200, 0.4).pvalue > 1e-3
+    for a, b in pairs:
+        same = {
+            "warp": b.warp.model_copy(update={"width": a.warp.width}),
+            "weft": b.weft.model_copy(update={"width": a.weft.width}),
+        }
+        assert b.model_copy(update=same) == a
