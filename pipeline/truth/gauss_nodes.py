@@ -58,7 +58,7 @@ from pipeline.truth.kernel import fast_kernel, kernel
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import HIDDEN_SHARE, Queries
 from pipeline.truth.single import remaining
-from pipeline.truth.table import _orbits as orbits
+from pipeline.truth.table import orbits
 from weaves.fabric import Fabric
 
 NARROW: Final = 0.25

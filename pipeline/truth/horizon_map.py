@@ -27,7 +27,7 @@ from pipeline.truth.heightfield import (
     HeightField,
 )
 from pipeline.truth.horizon import horizons
-from pipeline.truth.table import _orbits as orbits
+from pipeline.truth.table import orbits
 
 Single = npt.NDArray[np.float32]
 

@@ -118,12 +118,12 @@ def tabulate(
         Resolution; 0 nodes: as many as the number of different cells asks for.
     """
     picks, ends = front.top.shape
-    orbits = _orbits(front.top)
-    nodes = nodes or _resolution(len(orbits), coarse)
+    alike = orbits(front.top)
+    nodes = nodes or _resolution(len(alike), coarse)
     kinds: list[tuple[float, ...]] = []
     rows, copies, grids = [], [], []
     start, fine_start = 0, 0
-    for orbit in orbits:
+    for orbit in alike:
         pick, end = orbit[0]
         for family, x_edges, y_edges in _pieces(front, pick, end, nodes):
             for edges in (x_edges, y_edges):
@@ -158,7 +158,7 @@ def tabulate(
         fine=_surface(front, fine_x, fine_y),
         slope=slope,
         slope_behind=slope_behind,
-        uniform=_FADED * _longest_period(front.top),
+        uniform=_FADED * longest_period(front.top),
     )
 
 
@@ -181,21 +181,21 @@ def _translations(shape: tuple[int, int], top: bytes) -> tuple[tuple[int, int], 
     return tuple(shift for shift in np.ndindex(shape) if np.array_equal(np.roll(cloth, shift, (0, 1)), cloth))
 
 
-def _orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
+def orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
     """Group the cells (pick, end) that translations of the cloth onto itself carry into one another."""
     picks, ends = top.shape
     steps = _translations(top.shape, top.tobytes())
     left = dict.fromkeys(np.ndindex(picks, ends))
-    orbits = []
+    found = []
     while left:
         pick, end = next(iter(left))
-        orbits.append([((pick + p) % picks, (end + e) % ends) for p, e in steps])
-        for cell in orbits[-1]:
+        found.append([((pick + p) % picks, (end + e) % ends) for p, e in steps])
+        for cell in found[-1]:
             del left[cell]
-    return orbits
+    return found
 
 
-def _longest_period(top: npt.NDArray[np.int8]) -> float:
+def longest_period(top: npt.NDArray[np.int8]) -> float:
     """Return the wavelength of the slowest wave that the translations of a cloth onto itself leave."""
     picks, ends = top.shape
     steps = _translations(top.shape, top.tobytes())

@@ -36,14 +36,14 @@ def by_waves(table, x, y, deviation_x, deviation_y):
 @pytest.mark.parametrize("name", ["denim", "satin_8", "herringbone"])
 @pytest.mark.parametrize("stretch", [1.0, 1.7])
 def test_waves_are_the_gaussian_over_all_images(name, stretch):
-    """Both lose up to 1 %: waves the faint ones, products the tails."""
+    """To a tenth of the largest: several waves of 1 % are missing, and tails of up to 3.4 % of the peak are cut off."""
     table = tabulate(load_fabric(name))
     narrow = max(table.waves_from, 0.3)
-    for x, y in ((0.3, 0.7), (2.9, 1.2)):
-        waves, products = (of(table, x, y, narrow, stretch * narrow) for of in (by_waves, by_products))
-        assert np.abs(waves - products).max() < 0.05 * table.evenly.max()
-        assert np.abs(waves - table.evenly).max() > 0.1 * table.evenly.max()  # far from even: the test can fail
-        assert waves.sum() == pytest.approx(1.0, abs=0.02)
+    for x, y, deviation in ((0.3, 0.7, narrow), (2.9, 1.2, 1.3 * narrow)):
+        waves, products = (of(table, x, y, deviation, stretch * deviation) for of in (by_waves, by_products))
+        assert np.abs(waves - products).max() < 0.1 * table.evenly.max()
+        assert np.abs(waves - table.evenly).max() > 0.2 * table.evenly.max()  # far from even: the test can fail
+        assert waves.sum() == pytest.approx(1.0, abs=0.03)
         assert products.sum() == pytest.approx(1.0, abs=0.03)
 
 

@@ -1,0 +1,215 @@
+"""Sums over few nodes, corrected by a small network: one network for all fabrics and scales.
+
+What a cloth does to light is known; only its hidden nodes are too many. `pipeline.truth.sums` answers a query by the
+point model over tens of nodes with softened horizons, and says on the way how much of the answer is in doubt. A narrow
+perceptron reads that and puts out four factors, one for each component that the sums alone give:
+
+    features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the sums
+
+Factors lie between 0 and 2 and begin at 1: before the first step the network is the sums, and however little it has
+learnt of a cloth, its colours, highlights and repeat are the cloth's own. What the fabric alone decides, 10 of the 40
+features, folds into a bias. Mirror images need not be learnt, because features know none; exchanging warp and weft is
+taught by exchanging them in half of all steps.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import Domain, domain_of
+from pipeline.models.method import CHUNK, Batch
+from pipeline.models.options import SelvageOptions
+from pipeline.models.sums import Tables, refuse
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.query import Queries
+from pipeline.truth.sums.features import (
+    EXCHANGED,
+    EXCHANGED_SIGN,
+    FEATURES,
+    OF_QUERY,
+    cloth_features,
+    read_queries,
+)
+from pipeline.truth.sums.table import Table, tabulate
+from weaves.fabric import Fabric
+
+_SLOPE = 0.01
+_LARGEST = 2.0  # factor
+_STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
+_LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
+_COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
+
+
+class SelvageNetwork(nn.Module):
+    """The correcting network, with the cloth it is trained on.
+
+    Parameters
+    ----------
+    options : SelvageOptions
+        The design.
+    fabrics : sequence of Fabric
+        Training fabrics, addressed by index in batches; none for inference.
+    """
+
+    def __init__(self, options: SelvageOptions, fabrics: Sequence[Fabric] = ()) -> None:
+        super().__init__()
+        self.options = options
+        sizes = [FEATURES] + [options.width] * options.layers
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in itertools.pairwise(sizes))
+        self.last = nn.Linear(options.width, 4)
+        nn.init.zeros_(self.last.weight)
+        nn.init.zeros_(self.last.bias)
+        self.mean: Tensor
+        self.scale: Tensor
+        self.register_buffer("mean", torch.zeros(FEATURES))
+        self.register_buffer("scale", torch.ones(FEATURES))
+        self._tables = [tabulate(fabric) for fabric in fabrics]
+        if fabrics:
+            self._measure(fabrics)
+
+    def forward(self, features: Tensor, components: Tensor) -> Tensor:
+        """Return components (n, 4) from features (n, FEATURES) and the components (n, 4) that the sums give."""
+        x = (features - self.mean) * self.scale
+        for layer in self.hidden:
+            x = functional.leaky_relu(layer(x), _SLOPE)
+        factors: Tensor = _LARGEST * torch.sigmoid(self.last(x))
+        return components * factors
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the squared errors of components and colour, over the colour: dark patches count too."""
+        options = self.options
+        features, components = self._read(batch)
+        target = batch.target.flatten(0, 1)
+        if options.exchange and random.integers(2):
+            sign = torch.from_numpy(EXCHANGED_SIGN).to(features.device)
+            features = features[:, EXCHANGED.tolist()] * sign
+            components, target = components[:, list(_COMPONENTS)], target[:, list(_COMPONENTS)]
+        specular, diffuse = options.specular_colour, options.diffuse_colour
+        colours = target.new_tensor([specular, specular, diffuse, diffuse])
+        error = (self(features, components) - target) * colours
+        squared = error.square().sum(dim=-1) + options.colour_weight * error.sum(dim=-1).square()
+        loss: Tensor = (squared / (target @ colours + options.dark)).mean()
+        return loss
+
+    def start_at(self, target: Tensor) -> None:
+        """Change nothing: the network starts at the sums."""
+
+    def schedule(self, progress: float) -> None:
+        """Change nothing over the training."""
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return one group: all weights learn at the same rate."""
+        return [{"params": list(self.parameters()), "lr": rate}]
+
+    def architecture(self) -> dict[str, Any]:
+        """Count parameters and name the layers."""
+        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
+        return {"parameters": {"total": sum(weight.numel() for weight in self.parameters())}, "layers": layers}
+
+    def _read(self, batch: Batch) -> tuple[Tensor, Tensor]:
+        """Return features and components of all rows of a batch, computed on the CPU."""
+        found = []
+        for row, fabric in enumerate(batch.fabric.tolist()):
+            columns = (getattr(batch, name)[row].numpy(force=True) for name in Queries._fields)
+            found.append(read_queries(self._tables[fabric], Queries(*columns)))
+        features, components = (torch.from_numpy(np.concatenate(parts)) for parts in zip(*found, strict=True))
+        return features.to(batch.u.device), components.to(batch.u.device)
+
+    def _measure(self, fabrics: Sequence[Fabric]) -> None:
+        """Measure mean and spread of the features over queries of all fabrics, before and after the exchange."""
+        rows = []
+        for index, (fabric, table) in enumerate(zip(fabrics, self._tables, strict=True)):
+            repeat, count = fabric.weave.repeat, self.options.measured_rows
+            rows.append(read_queries(table, draw_queries(QueryOptions(), repeat, _STREAM + index, 0, count))[0])
+        features = np.concatenate(rows)
+        features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN]).astype(np.float64)
+        self.mean.copy_(torch.from_numpy(features.mean(axis=0)))
+        self.scale.copy_(torch.from_numpy(1.0 / (features.std(axis=0) + _LEAST_SPREAD)))
+
+
+class Selvage:
+    """A trained network that answers for any fabric; it tabulates each once.
+
+    Parameters
+    ----------
+    network : SelvageNetwork
+        Trained weights.
+    domain : Domain, optional
+        What it was taught; anything that the sums know if left out.
+    """
+
+    def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
+        self.name, self.setting, self.domain = network.options.name, "", domain
+        self._network = network.eval()
+        self._tables = Tables()
+        self._biases: dict[str, Tensor] = {}
+        # Transposed weights; the normalisation folds into the first layer.
+        layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
+        first, *others = layers
+        with torch.no_grad():
+            weight = first.weight * network.scale
+            self._first = weight.t().contiguous(), first.bias - weight @ network.mean
+            self._others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
+        self._of_query = self._first[0][:OF_QUERY].contiguous()
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Say yes: any fabric can be tabulated."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Tabulate the fabric, once."""
+        self._prepared(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+        refuse(queries, self.name)
+        table, bias = self._prepared(fabric)
+        result = np.empty((len(queries.u), 4), np.float32)
+        with torch.inference_mode():
+            for start in range(0, len(result), CHUNK):
+                rows = slice(start, start + CHUNK)
+                features, components = read_queries(table, queries.take(rows))
+                x = torch.addmm(bias, torch.from_numpy(features)[:, :OF_QUERY], self._of_query)
+                for weight, shift in self._others:
+                    x = torch.addmm(shift, functional.leaky_relu_(x, _SLOPE), weight)
+                x.sigmoid_().mul_(_LARGEST)
+                np.multiply(x.numpy(), components, out=result[rows])
+        return result
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of the table and of the network."""
+        return self._tables.of(fabric).nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+
+    def _prepared(self, fabric: Fabric) -> tuple[Table, Tensor]:
+        """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
+        table, key = self._tables.of(fabric), fingerprint(fabric.optics())
+        if key not in self._biases:
+            weight, bias = self._first
+            self._biases[key] = bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
+        return table, self._biases[key]
+
+
+def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
+    """Return an untrained network for these fabrics."""
+    return SelvageNetwork(options, fabrics)
+
+
+def restore(options: SelvageOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Selvage]:
+    """Return the method that a trained network is."""
+    methods = []
+    for card, weights in trained:
+        network = SelvageNetwork(options)
+        network.load_state_dict(weights)
+        methods.append(Selvage(network, domain_of(card)))
+    return methods

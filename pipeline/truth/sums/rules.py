@@ -1,0 +1,60 @@
+"""Gauss rules of a piece along one axis, the boxes that their nodes stand for, and the grid that horizons come on."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Double = npt.NDArray[np.float64]
+
+
+class Rule(NamedTuple):
+    """Nodes along one axis of a cell.
+
+    Attributes
+    ----------
+    places, weights : float64 (n,)
+        Positions within the cell; weights that sum to the length.
+    borders : float64 (n + 1,)
+        Where the boxes of the nodes end.
+    """
+
+    places: Double
+    weights: Double
+    borders: Double
+
+
+@lru_cache(maxsize=256)
+def rule(low: float, high: float, count: int, radius: float) -> Rule:
+    """Return the rule of `count` nodes from `low` to `high`: Gauss's, in v where x = r sin v if `radius` is not 0."""
+    s, weight = np.polynomial.legendre.leggauss(count)
+    if radius:
+        v = 0.5 * math.pi * s
+        places, weights = 0.5 + radius * np.sin(v), weight * np.cos(v)
+    else:
+        places, weights = 0.5 * (low + high) + 0.5 * (high - low) * s, weight
+    weights = weights * ((high - low) / weights.sum())
+    return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]))
+
+
+def grid_edges(low: float, high: float, count: int, radius: float) -> Double:
+    """Return the borders of `count` cells of a grid: evenly from `low` to `high`, or evenly in v."""
+    share = np.linspace(0.0, 1.0, count + 1)
+    return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
+
+
+def grid_middles(low: float, high: float, count: int, radius: float) -> Double:
+    """Return the middles of the same cells."""
+    share = (np.arange(count) + 0.5) / count
+    return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
+
+
+def overlap(borders: Double, edges: Double) -> Double:
+    """Return which share of each box lies in each cell of a grid, (boxes, cells); rows sum to 1."""
+    share = np.minimum(borders[1:, None], edges[None, 1:]) - np.maximum(borders[:-1, None], edges[None, :-1])
+    share = np.maximum(share, 0.0)
+    return np.asarray(share / np.maximum(share.sum(axis=1, keepdims=True), 1e-300))
