@@ -23,6 +23,8 @@ class _Options(BaseModel):
     """Whether there is anything to train."""
     of_one_material: ClassVar[bool] = False
     """Whether a trained model knows a single fabric."""
+    blends: ClassVar[bool] = False
+    """Whether it answers for what lies between two fabrics, from blended latents."""
     seconds: ClassVar[tuple[float, float]] = (2e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
 
@@ -50,6 +52,8 @@ Count = Annotated[int, Field(ge=1, le=4096)]
 class WovenOptions(_Options):
     """One network for many fabrics and scales [Chen2024Woven]."""
 
+    blends: ClassVar[bool] = True
+
     model: Literal["woven"] = "woven"
     """Which file of `pipeline.models` implements it."""
     name: Name = "woven"
@@ -62,9 +66,10 @@ class WovenOptions(_Options):
     """Side of the square normal and tangent maps, which hold one repeat; the paper does not say."""
     encoder_channels: int = Field(default=16, ge=4, le=128)
     """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
-    one_blob: Literal["plain", "periodic", "local"] = "local"
-    """How centres enter: `plain` as published; `periodic` wraps u and v at the repeat's edge; `local` encodes u and v
-    within their yarn and sees a picture of the repeat from the place asked about (an own change: see the model)."""
+    one_blob: Literal["none", "plain", "periodic", "local"] = "local"
+    """How centres enter: `none` as the bare numbers u, v and size; `plain` as published; `periodic` wraps u and v at
+    the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the place asked
+    about (an own change: see the model)."""
     bins: int = Field(default=8, ge=2, le=64)
     """One-blob bins for each of u, v and size; the published 24 values are 3 x 8."""
     smallest_size: float = Field(default=0.005, gt=0, le=0.1)
@@ -102,6 +107,7 @@ class WovenOptions(_Options):
         """What is not as published, in words for the page."""
         changes = {
             "a picture of the repeat seen from the place asked about": self.one_blob == "local",
+            "bare numbers in place of one-blobs": self.one_blob == "none",
             "one-blobs that wrap": self.one_blob == "periodic",
             "every cloth in standard position": self.standard,
             "a random origin in every training step": self.roll,
@@ -436,6 +442,63 @@ class PrefilteredOptions(_Options):
     """What widens the roughness: nothing, the mean tangent's length, or the half vector's variance."""
 
 
+class SelvageOptions(_Options):
+    """Sums over few nodes, corrected by a small network: one for many fabrics and scales; own design."""
+
+    seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
+
+    model: Literal["selvage"] = "selvage"
+    """Which file of `pipeline.models` implements it."""
+    name: Name = "selvage"
+    """Name of the trained model."""
+    width: Literal[16, 32, 64] = 64
+    """Width of the hidden layers."""
+    layers: int = Field(default=2, ge=1, le=8)
+    """Hidden layers."""
+    exchange: bool = True
+    """Exchange warp and weft in a random half of the training steps."""
+    measured_rows: int = Field(default=1024, ge=16, le=2**20)
+    """Queries of each training fabric over which features are normalised to mean 0 and deviation 1."""
+    specular_colour: float = Field(default=0.3, gt=0, le=1e4)
+    """Colour of the specular components in the loss."""
+    diffuse_colour: float = Field(default=0.5, gt=0, le=1e4)
+    """Colour of the diffuse components in the loss."""
+    colour_weight: float = Field(default=1.0, ge=0, le=1e4)
+    """Weight of the squared error of the whole colour beside those of the components."""
+    bound: bool = True
+    """Never answer more than the sums do without shadows: the directional albedo is then at most 1."""
+    narrow_nodes: int = Field(default=0, ge=0, le=16)
+    """Nodes across a yarn of the Gauss rule (`quadrature`) that answers small footprints in place of the network; 0:
+    the network answers all."""
+    seam: tuple[float, float] = (0.18, 0.28)
+    """Standard deviations, in yarn spacings, below which the rule answers alone and above which the network does; in
+    between they are blended."""
+    dark: float = Field(default=0.1, gt=0, le=1e4)
+    """Colour well above which squared errors are divided by the colour, and well below which they are not."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel of the sums; must be the kernel of the truth."""
+
+    @model_validator(mode="after")
+    def _seam_has_a_width(self) -> SelvageOptions:
+        if not 0 < self.seam[0] < self.seam[1]:
+            raise ValueError(f"seam must be [low, high] with 0 < low < high, got {list(self.seam)}")
+        return self
+
+
+class SumsOptions(_Options):
+    """The sums of `selvage` without its network; nothing is trained."""
+
+    learns: ClassVar[bool] = False
+    seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
+
+    model: Literal["sums"] = "sums"
+    """Which file of `pipeline.models` implements it."""
+    name: Name = "sums"
+    """Name in tables."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel of the sums; must be the kernel of the truth."""
+
+
 ModelOptions = Annotated[
     WovenOptions
     | NeumipOptions
@@ -445,7 +508,9 @@ ModelOptions = Annotated[
     | BtfAutoencoderOptions
     | TableOptions
     | QuadratureOptions
-    | PrefilteredOptions,
+    | PrefilteredOptions
+    | SelvageOptions
+    | SumsOptions,
     Field(discriminator="model"),
 ]
 """Any model's options, told apart by `model`."""

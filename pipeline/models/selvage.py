@@ -7,9 +7,13 @@ perceptron reads that and puts out four factors, one for each component that the
     features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the sums
 
 Factors lie between 0 and 2 and begin at 1: before the first step the network is the sums, and however little it has
-learnt of a cloth, its colours, highlights and repeat are the cloth's own. What the fabric alone decides, 10 of the 40
-features, folds into a bias. Mirror images need not be learnt, because features know none; exchanging warp and weft is
-taught by exchanging them in half of all steps.
+learnt of a cloth, its colours, highlights and repeat are the cloth's own. With `bound` no component exceeds what the
+sums give without shadows of the light, and the directional albedo is at most 1 (pipeline.truth.sums.features says why).
+With `narrow_nodes` small footprints, where so few nodes err most, are left to a Gauss rule of that many nodes; between
+the two ends of `seam` both are blended.
+
+What the fabric alone decides, 10 of the 40 features, folds into a bias. Mirror images need not be learnt, because
+features know none; exchanging warp and weft is taught by exchanging them in half of all steps.
 """
 
 from __future__ import annotations
@@ -27,7 +31,8 @@ from torch.nn import functional
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import CHUNK, Batch
-from pipeline.models.options import SelvageOptions
+from pipeline.models.options import QuadratureOptions, SelvageOptions
+from pipeline.models.quadrature import Quadrature
 from pipeline.models.sums import Tables, refuse
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
@@ -76,26 +81,27 @@ class SelvageNetwork(nn.Module):
         if fabrics:
             self._measure(fabrics)
 
-    def forward(self, features: Tensor, components: Tensor) -> Tensor:
-        """Return components (n, 4) from features (n, FEATURES) and the components (n, 4) that the sums give."""
+    def forward(self, features: Tensor, components: Tensor, bounds: Tensor) -> Tensor:
+        """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) that the sums give."""
         x = (features - self.mean) * self.scale
         for layer in self.hidden:
             x = functional.leaky_relu(layer(x), _SLOPE)
         factors: Tensor = _LARGEST * torch.sigmoid(self.last(x))
-        return components * factors
+        answer = components * factors
+        return torch.minimum(answer, bounds) if self.options.bound else answer
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the squared errors of components and colour, over the colour: dark patches count too."""
         options = self.options
-        features, components = self._read(batch)
+        features, components, bounds = self._read(batch)
         target = batch.target.flatten(0, 1)
         if options.exchange and random.integers(2):
             sign = torch.from_numpy(EXCHANGED_SIGN).to(features.device)
             features = features[:, EXCHANGED.tolist()] * sign
-            components, target = components[:, list(_COMPONENTS)], target[:, list(_COMPONENTS)]
+            components, bounds, target = (x[:, list(_COMPONENTS)] for x in (components, bounds, target))
         specular, diffuse = options.specular_colour, options.diffuse_colour
         colours = target.new_tensor([specular, specular, diffuse, diffuse])
-        error = (self(features, components) - target) * colours
+        error = (self(features, components, bounds) - target) * colours
         squared = error.square().sum(dim=-1) + options.colour_weight * error.sum(dim=-1).square()
         loss: Tensor = (squared / (target @ colours + options.dark)).mean()
         return loss
@@ -115,21 +121,21 @@ class SelvageNetwork(nn.Module):
         layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
         return {"parameters": {"total": sum(weight.numel() for weight in self.parameters())}, "layers": layers}
 
-    def _read(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """Return features and components of all rows of a batch, computed on the CPU."""
+    def _read(self, batch: Batch) -> tuple[Tensor, ...]:
+        """Return features, components and bounds of all rows of a batch, computed on the CPU."""
         found = []
         for row, fabric in enumerate(batch.fabric.tolist()):
             columns = (getattr(batch, name)[row].numpy(force=True) for name in Queries._fields)
             found.append(read_queries(self._tables[fabric], Queries(*columns)))
-        features, components = (torch.from_numpy(np.concatenate(parts)) for parts in zip(*found, strict=True))
-        return features.to(batch.u.device), components.to(batch.u.device)
+        parts = (torch.from_numpy(np.concatenate(columns)) for columns in zip(*found, strict=True))
+        return tuple(part.to(batch.u.device) for part in parts)
 
     def _measure(self, fabrics: Sequence[Fabric]) -> None:
         """Measure mean and spread of the features over queries of all fabrics, before and after the exchange."""
         rows = []
         for index, (fabric, table) in enumerate(zip(fabrics, self._tables, strict=True)):
             repeat, count = fabric.weave.repeat, self.options.measured_rows
-            rows.append(read_queries(table, draw_queries(QueryOptions(), repeat, _STREAM + index, 0, count))[0])
+            rows.append(read_queries(table, draw_queries(QueryOptions(), repeat, _STREAM + index, 0, count)).features)
         features = np.concatenate(rows)
         features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN]).astype(np.float64)
         self.mean.copy_(torch.from_numpy(features.mean(axis=0)))
@@ -150,6 +156,8 @@ class Selvage:
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self._network = network.eval()
+        nodes = network.options.narrow_nodes
+        self._rule = Quadrature(nodes, QuadratureOptions()) if nodes else None
         self._tables = Tables()
         self._biases: dict[str, Tensor] = {}
         # Transposed weights; the normalisation folds into the first layer.
@@ -168,28 +176,49 @@ class Selvage:
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric, once."""
         self._prepared(fabric)
+        if self._rule:
+            self._rule.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
         refuse(queries, self.name)
+        result = np.empty((len(queries.u), 4), np.float32)
+        low, high = self._network.options.seam
+        # How much of each answer is the network's: all of it, if there is no rule for small footprints.
+        place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
+        share = np.clip(place, 0.0, 1.0)[:, None] if self._rule else np.ones((len(result), 1), np.float32)
+        by_network, by_rule = (np.flatnonzero(rows) for rows in (share[:, 0] > 0.0, share[:, 0] < 1.0))
+        result[by_network] = self._corrected(fabric, queries.take(by_network))
+        if self._rule and by_rule.size:
+            narrow = self._rule.predict(fabric, queries.take(by_rule))
+            network = np.where(share[by_rule] > 0.0, result[by_rule], np.float32(0.0))
+            result[by_rule] = share[by_rule] * network + (1.0 - share[by_rule]) * narrow
+        return result
+
+    def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer by the sums and the network."""
         table, bias = self._prepared(fabric)
         result = np.empty((len(queries.u), 4), np.float32)
+        bounded = self._network.options.bound
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK):
                 rows = slice(start, start + CHUNK)
-                features, components = read_queries(table, queries.take(rows))
+                features, components, bounds = read_queries(table, queries.take(rows))
                 x = torch.addmm(bias, torch.from_numpy(features)[:, :OF_QUERY], self._of_query)
                 for weight, shift in self._others:
                     x = torch.addmm(shift, functional.leaky_relu_(x, _SLOPE), weight)
                 x.sigmoid_().mul_(_LARGEST)
                 np.multiply(x.numpy(), components, out=result[rows])
+                if bounded:
+                    np.minimum(result[rows], bounds, out=result[rows])
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table and of the network."""
-        return self._tables.of(fabric).nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        rule = self._rule.bytes_stored(fabric) if self._rule else 0
+        return rule + self._tables.of(fabric).nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
 
     def _prepared(self, fabric: Fabric) -> tuple[Table, Tensor]:
         """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""

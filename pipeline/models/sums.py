@@ -79,7 +79,7 @@ class Sums:
         result = np.empty((len(queries.u), 4), np.float32)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)
-            _, result[rows] = read_queries(table, queries.take(rows))
+            result[rows] = read_queries(table, queries.take(rows)).components
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:

@@ -6,6 +6,11 @@ exchanges warp and weft: that is a permutation of the features and of the compon
 
 The components of a patch hidden almost wholly fade to 0: the truth of most such patches is that nothing at all is seen.
 
+Beside each component stands what it would be without shadows of the light. That is a mean of the point model over nodes
+whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
+every node, so the diffuse components without shadows integrate to at most 1, and nothing below them makes light. The
+specular ones, scattered once, stay far below 1 (the slab reflects less than half of what it meets).
+
     0-7, 8-15   of warp, of weft: share of the area seen; how much is seen of the bare area, diffuse and specular; how
                 much of the latter two is in doubt; specular and diffuse component
     16-24       wi, wo; slopes of the half vector; wi.wo
@@ -17,7 +22,7 @@ The components of a patch hidden almost wholly fade to 0: the truth of most such
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +37,8 @@ from pipeline.truth.sums.shade import (
     BARE_SPECULAR,
     DIFFUSE,
     DIFFUSE_DOUBT,
+    OPEN_DIFFUSE,
+    OPEN_SPECULAR,
     SPECULAR,
     SPECULAR_DOUBT,
 )
@@ -74,8 +81,9 @@ def _assemble(
     twists: Single,
     features: Single,
     components: Single,
+    bounds: Single,
 ) -> None:
-    """Turn sums into features (N, FEATURES) and components (N, 4)."""
+    """Turn sums into features (N, FEATURES), components (N, 4), and what these are without shadows (N, 4)."""
     for n in range(len(found)):
         bare = found[n, 0, BARE_AREA] + found[n, 1, BARE_AREA] + gaps[n]
         area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], _LEAST * bare) + _TINY
@@ -92,6 +100,8 @@ def _assemble(
             own = found[n, f]
             specular, diffuse = own[SPECULAR] * inverse, own[DIFFUSE] * inverse * _INVERSE_PI
             components[n, f], components[n, 2 + f] = faded * specular, faded * diffuse
+            bounds[n, f] = faded * own[OPEN_SPECULAR] * inverse
+            bounds[n, 2 + f] = faded * own[OPEN_DIFFUSE] * inverse * _INVERSE_PI
             per_diffuse, per_specular = _1 / (own[BARE_DIFFUSE] + _TINY), _1 / (own[BARE_SPECULAR] + _TINY)
             k = 8 * f
             row[k] = own[AREA] * inverse
@@ -114,6 +124,24 @@ def _assemble(
             row[OF_QUERY + k] = cloth[k]
 
 
+class Reading(NamedTuple):
+    """What is read of N queries.
+
+    Attributes
+    ----------
+    features : float32 (N, FEATURES)
+        For the network.
+    components : float32 (N, 4)
+        What the sums alone answer.
+    bounds : float32 (N, 4)
+        The same without shadows of the light.
+    """
+
+    features: Single
+    components: Single
+    bounds: Single
+
+
 def cloth_features(table: Table) -> Single:
     """Return what is the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
     yarn = table.yarn.astype(np.float64)
@@ -133,8 +161,8 @@ def along_axes(queries: Queries) -> npt.NDArray[np.bool_]:
     return np.asarray(turned | (queries.sigma == queries.sigma_minor))
 
 
-def read_queries(table: Table, queries: Queries) -> tuple[Single, Single]:
-    """Return features and components of N queries about flat cloth, light and viewer in front.
+def read_queries(table: Table, queries: Queries) -> Reading:
+    """Read N queries about flat cloth, light and viewer in front.
 
     Parameters
     ----------
@@ -142,10 +170,6 @@ def read_queries(table: Table, queries: Queries) -> tuple[Single, Single]:
         The cloth.
     queries : Queries
         Footprints along the axes.
-
-    Returns
-    -------
-    float32 (N, FEATURES), float32 (N, 4)
     """
     across = np.abs(np.sin(queries.angle)) > 0.5  # the first axis lies along y
     first = np.where(across, queries.sigma_minor, queries.sigma)
@@ -155,7 +179,7 @@ def read_queries(table: Table, queries: Queries) -> tuple[Single, Single]:
         for column in (queries.u, queries.v, first, second, queries.wi, queries.wo)
     )
     found, gaps = sum_queries(table, u, v, x, y, wi, wo)
-    features, components = np.empty((len(u), FEATURES), np.float32), np.empty((len(u), 4), np.float32)
+    reading = Reading(*(np.empty((len(u), width), np.float32) for width in (FEATURES, 4, 4)))
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
-    _assemble(found, gaps, np.sqrt(x * y), wi, wo, cloth_features(table), twists, features, components)
-    return features, components
+    _assemble(found, gaps, np.sqrt(x * y), wi, wo, cloth_features(table), twists, *reading)
+    return reading

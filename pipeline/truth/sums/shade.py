@@ -4,9 +4,10 @@ The formulas are those of `patch`, `microflake` and `slab`, written with cosines
 ramp; how much of a box both viewer and light reach depends on their azimuths: alike (the better hidden one decides), at
 right angles (independently) or opposite (what hides one shows the other); a highlight has four places in a node's box.
 
-Of each family come eight sums, each a share of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and
+Of each family come ten sums, each a share of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and
 lit; BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR, the same with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, how much
-of the bare ones lies within ramps.
+of the bare ones lies within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen and lit without shadows: more light no model
+that keeps energy may return (features).
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ from pipeline.truth.single import absorbed
 from pipeline.truth.sums.table import LANES, LEVELS
 from pipeline.truth.table import Single
 
-SUMS: Final = 8
+SUMS: Final = 10
 """Sums of a family."""
 
-AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(SUMS)
+AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(8)
+OPEN_DIFFUSE, OPEN_SPECULAR = 8, 9
 
 ROWS: Final = 8
 """Rows of a block of placed nodes."""
@@ -36,6 +38,10 @@ SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(ROWS)
 negative beneath; largest sine of u."""
 
 Eight = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
+Ten = tuple[
+    np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32,
+    np.float32,
+]  # fmt: skip
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _TINY = np.float32(1e-12)
@@ -106,8 +112,8 @@ def _node(
     scale: np.float32,
     thickness: np.float32,
     blend: np.float32,
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """Return a node's shares of the first six sums.
+) -> Eight:
+    """Return a node's shares of the first six sums and of the last two.
 
     `along`, `across`: by how much the half vector's cosine with the tangent changes to the four places.
     """
@@ -134,7 +140,7 @@ def _node(
     depth = min(thickness * crossed / (cosines + _TINY), _DEEPEST)
     flakes = ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23 * crossed)
     specular = wide * scale * flakes * cosines * absorbed(depth)
-    return area * seen, diffuse * both, specular * both, area, diffuse, specular
+    return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
 
 
 @fast_kernel
@@ -153,7 +159,7 @@ def shade_fixed(
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
-) -> Eight:
+) -> Ten:
     """Return the sums over fixed nodes of one family.
 
     `low`, `high`: mean horizons at the azimuths around a direction; `turn`: where between them it lies.
@@ -162,7 +168,7 @@ def shade_fixed(
     rest = (_1 - square) * d.size
     scale = _FLAKES * alpha * square
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    a, c, s, a0, c0, s0, dc, ds = _0, _0, _0, _0, _0, _0, _0, _0
+    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(LANES):
             over_o = (d.oz - low_o[b, k] - turn_o * (high_o[b, k] - low_o[b, k])) * sharpness_o[b, k]
@@ -171,7 +177,7 @@ def shade_fixed(
             lit = min(max(_HALF + over_i, _0), _1)
             along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
-            node_a, node_c, node_s, bare_a, bare_c, bare_s = _node(
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
                 d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
                 nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, rest, scale, thickness, blend,
             )  # fmt: skip
@@ -184,7 +190,9 @@ def shade_fixed(
             s0 += bare_s
             dc += bare_c * doubt
             ds += bare_s * doubt
-    return a, c, s, a0, c0, s0, dc, ds
+            oc += open_c
+            os += open_s
+    return a, c, s, a0, c0, s0, dc, ds, oc, os
 
 
 @fast_kernel
@@ -202,7 +210,7 @@ def shade_placed(
     d: Directions,
     yarn: Single,
     thickness: np.float32,
-) -> Eight:
+) -> Ten:
     """Return the sums over nodes placed by the query.
 
     `cells` is each node's cell of its grid at the first azimuth; `low`, `high`: what leads to those around a direction.
@@ -214,7 +222,7 @@ def shade_placed(
     scale = _FLAKES * alpha * square
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
-    a, c, s, a0, c0, s0, dc, ds = _0, _0, _0, _0, _0, _0, _0, _0
+    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(cells)):
         for k in range(LANES):
             at = cells[b, k]
@@ -241,7 +249,7 @@ def shade_placed(
             h = hx * tx + hy * ty + hz * tz
             along = step_u * (hy * uy + hz * uz - h * (uy * ty + uz * tz))
             across = step_v * (hx * vx + hy * vy + hz * vz - h * (vx * tx + vy * ty + vz * tz))
-            node_a, node_c, node_s, bare_a, bare_c, bare_s = _node(
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
                 d, nx * n, ny * n, nz * n, _1 / (nz * n), tx, ty, tz, along, across, seen, lit, nodes[b, WEIGHT, k],
                 square, rest, scale, thickness, blend,
             )  # fmt: skip
@@ -254,7 +262,9 @@ def shade_placed(
             s0 += bare_s
             dc += bare_c * doubt
             ds += bare_s * doubt
-    return a, c, s, a0, c0, s0, dc, ds
+            oc += open_c
+            os += open_s
+    return a, c, s, a0, c0, s0, dc, ds, oc, os
 
 
 @fast_kernel

@@ -12,6 +12,7 @@ from pipeline.models.woven import Woven, WovenNetwork, read_cloth
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
+from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
@@ -87,7 +88,24 @@ def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard, twil
     assert after[1].item() == pytest.approx((before[1].item() + 3 / 4) % 1, abs=1e-6)
 
 
-@pytest.mark.parametrize("one_blob", ["plain", "periodic", "local"])
+def test_without_one_blobs_three_numbers_tell_the_place():
+    """Of the published decoder the first layer alone changes: 3 numbers enter it in place of 24."""
+    network = WovenNetwork(WovenOptions(one_blob="none"))
+    assert network.architecture()["parameters"]["decoder"] == 86_660 - 21 * 128
+
+
+def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size(twill):
+    """The decoder is handed u, v as shares and log2 of the size over its range: sigma = .4 of 4 yarns is .1 repeat."""
+    network = WovenNetwork(SMALL.model_copy(update={"one_blob": "none", "standard": False}))
+    handed = []
+    network.decoder.register_forward_hook(lambda module, inputs, output: handed.append(inputs))
+    Woven(network).predict(twill, queries([5.0], [3.0], 0.4))
+    size = math.log(0.1 / 0.005) / math.log(1.0 / 0.005)
+    assert handed[0][1] is None
+    assert handed[0][2].flatten().tolist() == pytest.approx([0.25, 0.75, size], abs=1e-6)
+
+
+@pytest.mark.parametrize("one_blob", ["none", "plain", "periodic", "local"])
 def test_training_sees_what_rendering_sees(one_blob, twill):
     """The loss against the network's own predictions is 0: training and inference place queries alike."""
     options = SMALL.model_copy(update={"one_blob": one_blob, "roll": False})
@@ -119,6 +137,65 @@ def test_mirror_images_are_answered_alike(symmetry, twill):
     there = Queries.round(u[0].numpy() * ends, v[0].numpy() * picks, asked.sigma, wi[0].numpy(), wo[0].numpy())
     expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
     np.testing.assert_allclose(method.predict(image, there), expected, rtol=2e-3, atol=2e-5)
+
+
+def other_yarns(fabric, name):
+    other = load_fabric(name)
+    return fabric.model_copy(update={"name": name, "warp": other.warp, "weft": other.weft})
+
+
+@pytest.mark.parametrize("standard", [False, True])
+def test_between_two_fabrics_lie_both_at_its_ends(standard, twill):
+    """A 3/1 twill has one standard position whatever its yarns are, so that the second end is the second fabric too."""
+    method = Woven(WovenNetwork(SMALL.model_copy(update={"standard": standard})))
+    second = other_yarns(twill, "satin_8")
+    asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 200)
+    one, other = method.predict(twill, asked), method.predict(second, asked)
+    assert np.abs(one - other).max() > 1e-3
+    # Two fabrics at once are summed in another order than one: single precision.
+    np.testing.assert_allclose(method.predict_between(twill, second, 0.0, asked), one, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(method.predict_between(twill, second, 1.0, asked), other, rtol=1e-4, atol=1e-5)
+
+
+def test_between_a_fabric_and_itself_is_nothing_else(twill):
+    method = Woven(WovenNetwork(SMALL))
+    asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 50)
+    expected = method.predict(twill, asked)
+    np.testing.assert_allclose(method.predict_between(twill, twill, 0.3, asked), expected, rtol=1e-4, atol=1e-5)
+
+
+def test_what_is_blended_lies_in_the_same_place():
+    """Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's.
+
+    With the yarns exchanged, second = the first seen through the mirror x = y, whose own standard position is the same;
+    in the first one's position it is another cloth.
+    """
+    plain = load_fabric("polyester_lining")
+    exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
+    alone = [read_cloth([fabric], SMALL) for fabric in (plain, exchanged)]
+    assert alone[0].placement.exchange.item() != alone[1].placement.exchange.item()
+    together = read_cloth([plain, exchanged], SMALL, like=plain)
+    for part in together.placement:
+        assert torch.equal(part[0], part[1])
+    torch.testing.assert_close(together.maps[:1], alone[0].maps)
+    torch.testing.assert_close(together.parameters[1], alone[0].parameters[0][[1, 0, 3, 2]])
+
+
+def test_fabrics_of_other_repeats_cannot_be_blended(twill):
+    method = Woven(WovenNetwork(SMALL))
+    with pytest.raises(BadInput, match="the repeat of cotton_twill is needed, 4 x 4, to blend the two"):
+        method.predict_between(twill, load_fabric("satin_8"), 0.5, queries([0.5], [0.5], 0.1))
+
+
+def test_a_colour_edit_needs_no_encoding_and_another_yarn_does(twill):
+    network = WovenNetwork(SMALL)
+    method, runs = Woven(network), []
+    network.encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
+    method.prepare(twill)
+    method.prepare(twill.model_copy(update={"warp": twill.warp.model_copy(update={"diffuse": (0.1, 0.2, 0.3)})}))
+    assert len(runs) == 1
+    method.prepare(twill.model_copy(update={"warp": twill.warp.model_copy(update={"roughness": 0.31})}))
+    assert len(runs) == 2
 
 
 def test_large_footprints_see_no_place(twill):
