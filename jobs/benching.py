@@ -25,7 +25,10 @@ STABILITY: Final = "records/stability.json"
 TRUTH: Final = "records/truth.json"
 """File of the Records of `bench truth`."""
 
-RECORDS: Final = (STABILITY, TRUTH)
+SAMPLER: Final = "records/sampler.json"
+"""File of the Records of `bench sampler`."""
+
+RECORDS: Final = (STABILITY, TRUTH, SAMPLER)
 """Files of Records that any page shows, if they exist."""
 
 
@@ -112,6 +115,25 @@ def truth(out: Path) -> None:
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
 
 
+def sampler(out: Path) -> None:
+    """Measure what drawing directions by lobes saves; print the table and write the Records."""
+    from rich.console import Console
+
+    from reports import cells, sampling
+    from reports.record import this_machine, write_records
+
+    console = Console()
+    with console.status("the sampler") as status:
+        found = []
+        for one in sampling.measure():
+            found.append(one)
+            status.update(f"the sampler: {one.fabric}, {one.sampler}")
+    path = out / SAMPLER
+    write_records(path, sampling.to_records(found), this_machine(1))
+    console.print(_columns(("fabric", *cells.SAMPLERS), cells.sampler_rows(found)))
+    console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
+
+
 def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
     """Show rows of cells, each table after an empty line."""
     from rich.padding import Padding
@@ -144,5 +166,5 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
     return table
 
 
-BENCHES: Final[dict[str, Callable[[Path], None]]] = {"stability": stability, "truth": truth}
+BENCHES: Final[dict[str, Callable[[Path], None]]] = {"stability": stability, "truth": truth, "sampler": sampler}
 """Measurements by name; no recipe of such a name can be asked for."""

@@ -1,4 +1,4 @@
-"""The benchmark's tasks: the truth's pictures, one task a method and fabric, and the timing of all methods together.
+"""The benchmark's tasks: the truth's pictures, one task a method and fabric, latents, the timing of all methods.
 
 The truth of a picture depends on fabric and view alone, so every recipe and every model shares it. Colours enter here:
 errors and pictures are of light, not of components.
@@ -32,16 +32,26 @@ class Subject:
     test: tuple[str, ...]
     pictures: Mapping[str, Task]
     frames: Task
+    edge: Task | None
 
     @property
     def truth(self) -> dict[str, str]:
-        """Paths of the truth's pictures by scene, and of its frames."""
-        return {name: task.products[0] for name, task in (*self.pictures.items(), ("frames", self.frames))}
+        """Paths of the truth's pictures by scene, of its frames, and of its edge where the cloth is curved."""
+        return {name: task.products[0] for name, task in self._shown.items()}
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Ids of the tasks that any measurement of this fabric needs."""
-        return (*self.test, *(task.id for task in self.pictures.values()), self.frames.id)
+        return (*self.test, *(task.id for task in self._shown.values()))
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks that render the truth."""
+        return tuple(self._shown.values())
+
+    @property
+    def _shown(self) -> dict[str, Task]:
+        return {**self.pictures, "frames": self.frames, **({"edge": self.edge} if self.edge else {})}
 
 
 def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]]) -> Iterator[Task]:
@@ -59,13 +69,16 @@ def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Ma
     subjects = [_subject(recipe, fabric, "seen", parts) for fabric in recipe.seen]
     subjects += [_subject(recipe, fabric, "unseen", parts) for fabric in recipe.unseen]
     for subject in subjects:
-        yield from (*subject.pictures.values(), subject.frames)
+        yield from subject.tasks
     for subject in subjects:
         yield _truth_task(recipe, subject, parts)
         for model in recipe.models:
             trainings = trained.get(model.options.name, {})
             training = trainings.get("" if "" in trainings else subject.fabric.name)
             yield _method_task(recipe, model, subject, parts, [training] if training else [])
+    for model in recipe.models:
+        if model.options.blends:
+            yield _latents_task(recipe, model, trained[model.options.name][""])
     yield _timing_task(recipe, subjects, parts, trained)
 
 
@@ -109,7 +122,12 @@ def _subject(recipe: Recipe, fabric: Fabric, role: str, parts: Sequence[Shard]) 
     test = tuple(
         part.task.id for part in parts if part.question.fabric.name == fabric.name and part.question.split == "test"
     )
-    return Subject(fabric, role, test, pictures, frames)
+    edge = None
+    if recipe.dataset.queries.curvature[1] > 0:
+        width, height = round(bench.edge.depth / bench.edge.pixel), bench.edge.rows
+        asked = {"edge": bench.edge.model_dump(mode="json")}
+        edge = task("edge", common | asked, max(width, 1) * height, bench.edge.truth)
+    return Subject(fabric, role, test, pictures, frames, edge)
 
 
 def _truth_task(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> Task:
@@ -171,6 +189,34 @@ def _method_task(
     )
 
 
+def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
+    """Return the measurements of what lies between latents; of presets, whatever the recipe's fabrics are."""
+    options, dataset = model.options, recipe.dataset
+    spec = {
+        "measure": "latents",
+        "versions": [TRUTH_VERSION, BENCH_VERSION, options.version],
+        "options": options.model_dump(mode="json"),
+        "models": [training.id],
+        "queries": dataset.queries.model_dump(mode="json"),
+        "truth": dataset.truth.model_dump(mode="json"),
+    }
+    return Task(
+        "bench",
+        options.name,
+        f"latents of {options.name}",
+        spec,
+        _records(f"latents-{options.name}-{identity('bench', spec)[:8]}"),
+        (training.id,),
+        cost=10.0,
+        size=4000,
+        setting={
+            "make": "latents",
+            "model": options.model_dump(mode="json"),
+            "models": [str(Path(training.products[0]).parent)],
+        },
+    )
+
+
 def _timing_task(
     recipe: Recipe, subjects: Sequence[Subject], parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]]
 ) -> Task:
@@ -224,7 +270,7 @@ def _asked(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str
     return {
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "bench": recipe.bench.model_dump(mode="json", exclude=_TIMED),
+        "bench": recipe.bench.model_dump(mode="json", exclude={*_TIMED, "edge"}),
         "fabric": _look(subject.fabric),
         "role": subject.role,
         "truth": fingerprint(subject.needs),

@@ -13,13 +13,17 @@ from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
 from pipeline.models.registry import load_methods
 from pipeline.shards.manifest import Manifest
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.options import TruthOptions
 from reports.bench import measure_errors, measure_timing, measure_truth
 from reports.frames import measure_aliasing, measure_truth_frames, render_frames
 from reports.furnace import measure_furnace
+from reports.latents import measure_edits, measure_paths, pairs
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
+from reports.silhouette import measure_silhouette, render_edge
 from weaves.fabric import Fabric
 
 Progress = Callable[[float], None]
@@ -36,6 +40,11 @@ def frames(task: Task, out: Path, progress: Progress) -> None:
     render_frames(Fabric.model_validate(task.setting["fabric"]), _options(task), out / task.products[0])
 
 
+def edge(task: Task, out: Path, progress: Progress) -> None:
+    """Render the truth's edge of a cloth cylinder."""
+    render_edge(Fabric.model_validate(task.setting["fabric"]), _options(task).edge, out / task.products[0])
+
+
 def truth(task: Task, out: Path, progress: Progress) -> None:
     """Measure the truth on one fabric."""
     setting, options, folder = task.setting, _options(task), out / task.setting["dataset"]
@@ -47,7 +56,7 @@ def truth(task: Task, out: Path, progress: Progress) -> None:
 
 
 def method(task: Task, out: Path, progress: Progress) -> None:
-    """Measure a method on one fabric: errors, pictures, aliasing."""
+    """Measure a method on one fabric: errors, pictures, aliasing, and the silhouette of curved cloth."""
     setting, options, folder = task.setting, _options(task), out / task.setting["dataset"]
     manifest, name, role = Manifest.load(folder), setting["fabric"], setting["role"]
     fabric = manifest.fabrics[name]
@@ -58,10 +67,27 @@ def method(task: Task, out: Path, progress: Progress) -> None:
         records += measure_errors(one, manifest, folder, name, role, options, provenance)
         records += measure_furnace(one, fabric, role, provenance)
         records += measure_aliasing(one, fabric, role, options, out / setting["truth"]["frames"], provenance)
+        if "edge" in setting["truth"]:
+            reference = out / setting["truth"]["edge"]
+            records += measure_silhouette(one, fabric, role, options.edge, reference, provenance)
         for scene, path in setting["pictures"].get(one.setting, {}).items():
             reference = out / setting["truth"][scene]
             records += render_method(one, fabric, role, scene, options, reference, out / path, provenance)
         progress((index + 1) / len(methods))
+    write_records(out / task.products[0], records, this_machine(1))
+
+
+def latents(task: Task, out: Path, progress: Progress) -> None:
+    """Measure what lies between latents, and what an edit costs."""
+    setting, spec = task.setting, task.spec
+    (one,) = _methods(setting["model"], setting["models"], out)
+    provenance = Provenance(model=" ".join(spec["models"]))
+    chosen, asked = pairs(), QueryOptions.model_validate(spec["queries"])
+    records = measure_edits(one, chosen[0].first, provenance=provenance)
+    for index, pair in enumerate(chosen):
+        truth = TruthOptions.model_validate(spec["truth"])
+        records += measure_paths(one, [pair], asked, truth, provenance=provenance)
+        progress((index + 1) / len(chosen))
     write_records(out / task.products[0], records, this_machine(1))
 
 

@@ -61,7 +61,7 @@ def _report_task(
             truth = {"fabric": fabric["name"], "scene": make, "method": "truth", "setting": ""}
             pictures.append(truth | {"path": task.products[0]})
         for setting, scenes in task.setting.get("pictures", {}).items():
-            method = {"fabric": fabric, "method": task.setting["model"]["model"], "setting": setting}
+            method = {"fabric": fabric, "method": task.setting["model"]["name"], "setting": setting}
             pictures += [method | {"scene": scene, "path": path} for scene, path in scenes.items()]
     fabrics = [(fabric, "seen") for fabric in recipe.seen] + [(fabric, "unseen") for fabric in recipe.unseen]
     return Task(
@@ -95,18 +95,20 @@ def _report_task(
 def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
     """Return what the page says of a model."""
     options, training = model.options, model.training
-    about = "nothing is trained"
+    about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
     if trainings:
         first = next(iter(trainings.values()))
         what = "each fabric by itself" if model.of_one_material else f"{len(first.spec['fabrics'])} fabrics at once"
-        about = f"{what}, {training.steps:,} steps of {training.batch:,} queries"
+        kind = "" if options.name == options.model else f"{options.model}: "
+        about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
     return {
-        "name": options.model,
+        "name": options.name,
         "about": about,
         "fingerprint": " ".join(task.id for task in trainings.values()),
         "per_material": model.of_one_material,
+        "kind": options.model,
     }
 
 

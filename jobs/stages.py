@@ -57,8 +57,10 @@ def _bench(task: Task, out: Path, progress: Progress) -> None:
     {
         "truth": measuring.truth,
         "method": measuring.method,
+        "latents": measuring.latents,
         "timing": measuring.timing,
         "frames": measuring.frames,
+        "edge": measuring.edge,
     }.get(task.setting["make"], measuring.picture)(task, out, progress)
 
 

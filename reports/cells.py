@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,8 +14,9 @@ from reports.accuracy import Accuracy
 from reports.bias import Bias
 from reports.effort import Effort
 from reports.record import TRUTH, Record
+from reports.sampling import SETTINGS, Saving
 from reports.stability import Finding
-from reports.style import display
+from reports.style import NO_BREAK, display
 from reports.summary import BASELINE, COMPONENTS, rows
 from reports.tiles import EXPOSURE, hex_colour
 from reports.wording import learnt
@@ -26,93 +27,139 @@ NONE = "–"
 COMPONENT_TITLES: Final = ("S warp", "S weft", "C warp", "C weft")
 
 
+def groups(lines: Sequence[Row]) -> list[Row]:
+    """Gather rows of methods: each group is a method's name and its rows; a method with knobs has a head of its own."""
+    found: dict[str, list[Row]] = {}
+    for line in lines:
+        found.setdefault(line["method"], []).append(line)
+    return [
+        {"method": method, "label": display(method), "head": len(rows_) > 1, "rows": rows_}
+        for method, rows_ in found.items()
+    ]
+
+
 def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, list[Row]]:
-    """Return the rows of the error table by role."""
+    """Return the rows of the error table by role, in groups."""
     result: dict[str, list[Row]] = {}
     for row in rows(errors):
         known = row.role == "unseen" and row.method in per_material
-        result.setdefault(row.role, []).append(
-            {
-                "method": row.method,
-                "label": display(row.method, row.setting) + (" *" if known else ""),
-                "baseline": (row.method, row.setting) == BASELINE,
-                "cells": [
-                    scientific(row.mse),
-                    f"{scientific(row.low)} … {scientific(row.high)}",
-                    percent(row.noise_share),
-                    times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
-                    _interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
-                    fixed(row.colour_rrmse),
-                    *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
-                ],
-            }
-        )
-    return result
+        line = _line(row.method, row.setting) | {
+            "cells": [
+                scientific(row.mse),
+                f"{scientific(row.low)} … {scientific(row.high)}",
+                percent(row.noise_share),
+                times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
+                _interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
+                fixed(row.colour_rrmse),
+                *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
+            ],
+        }
+        line["label"] += " *" if known else ""
+        result.setdefault(row.role, []).append(line)
+    return {role: groups(lines) for role, lines in result.items()}
 
 
 def fabric_rows(table: pd.DataFrame) -> dict[str, Any]:
-    """Return the MSE of every method on every fabric; the lowest of a row is marked."""
+    """Return the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked."""
     labels = [column for column in table.columns if column not in ("role", "fabric")]
+    records = table.to_dict("records")
+    best = [min((r[label] for label in labels if not _missing(r[label])), default=math.nan) for r in records]
     lines = []
-    for record in table.to_dict("records"):
-        values = [record[label] for label in labels]
-        best = min((v for v in values if not _missing(v)), default=math.nan)
-        cells = [{"text": scientific(value), "best": value == best} for value in values]
-        lines.append({"fabric": plain(record["fabric"]), "role": record["role"], "cells": cells})
-    return {"labels": [display(*_split(label)) for label in labels], "rows": lines}
+    for label in labels:
+        values = [(record[label], lowest) for record, lowest in zip(records, best, strict=True)]
+        cells = [{"text": scientific(value), "best": value == lowest} for value, lowest in values]
+        lines.append(_line(*_split(label)) | {"cells": cells})
+    fabrics = [{"title": plain(str(record["fabric"])), "role": record["role"]} for record in records]
+    return {"fabrics": fabrics, "groups": groups(lines)}
+
+
+FRONT: Final = ("ns a query", "error of the colour", "bytes stored")
+"""Columns of `front_rows` after the method."""
+
+
+def front_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
+    """Return what is on the front by role, the fastest first."""
+    result: dict[str, list[Row]] = {}
+    for row in rows(table[table["front"]].sort_values("ns", kind="stable") if len(table) else table):
+        cells = [f"{row.ns:,.0f}", percent(row.error, 2), size(row.bytes_stored)]
+        line = _line(row.method, row.setting) | {"cells": cells}
+        result.setdefault(row.role, []).append(line)
+    return result
 
 
 def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str, Any]:
-    """Return the rows of the aliasing table, and the variance that the motion itself brings."""
+    """Return the rows of the aliasing table in groups, and the variance that the motion itself brings."""
     motion = [record.value for record in records if record.metric == "motion"]
-    lines: dict[tuple[str, str], Row] = {}
+    roles = list(dict.fromkeys(aliasing["role"])) if len(aliasing) else []
+    found: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in rows(aliasing):
-        key = (row.method, row.setting)
-        found = lines.setdefault(key, {"method": row.method, "label": display(*key), "by_role": {}})
-        found["baseline"] = (row.method, row.setting) == BASELINE
-        found["by_role"][row.role] = [signed(row.flicker), signed(row.excess_energy)]
+        found.setdefault((row.method, row.setting), {})[row.role] = [signed(row.flicker), signed(row.excess_energy)]
+    lines = [
+        _line(*key) | {"cells": [text for role in roles for text in by_role.get(role, [NONE, NONE])]}
+        for key, by_role in found.items()
+    ]
     return {
-        "rows": list(lines.values()),
-        "roles": list(dict.fromkeys(aliasing["role"])) if len(aliasing) else [],
+        "groups": groups(lines),
+        "roles": roles,
         "motion": scientific(float(np.mean(motion))) if motion else NONE,
     }
 
 
 def energy_rows(energy: pd.DataFrame) -> list[Row]:
-    """Return the rows of the table of energies; what sends back more than arrives is marked."""
-    return [
-        {
-            "method": row.method,
-            "label": display(row.method, row.setting),
-            "baseline": (row.method, row.setting) == BASELINE,
-            "cells": [f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in (row.diffuse, row.specular, row.colour)],
-        }
-        for row in rows(energy)
-    ]
+    """Return the rows of the table of energies, in groups; what sends back more than arrives is marked."""
+    return groups(
+        [
+            _line(row.method, row.setting)
+            | {
+                "cells": [
+                    f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in (row.diffuse, row.specular, row.colour)
+                ]
+            }
+            for row in rows(energy)
+        ]
+    )
+
+
+SILHOUETTE: Final = ("coverage, RMSE", "edge too far out, yarn spacings", "light, RMSE", "fabrics")
+"""Columns of `silhouette_rows` after the method."""
+
+
+def silhouette_rows(table: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of silhouettes, in groups."""
+    lines = []
+    for row in rows(table):
+        cells = [fixed(row.coverage), f"{row.displacement:+.4f}".replace("-", "−"), fixed(row.light), f"{row.fabrics}"]
+        lines.append(_line(row.method, row.setting) | {"cells": cells})
+    return groups(lines)
 
 
 def timing_rows(timing: pd.DataFrame) -> list[Row]:
-    """Return the rows of the timing table."""
-    return [
-        {
-            "method": row.method,
-            "label": display(row.method, row.setting),
-            "baseline": (row.method, row.setting) == BASELINE,
-            "cells": [
-                f"{row.median_ns:,.0f}",
-                f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",
-                times(row.time_ratio),
-                NONE if row.method == TRUTH else size(row.bytes_stored),
-            ],
-        }
-        for row in rows(timing)
-    ]
+    """Return the rows of the timing table, in groups."""
+    return groups(
+        [
+            _line(row.method, row.setting)
+            | {
+                "cells": [
+                    f"{row.median_ns:,.0f}",
+                    f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",
+                    times(row.time_ratio),
+                    NONE if row.method == TRUTH else size(row.bytes_stored),
+                ],
+            }
+            for row in rows(timing)
+        ]
+    )
 
 
-def figures_of_merit(records: Sequence[Record], errors: pd.DataFrame, timing: pd.DataFrame) -> list[Row]:
+def figures_of_merit(
+    records: Sequence[Record],
+    errors: pd.DataFrame,
+    timing: pd.DataFrame,
+    untrained: Collection[str] = (BASELINE[0],),
+) -> list[Row]:
     """Return the few numbers at the head of the page, of the first learnt method and of the truth."""
     result = []
-    methods = learnt(errors) if len(errors) else []
+    methods = learnt(errors, untrained) if len(errors) else []
     if methods:
         method, setting = methods[0]
         for row in rows(errors[(errors["method"] == method) & (errors["setting"] == setting)]):
@@ -198,6 +245,18 @@ def bias_rows(found: Sequence[Bias]) -> list[list[str]]:
     ]
 
 
+SAMPLERS: Final = tuple(label for label, points in SETTINGS if points)
+"""Columns of `sampler_rows` after the fabric."""
+
+
+def sampler_rows(found: Sequence[Saving]) -> list[list[str]]:
+    """Return how many times less variance each sampler has than the cosine, and what a direction takes."""
+    lines: dict[str, dict[str, str]] = {}
+    for one in found:
+        lines.setdefault(one.fabric, {})[one.sampler] = f"{times(one.variance_saved)} · {one.sample_time:,.0f} ns"
+    return [[plain(fabric), *(cells.get(name, NONE) for name in SAMPLERS)] for fabric, cells in lines.items()]
+
+
 EFFORT: Final = ("how", "queries", "points", "µs a query", "time")
 """Columns of `effort_rows` after the fabric."""
 
@@ -217,6 +276,29 @@ def effort_rows(found: Sequence[Effort]) -> list[list[str]]:
             percent(row.share * row.seconds / whole[row.fabric], 0) if whole[row.fabric] else NONE,
         ]
         for row in found
+    ]
+
+
+def path_rows(table: pd.DataFrame) -> list[list[str]]:
+    """Return the rows of the table of what lies between: method, path, way, then the error at every share of it."""
+    lines: dict[tuple[str, ...], list[str]] = {}
+    for row in rows(table):
+        path = f"{plain(row.fabric)} → {plain(row.to)}"
+        lines.setdefault((display(row.method, row.setting), path, row.how), []).append(percent(row.error))
+    return [[*key, *errors] for key, errors in lines.items()]
+
+
+def edit_rows(records: Sequence[Record]) -> list[list[str]]:
+    """Return the rows of the table of edits: method, what is edited, median time, quartiles."""
+    return [
+        [
+            display(record.method, record.setting),
+            record.note,
+            f"{record.value:.3g} {record.unit}",
+            f"{record.low:.3g} … {record.high:.3g}" if record.low is not None and record.high is not None else NONE,
+        ]
+        for record in records
+        if record.metric == "encode_time"
     ]
 
 
@@ -285,8 +367,18 @@ def size(value: float) -> str:
     return f"{value:,.0f} B" if value < 1e3 else f"{value / 1e3:,.1f} kB" if value < 1e6 else f"{value / 1e6:,.2f} MB"
 
 
+def _line(method: str, setting: str) -> Row:
+    """Return what any row of a method says: whose it is, and both its names, whole and within its group."""
+    return {
+        "method": method,
+        "label": display(method, setting),
+        "setting": setting.replace(" ", NO_BREAK) or display(method),
+        "baseline": (method, setting) == BASELINE,
+    }
+
+
 def _interval(low: float, high: float) -> str:
-    return NONE if _missing(low) else f"{low:.2g} … {high:.2g}"
+    return NONE if _missing(low) else " … ".join(f"{v:.2g}" if v < 100 else f"{v:,.0f}" for v in (low, high))
 
 
 def _missing(value: float | None) -> bool:

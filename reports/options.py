@@ -20,8 +20,30 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
 
 
+class EdgeOptions(BaseModel):
+    """The edge of a cloth cylinder (`reports.silhouette`): cylinder, camera, light and truth."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    radius: float = Field(default=10.0, ge=1, le=1e4)
+    """Of the boundary, in yarn spacings."""
+    depth: float = Field(default=0.24, gt=0)
+    """Width of the strip, in yarn spacings; less than the radius. Rays rise again from depths of a few tenths of a
+    yarn spacing at most."""
+    pixel: float = Field(default=0.04, gt=0, le=1)
+    """Side of a pixel, in yarn spacings; its Gaussian has half of it as standard deviation."""
+    rows: int = Field(default=200, ge=1, le=4096)
+    """Pixels along the edge."""
+    light: tuple[float, float] = (60.0, 20.0)
+    """In degrees: angle from the camera's direction towards the edge's side, and elevation along the axis."""
+    truth: TruthOptions = TruthOptions(relative_error=0.05, max_count=1024)
+    """How true the truth is. Its light takes seconds a fabric at 5 %, a minute at 2 %."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Of the truth's points."""
+
+
 class BenchOptions(BaseModel):
-    """One benchmark: errors on held-out queries, pictures, aliasing, timing."""
+    """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -40,6 +62,8 @@ class BenchOptions(BaseModel):
     """The same for the frames of the truth."""
     picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
+    edge: EdgeOptions = EdgeOptions()
+    """The silhouette, measured where the data set's queries are of curved cloth."""
     rows: int = Field(default=16_384, ge=64)
     """Most held-out queries a fabric used for the errors."""
     frames: int = Field(default=6, ge=3, le=1024)

@@ -15,14 +15,17 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
+from pipeline.models.options import CLASSES
 from pipeline.scenes.options import Scene
-from reports import accuracy, bias, cells, effort, figures, summary, tiles
+from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
 from reports.exr import read_exr
 from reports.options import BenchOptions
 from reports.record import TRUTH, Machine, Record, Role, to_table
+from reports.silhouette import silhouette_table
 from reports.stability import Finding, from_records
-from reports.style import DARK, LIGHT, display, render
-from reports.wording import DEFINITIONS, caveats, headline, learnt
+from reports.style import DARK, LIGHT, Scheme, display, render
+from reports.tradeoff import tradeoff_table
+from reports.wording import DEFINITIONS, beaten, caveats, cheapest_sentences, headline, learnt
 from weaves.fabric import Fabric
 
 
@@ -43,12 +46,21 @@ class ModelNote:
     """What the page says of a method."""
 
     name: str
+    """As in the recipe: tells several models of one kind apart."""
     about: str
     """In a few words: what it is and how it was trained."""
     fingerprint: str = ""
     """Of the trained model."""
     per_material: bool = False
     """Whether it learns each fabric by itself."""
+    kind: str = ""
+    """Which model it is, a key of `pipeline.models.options.CLASSES`; empty: that of its name."""
+
+    @property
+    def learns(self) -> bool:
+        """Whether there is anything to train."""
+        model = CLASSES.get(self.kind or self.name)
+        return model is None or model.learns
 
 
 @dataclass(frozen=True)
@@ -105,7 +117,12 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "aliasing": summary.aliasing_table(page.records),
         "timing": summary.timing_table(page.records),
         "energy": summary.energy_table(page.records),
+        "silhouettes": silhouette_table(page.records),
     }
+    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"])
+    between = summary.path_table(page.records)
+    if len(between):
+        tables["between"] = between
     findings = from_records(page.records)
     if findings:
         tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
@@ -115,7 +132,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     for name, table in tables.items():
         write_table(folder / "tables" / name, table)
     progress(0.1)
-    images = dict(_plots(tables, page.records))
+    images = dict(_plots(tables, page))
     for name, content in images.items():
         atomic_write(folder / "figures" / name, content)
     progress(0.4)
@@ -136,23 +153,35 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 
 
 def _of_the_truth(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
-    """Return what `bench truth` measured beside speeds, by the name of its table."""
+    """Return what `bench truth` measured beside speeds, and `bench sampler`, by the names of their tables."""
     return {
         "truth_accuracy": accuracy.from_records(records),
         "truth_bias": bias.from_records(records),
         "truth_effort": effort.from_records(records),
+        "sampler": sampling.from_records(records),
     }
 
 
-def _plots(tables: dict[str, pd.DataFrame], records: Sequence[Record]) -> Iterator[tuple[str, bytes]]:
+def _schemes(page: PageInput) -> dict[str, Scheme]:
+    """Return both schemes with a colour for every method of the page."""
+    names = [TRUTH, *(note.name for note in page.models)]
+    return {scheme.name: scheme.naming(names) for scheme in (LIGHT, DARK)}
+
+
+def _untrained(page: PageInput) -> set[str]:
+    """Return the names of the methods that learn nothing."""
+    return {note.name for note in page.models if not note.learns}
+
+
+def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[str, bytes]]:
     """Draw every plot that there are numbers for, in both schemes."""
     errors, timing, aliasing = tables["errors"], tables["timing"], tables["aliasing"]
-    curves = summary.spectra(records)
+    curves = summary.spectra(page.records)
     plots: dict[str, tuple[Any, ...]] = {}
     if len(errors):
         plots["errors"] = (figures.errors, errors, tables["errors_by_fabric"])
-    if len(errors) and len(timing):
-        plots["error-against-time"] = (figures.error_against_time, errors, timing)
+    if tables["tradeoff"]["error"].notna().any():
+        plots["error-against-time"] = (figures.error_against_time, tables["tradeoff"])
     if len(aliasing):
         plots["aliasing"] = (figures.aliasing, aliasing)
     if curves:
@@ -160,7 +189,7 @@ def _plots(tables: dict[str, pd.DataFrame], records: Sequence[Record]) -> Iterat
     if len(timing):
         plots["timing"] = (figures.timing, timing)
     for name, (plot, *data) in plots.items():
-        for scheme in (LIGHT, DARK):
+        for scheme in _schemes(page).values():
             yield f"{name}-{scheme.name}.png", render(plot, scheme, *data)
 
 
@@ -183,6 +212,7 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
 def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[Finding], plots: set[str]) -> str:
     errors, timing = tables["errors"], tables["timing"]
     per_material = [note.name for note in page.models if note.per_material]
+    untrained, schemes = _untrained(page), _schemes(page)
     environment = Environment(
         loader=PackageLoader("reports"),
         autoescape=True,
@@ -195,13 +225,22 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
     shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
     return environment.get_template("page.html.j2").render(
         page=page,
-        headlines=_headlines(errors, timing),
-        figures_of_merit=cells.figures_of_merit(page.records, errors, timing),
+        headlines=_headlines(errors, timing, untrained),
+        figures_of_merit=cells.figures_of_merit(page.records, errors, timing, untrained),
+        front=cells.front_rows(tables["tradeoff"]),
+        front_columns=cells.FRONT,
+        cheapest=cheapest_sentences(tables["tradeoff"]),
+        beaten=beaten(tables["tradeoff"]),
         errors=cells.error_rows(errors, per_material),
         by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
         aliasing=cells.aliasing_rows(tables["aliasing"], page.records),
         energy=cells.energy_rows(tables["energy"]),
+        silhouettes=cells.silhouette_rows(tables["silhouettes"]),
+        silhouette_columns=cells.SILHOUETTE,
         timing=cells.timing_rows(timing),
+        paths=cells.path_rows(summary.path_table(page.records)),
+        edits=cells.edit_rows(page.records),
+        shares=[f"t = {share:g}" for share in latents.SHARES],
         stability=cells.stability_rows(findings),
         rates=cells.rate_rows(page.records),
         accuracies=cells.accuracy_rows(measured["truth_accuracy"]),
@@ -209,9 +248,10 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         accuracy_count=max((row.count for row in measured["truth_accuracy"]), default=0),
         biases=cells.bias_rows(measured["truth_bias"]),
         efforts=cells.effort_rows(measured["truth_effort"]),
+        samplers=cells.sampler_rows(measured["sampler"]),
         limit=cells.percent(bias.LIMIT),
         asked=cells.percent(effort.RELATIVE_ERROR),
-        columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT},
+        columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT, "sampler": cells.SAMPLERS},
         titles={name: cells.plain(name) for name in cells.accuracy_rows(measured["truth_accuracy"])},
         strips=_strips(page, tables["pictures"]),
         fabrics=fabrics,
@@ -219,17 +259,17 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         plots=plots,
         definitions=DEFINITIONS,
         caveats=caveats(page.options, per_material, errors),
-        colours={scheme.name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for scheme in (LIGHT, DARK)},
-        schemes={"light": LIGHT, "dark": DARK},
+        colours={name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for name, scheme in schemes.items()},
+        schemes=schemes,
         difference_range=tiles.DIFFERENCE_RANGE,
         table_names=sorted(tables),
     )
 
 
-def _headlines(errors: pd.DataFrame, timing: pd.DataFrame) -> list[str]:
+def _headlines(errors: pd.DataFrame, timing: pd.DataFrame, untrained: set[str]) -> list[str]:
     """Return a sentence for each learnt method; the first quotes the paper."""
     result: list[str] = []
-    for key in learnt(errors) if len(errors) else []:
+    for key in learnt(errors, untrained) if len(errors) else []:
         if text := headline(*key, errors, timing, paper=not result):
             result.append(text)
     return result

@@ -71,9 +71,17 @@ Metric = Literal[
     "kind_share",
     "kind_points",
     "kind_time",
+    "variance_saved",
+    "sample_time",
+    "path_error",
+    "reencode_error",
+    "encode_time",
+    "silhouette_coverage",
+    "silhouette_displacement",
+    "silhouette_light",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
-`accuracy`, `bias` and `effort`."""
+`accuracy`, `bias`, `effort`, `latents` and `silhouette`."""
 
 
 class Provenance(BaseModel):

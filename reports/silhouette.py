@@ -12,19 +12,23 @@ same questions with curvature 0, opaque everywhere, and 0 where the light is beh
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+import pandas as pd
 
 from pipeline.models.method import Method
 from pipeline.scenes.curvature import minimum_curvature
 from pipeline.scenes.shade import shade
 from pipeline.truth.curved import opacity
 from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from reports.exr import read_exr, write_exr
+from reports.options import EdgeOptions
+from reports.record import TRUTH, Provenance, Record, Role, to_table
 from weaves.fabric import Fabric
 
 Floats = npt.NDArray[np.float64]
@@ -36,28 +40,6 @@ class SeesThrough(Protocol):
 
     def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
-
-
-class EdgeOptions(BaseModel):
-    """Cylinder, camera, light and truth."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
-
-    radius: float = Field(default=10.0, ge=1, le=1e4)
-    """Of the boundary, in yarn spacings."""
-    depth: float = Field(default=0.24, gt=0)
-    """Width of the strip, in yarn spacings; less than the radius. Rays rise again from depths of a few tenths of a
-    yarn spacing at most."""
-    pixel: float = Field(default=0.02, gt=0, le=1)
-    """Side of a pixel, in yarn spacings; its Gaussian has half of it as standard deviation."""
-    rows: int = Field(default=200, ge=1, le=4096)
-    """Pixels along the edge."""
-    light: tuple[float, float] = (60.0, 20.0)
-    """In degrees: angle from the camera's direction towards the edge's side, and elevation along the axis."""
-    truth: TruthOptions = TruthOptions(relative_error=0.02, max_count=4096)
-    """How true the truth is."""
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    """Of the truth's points."""
 
 
 class Edge(NamedTuple):
@@ -152,6 +134,67 @@ def silhouette(method: Method, fabric: Fabric, options: EdgeOptions, truth: Edge
         displacement=float(covered.sum(axis=1).mean() * options.pixel),
         light_rmse=float(np.sqrt(np.square(found.light - truth.light).mean())),
     )
+
+
+def render_edge(fabric: Fabric, options: EdgeOptions, path: Path) -> None:
+    """Write the truth's pictures to `path`: R, G, B the light, A the coverage."""
+    edge = true_edge(fabric, options)
+    planes = {name: edge.light[..., index] for index, name in enumerate("RGB")} | {"A": edge.coverage}
+    write_exr(path, planes, {"fabric": fabric.name, "scene": "edge", "method": TRUTH})
+
+
+def read_edge(path: Path) -> Edge:
+    """Read what `render_edge` wrote; BadInput if there is nothing."""
+    exr = read_exr(path)
+    return Edge(exr.channels["A"].astype(np.float64), exr.stack("R", "G", "B").astype(np.float64))
+
+
+def measure_silhouette(
+    method: Method,
+    fabric: Fabric,
+    role: Role,
+    options: EdgeOptions,
+    truth: Path,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure a method's edge against the truth's: errors of coverage and light, and how far the edge lies outside.
+
+    Parameters
+    ----------
+    method : Method
+        Must cover the fabric.
+    truth : Path
+        The pictures that `render_edge` wrote with the same options.
+    """
+    reference = read_edge(truth)
+    found = silhouette(method, fabric, options, reference)
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric.name,
+        role=role,
+        provenance=provenance or Provenance(),
+    )
+    pixels = reference.coverage.size
+    return [
+        subject.of("silhouette_coverage", found.coverage_rmse, pixels),
+        subject.of("silhouette_displacement", found.displacement, options.rows, unit="yarn spacings"),
+        subject.of("silhouette_light", found.light_rmse, pixels),
+    ]
+
+
+def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return one row a method: coverage, displacement, light, fabrics; means over fabrics."""
+    table = to_table(records)
+    table = table[table["metric"].str.startswith("silhouette_")]
+    keys = ["method", "setting"]
+    if table.empty:
+        return pd.DataFrame(columns=[*keys, "coverage", "displacement", "light", "fabrics"])
+    names = table["metric"].str.removeprefix("silhouette_")
+    means = table.assign(metric=names).pivot_table("value", keys, "metric", "mean", sort=False)
+    counts: Any = table.groupby(keys, sort=False)["fabric"].nunique().rename("fabrics")
+    result: pd.DataFrame = means[["coverage", "displacement", "light"]].join(counts).reset_index()
+    return result.rename_axis(columns=None)
 
 
 def _edge(

@@ -100,6 +100,18 @@ def energy_table(records: Sequence[Record]) -> pd.DataFrame:
     return groups.agg(**worst, fabrics=("fabric", "size")).reset_index()
 
 
+def path_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return errors between fabrics, one row a share of a path: method, setting, fabric, to, how, share, error."""
+    ways = {"path_error": "latents blended", "reencode_error": "encoded anew"}
+    lines = [
+        (record.method, record.setting, record.fabric, record.note, ways[record.metric], share, error)
+        for record in records
+        if record.metric in ways
+        for share, error in record.curve
+    ]
+    return pd.DataFrame(lines, columns=[*_KEYS, "fabric", "to", "how", "share", "error"])
+
+
 def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the cost of a query: median and quartiles in nanoseconds, bytes stored, time over that of 2 points."""
     table = to_table(records)

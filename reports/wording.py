@@ -6,7 +6,7 @@ Nothing is claimed that was not measured: a sentence is only made where both of 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import pandas as pd
@@ -17,6 +17,7 @@ from reports.record import TRUTH
 from reports.style import display
 from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
+from reports.tradeoff import LIMITS, cheapest
 
 DEFINITIONS: Final = {
     "MSE": "Mean squared error in linear RGB of the fabric's own colours, over held-out queries and channels, the "
@@ -39,6 +40,8 @@ DEFINITIONS: Final = {
     "ns a query": "Median time of one query, everything included, of calls that take turns in one process after a "
     "warm-up; quartiles beside it.",
     "× time": "That time over the time of point sampling at 2 points.",
+    "front": "The methods that no other beats on both error (relative RMSE of the colour) and time. Only methods that "
+    "answer for the same fabrics are compared; an error that is lost in the noise of the truth takes no part.",
     "bytes stored": "What a renderer keeps to answer for one fabric: weights and textures, or tables; mean over "
     "fabrics.",
 }
@@ -61,11 +64,43 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
     return f"{said}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{said}."
 
 
-def learnt(errors: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the methods that are not point sampling."""
+def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
+    """Return the methods that are neither the truth nor among those that nothing is trained for."""
     keys = dict.fromkeys(zip(errors["method"], errors["setting"], strict=True))
-    baseline = {key[0] for key in keys if key == BASELINE}
-    return [key for key in keys if key[0] not in baseline and key[0] != TRUTH]
+    return [key for key in keys if key[0] not in untrained and key[0] != TRUTH]
+
+
+def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) -> list[str]:
+    """Return for each role which method costs least within each error, from `tradeoff.tradeoff_table`.
+
+    Errors that one method is the cheapest for are named together.
+    """
+    result = []
+    for role, group in table.groupby("role", sort=False):
+        said: dict[str, list[str]] = {}
+        for limit in limits:
+            best = cheapest(group, limit)
+            text = f"{display(best.method, best.setting)} ({best.ns:,.0f} ns)" if best else ""
+            said.setdefault(text, []).append(f"{100 * limit:g} %")
+        parts = [f"for {_and(found)} the cheapest is {text}" for text, found in said.items() if text]
+        if missed := said.get(""):
+            parts.append(f"{_and(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
+        result.append(f"{str(role).capitalize()} fabrics, error of the colour: {'; '.join(parts)}.")
+    return result
+
+
+def beaten(table: pd.DataFrame) -> dict[str, list[str]]:
+    """Return for each role the methods of which no knob is on the front."""
+    result = {}
+    for role, group in table.groupby("role", sort=False):
+        best = set(group.loc[group["front"], "method"])
+        result[str(role)] = [display(name) for name in dict.fromkeys(group["method"]) if name not in best]
+    return result
+
+
+def _and(words: Sequence[str]) -> str:
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataFrame) -> list[str]:

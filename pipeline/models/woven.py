@@ -41,8 +41,10 @@ from pipeline.models.encodings import encoded_size, one_blob, periodic_blob
 from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, in_chunks, in_repeat
 from pipeline.models.options import WovenOptions
-from pipeline.models.placement import SYMMETRIES, Placement, placement, standard
+from pipeline.models.placement import SYMMETRIES, Placement, moved, placement, standard
 from pipeline.truth.query import Queries
+from weaves.draft import Matrix
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
@@ -54,6 +56,11 @@ _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 def _activate(x: Tensor) -> Tensor:
     return functional.leaky_relu(x, _SLOPE)
+
+
+def _patch(options: WovenOptions) -> int:
+    """Return how many numbers say where a footprint lies and how large it is."""
+    return 3 if options.one_blob == "none" else 3 * options.bins
 
 
 def _counts(options: WovenOptions) -> tuple[int, int]:
@@ -124,7 +131,7 @@ class _Decoder(nn.Module):
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
-        hidden, patch = options.hidden, 3 * options.bins
+        hidden, patch = options.hidden, _patch(options)
         self.latent = options.latent
         self.first = nn.Linear(options.latent + patch + (0 if options.spatial_fusion else _DIRECTIONS), hidden)
         self.filters: nn.Linear | None = None
@@ -152,8 +159,8 @@ class _Decoder(nn.Module):
             From the encoder.
         where : Tensor (F, n, bins^2) or None
             The footprint's share of every entry of the picture.
-        patch : Tensor (F, n, 3 bins)
-            One-blobs.
+        patch : Tensor (F, n, 3 bins or 3)
+            One-blobs, or the bare numbers.
         wi, wo : Tensor (F, n, 3)
             Directions.
         """
@@ -215,12 +222,25 @@ class Cloth(NamedTuple):
         return Cloth(self.maps.to(device), self.parameters.to(device), Placement(*parts))
 
 
-def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions) -> Cloth:
-    """Look at the surfaces of at least one fabric."""
+def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> Cloth:
+    """Look at the surfaces of at least one fabric.
+
+    Parameters
+    ----------
+    fabrics : sequence of Fabric
+        At least one.
+    options : WovenOptions
+        Whether they are brought into standard position, and how finely they are seen.
+    like : Fabric, optional
+        All are mirrored, exchanged and begun as brings this one into standard position; otherwise each by itself.
+    """
     centre = (np.arange(options.map_texels) + 0.5) / options.map_texels
     maps, parameters, placements = [], [], []
     for fabric in fabrics:
-        seen, symmetry, start = standard(fabric) if options.standard else (fabric, SYMMETRIES[0], (0, 0))
+        seen, symmetry, start = fabric, SYMMETRIES[0], (0, 0)
+        if options.standard:
+            seen, symmetry, start = standard(like or fabric)
+            seen = seen if like is None else _begun_at(moved(fabric, symmetry), start)
         ends, picks = seen.weave.repeat
         surface = surface_at(seen, centre[None, :] * ends, centre[:, None] * picks)
         maps.append(np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1))
@@ -230,6 +250,12 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions) -> Cloth:
         placements.append(placement(fabric, symmetry, start))
     together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
     return Cloth(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
+
+
+def _begun_at(fabric: Fabric, start: tuple[int, int]) -> Fabric:
+    """Return a fabric whose repeat begins at the end and pick of `start`."""
+    end, pick = start
+    return fabric.model_copy(update={"draft": Matrix(rows=tuple(fabric.weave.rolled(-end, -pick).rows()))})
 
 
 class WovenNetwork(nn.Module):
@@ -285,9 +311,12 @@ class WovenNetwork(nn.Module):
         u, v, wi, wo = placement.move(u, v, wi, wo)
         options, bins, extent = self.options, self.options.bins, placement.repeat
         size = sigma / extent.prod(dim=-1, keepdim=True).sqrt()
-        size = one_blob(encoded_size(size, options.smallest_size, options.largest_size), bins)
+        size = encoded_size(size, options.smallest_size, options.largest_size)
+        size = size.unsqueeze(-1) if options.one_blob == "none" else one_blob(size, bins)
         where: Tensor | None = None
-        if options.one_blob == "plain":
+        if options.one_blob == "none":
+            blobs = [u.unsqueeze(-1), v.unsqueeze(-1)]
+        elif options.one_blob == "plain":
             blobs = [one_blob(u, bins), one_blob(v, bins)]
         elif options.one_blob == "periodic":
             blobs = [periodic_blob(u, 1.0 / bins, bins), periodic_blob(v, 1.0 / bins, bins)]
@@ -369,11 +398,38 @@ class Woven:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-        swap = self._encode(fabric)[1].swap
-        log_k = self._network.options.log_k
-        return self._answer(fabric, queries, lambda output: to_components(swap(output[..., :4])[0], log_k))
+        return self._components(queries, *self._encode(fabric))
+
+    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer for what lies between two fabrics: latents are blended, nothing between them is encoded.
+
+        Parameters
+        ----------
+        first, second : Fabric
+            Of one repeat. Both are placed as the first one is: what is blended must lie in the same place.
+        share : float
+            Of the second one's latent; 0 is the first fabric, 1 the second.
+        queries : Queries
+            N questions, in yarn spacings of either fabric.
+
+        Returns
+        -------
+        float32 (N, 4)
+
+        Raises
+        ------
+        BadInput
+            If the repeats differ, or for kinds of queries that were not taught.
+        """
+        if first.weave.repeat != second.weave.repeat:
+            (ends, picks), allowed = second.weave.repeat, "the repeat of {} is needed, {} x {}, to blend the two"
+            raise BadInput(second.name, "repeat", f"{ends} x {picks}", allowed.format(first.name, *first.weave.repeat))
+        with torch.inference_mode():
+            cloth = read_cloth([first, second], self._network.options, like=first).to(self._device)
+            one, other = self._network.encode(cloth)
+            blended = torch.lerp(one, other, share).unsqueeze(0)
+            place = cloth.take(torch.tensor([0], device=self._device)).placement
+        return self._components(queries, blended, place)
 
     def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of light from straight behind that passes unscattered, float32 (N,) in [0, 1].
@@ -382,18 +438,27 @@ class Woven:
         """
         if not self._network.options.transmission:
             return np.zeros(len(queries.u), np.float32)
+
+        def read(output: Tensor) -> Tensor:
+            return output[0, :, 4:].clamp(0.0, 1.0).expand(-1, 4)
+
+        return self._answer(queries, *self._encode(fabric), read)[:, 0].copy()
+
+    def _components(self, queries: Queries, latent: Tensor, place: Placement) -> npt.NDArray[np.float32]:
+        log_k = self._network.options.log_k
+        return self._answer(queries, latent, place, lambda output: to_components(place.swap(output[..., :4])[0], log_k))
+
+    def _answer(
+        self, queries: Queries, latent: Tensor, place: Placement, read: Callable[[Tensor], Tensor]
+    ) -> npt.NDArray[np.float32]:
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        share = self._answer(fabric, queries, lambda output: output[0, :, 4:].clamp(0.0, 1.0).expand(-1, 4))
-        return share[:, 0].copy()
-
-    def _answer(self, fabric: Fabric, queries: Queries, read: Callable[[Tensor], Tensor]) -> npt.NDArray[np.float32]:
-        latent, place = self._encode(fabric)
 
         def answer(*columns: Tensor) -> Tensor:
             return read(self._network.decode(latent, place, *(column.unsqueeze(0) for column in columns)))
 
-        return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
+        ends, picks = place.own_repeat()[0].tolist()
+        return in_chunks(in_repeat(queries, (int(ends), int(picks))), answer, self._device)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the fabric's latent; the encoder is not needed to render."""

@@ -126,6 +126,31 @@ def test_a_colour_changes_what_is_shown_of_its_fabric_and_no_training(files, tas
         assert ids(after, "bench", other) == ids(tasks, "bench", other)
 
 
+def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
+    assert not ids(tasks, "bench", ", edge")
+    after = edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 8.0]\ncurvature = [0.01, 0.5]")
+    edges = ids(after, "bench", ", edge")
+    assert len(edges) == 3
+    for task in after:
+        if task.stage == "bench" and task.title.endswith(" on denim"):
+            assert edges[0] in task.needs
+            assert task.setting["truth"]["edge"].startswith("records/truth-denim-edge-")
+    again = edited(files, "frames = 4", "frames = 4\nedge = { radius = 20.0 }")
+    assert set(ids(again, "bench", ", edge")).isdisjoint(edges)
+    assert ids(again, "bench", ", sphere") == ids(after, "bench", ", sphere")
+
+
+def test_models_of_one_kind_are_told_apart_on_the_page(files):
+    tasks = edited(files, 'model = "neumip"', 'model = "neumip"\n\n[[models]]\nmodel = "neumip"\nname = "fine"')
+    page = tasks[-1]
+    notes = {note["name"]: note for note in page.setting["models"]}
+    assert notes["fine"]["kind"] == "neumip" and notes["fine"]["about"].startswith("neumip: ")
+    assert {"neumip", "fine"} <= {picture["method"] for picture in page.setting["pictures"]}
+    assert len({(p["fabric"], p["scene"], p["method"], p["setting"]) for p in page.setting["pictures"]}) == len(
+        page.setting["pictures"]
+    )
+
+
 def test_truth_of_pictures_is_shared_by_all_models_and_data_sets(files, tasks):
     pictures = ids(tasks, "bench", "truth of ")
     assert len(pictures) == 3 * 3
@@ -144,6 +169,15 @@ def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tas
         assert set(ids(tasks, "generate", f"{fabric} test")) < set(neumip.needs)
     assert [task.title for task in tasks if task.alone] == ["timing of all methods"]
     assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
+
+
+def test_what_lies_between_fabrics_needs_the_training_alone(files, tasks):
+    """Its pairs are presets: no row and no fabric of the recipe enters but through the network and the questions."""
+    (task,) = [task for task in tasks if task.title.startswith("latents")]
+    assert task.title == "latents of woven" and list(task.needs) == ids(tasks, "train", "woven")
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "latents") == [task.id]
+    assert ids(edited(files, "test = 500", "test = 600"), "bench", "latents") == [task.id]
+    assert ids(edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 9.0]"), "bench", "latents") != [task.id]
 
 
 def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):

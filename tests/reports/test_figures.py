@@ -1,10 +1,13 @@
 import io
+from itertools import pairwise
 
 import matplotlib.image
 import pytest
 
+from pipeline.models.options import CLASSES
 from reports import figures, summary
-from reports.style import DARK, LIGHT, display, render
+from reports.style import DARK, LIGHT, MARKERS, NAMES, display, render
+from reports.tradeoff import tradeoff_table
 
 PLOTS = ["errors", "error_against_time", "aliasing", "spectra", "timing"]
 
@@ -14,7 +17,7 @@ def data(made_up):
     errors, timing = summary.error_table(made_up), summary.timing_table(made_up)
     return {
         "errors": (errors, summary.fabric_table(made_up)),
-        "error_against_time": (errors, timing),
+        "error_against_time": (tradeoff_table(errors, timing),),
         "aliasing": (summary.aliasing_table(made_up),),
         "spectra": (summary.spectra(made_up),),
         "timing": (timing,),
@@ -39,14 +42,53 @@ def test_equal_data_give_equal_bytes(data):
 def test_front_holds_what_nothing_beats_on_both(data):
     """Made up: points of k cost 400 k and err 1/k, woven and NeuMIP lie at k = 9 like points: all are on the front
     but NeuMIP, which costs more than woven at the same error."""
-    errors, timing = data["error_against_time"]
-    figure = figures.error_against_time(LIGHT, errors, timing)
+    (table,) = data["error_against_time"]
+    figure = figures.error_against_time(LIGHT, table)
     line = figure.axes[0].lines[0]
     assert sorted(line.get_xdata()) == list(line.get_xdata())
-    costs = timing.set_index(["method", "setting"])["median_ns"]
+    costs = table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
     assert costs["neumip", ""] not in line.get_xdata()
     assert costs["woven", ""] in line.get_xdata()
     assert len(line.get_xdata()) == 6
+
+
+def test_the_knobs_of_a_method_are_one_curve_and_its_ends_are_numbered(data):
+    figure = figures.error_against_time(LIGHT, *data["error_against_time"])
+    curves = {len(line.get_xdata()) for line in figure.axes[0].lines[1:]}
+    assert curves == {1, 5}  # woven and NeuMIP; points of 1, 2, 4, 16, 64
+    assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["woven", "NeuMIP", "points", "the paper: 2.0× lower at 0.83× the time"]
+
+
+def test_rows_of_a_method_stand_together_under_its_name(data):
+    errors, fabrics = data["errors"]
+    mixed = errors.iloc[::-1].reset_index(drop=True)
+    figure = figures.errors(LIGHT, mixed, fabrics)
+    labels = [label.get_text().replace("\u00a0", " ") for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["points, k = 64", "k = 16", "k = 4", "k = 2", "k = 1", "NeuMIP", "woven"]
+    assert [b - a for a, b in pairwise(figure.axes[0].get_yticks())] == [1, 1, 1, 1, 1.5, 1]
+
+
+def test_ticks_of_both_signs_are_powers_of_ten_and_few():
+    assert figures._signed_decades([0.02, -0.0005], 1e-3) == pytest.approx([0, 1e-3, 1e-2])
+    ticks = figures._signed_decades([-0.3, 2.0, 1e-5], 1e-5)
+    assert len(ticks) <= 7 and 0.0 in ticks and 1.0 in ticks and -0.1 in ticks
+    assert figures._signed_decades([], 1e-5) == [0.0]
+
+
+@pytest.mark.parametrize("count", [1, 5, 40])
+def test_labels_keep_apart(count):
+    places = figures._apart([0.1 * (index // 3) for index in range(count)], 0.2, 3.0)
+    assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places))
+    assert places[-1] <= 3.0
+
+
+def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(data):
+    (curves,) = data["spectra"]
+    labels = {text.get_text().replace("\u00a0", " ") for text in figures.spectra(LIGHT, curves).axes[0].texts}
+    assert {"points, k = 2", "points, k = 64", "woven", "NeuMIP", "truth"} <= labels
+    assert "points, k = 16" not in labels and "points, k = 1" not in labels
 
 
 @pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
@@ -55,6 +97,28 @@ def test_every_method_has_a_colour_of_its_own(scheme):
     colours = scheme.colours(names)
     assert len(set(colours.values())) == len(names)
     assert scheme.colours(["woven", "woven"]) == {"woven": colours["woven"]}
+
+
+@pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
+def test_every_model_has_a_colour_that_no_other_has(scheme):
+    assert set(CLASSES) <= set(scheme.methods)
+    assert len(set(scheme.methods.values()) | set(scheme.others)) == len(scheme.methods) + len(scheme.others)
+    assert set(NAMES) | set(MARKERS) <= set(scheme.methods)
+
+
+def test_a_page_gives_names_their_colours_for_good():
+    """Two models of one kind differ, and a plot of the second alone shows it as the plot of both does."""
+    page = LIGHT.naming(["truth", "woven", "wide", "deep"])
+    assert page.colours(["deep"])["deep"] == page.colours(["wide", "deep"])["deep"]
+    assert page.colours(["deep"])["deep"] not in (page.colours(["wide"])["wide"], page.methods["woven"])
+    assert LIGHT.colours(["deep"])["deep"] != page.colours(["deep"])["deep"]
+    assert page.marker("deep") == page.marker("woven") != page.marker("point_sampled")
+
+
+def test_two_dozen_unknown_names_are_told_apart_by_colour_and_mark():
+    names = [f"variant_{index}" for index in range(24)]
+    page = LIGHT.naming(["truth", "woven", *names])
+    assert len({(page.methods[name], page.marker(name)) for name in names}) == len(names)
 
 
 def test_display_keeps_settings_on_one_line():

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import urlparse
@@ -8,9 +9,10 @@ import pytest
 
 from reports import accuracy, bias, effort
 from reports.exr import write_exr
+from reports.latents import SHARES
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
-from reports.record import this_machine
+from reports.record import Record, this_machine
 from reports.stability import judge, to_records
 from weaves.fabric import load_fabric
 
@@ -119,6 +121,32 @@ def test_headline_prints_the_papers_comparison(written):
     assert "Point sampling at 2 points answers 0 for 15% of the queries" in words
 
 
+def test_the_front_is_named_and_shown(written):
+    """Made up: errors are the root of 2e-3 or 1.5e-3 over k, so that 64 points err half a percent."""
+    folder, page = written
+    assert "for 10 %" in page.words and "the cheapest is points, k = 1" in page.words
+    assert "The front, seen fabrics" in page.words and "Not on the front, seen fabrics: NeuMIP." in page.words
+    front = pd.read_csv(folder / "tables" / "tradeoff.csv")
+    assert set(front.loc[~front["front"], "method"]) == {"neumip"}
+
+
+def test_methods_that_learn_nothing_make_no_headline(page_input, tmp_path):
+    note = ModelNote("woven", "a rule", kind="quadrature")
+    models = [note, *page_input.models[1:]]
+    page = Page(write_page(tmp_path, replace(page_input, models=models)).read_text(encoding="utf-8"))
+    assert "Woven reaches" not in page.words and "NeuMIP reaches" in page.words
+
+
+def test_silhouettes_are_shown_where_they_were_measured(written, page_input, tmp_path):
+    assert "silhouettes" not in written[1].ids and "#silhouettes" not in written[1].targets
+    subject = Record(method="curved", fabric="denim", role="seen")
+    numbers = {"silhouette_coverage": 0.125, "silhouette_displacement": -0.03, "silhouette_light": 0.25}
+    more = [subject.of(name, value, 100) for name, value in numbers.items()]
+    page = Page(write_page(tmp_path, replace(page_input, records=[*page_input.records, *more])).read_text())
+    assert "silhouettes" in page.ids and "#silhouettes" in page.targets
+    assert "curved.125−0.0300.2501" in page.words.replace(" ", "")
+
+
 def test_page_says_what_it_is_made_of(written, page_input):
     words = written[1].words
     for fact in ("fedcba9876543210", "tiny-01234567", "0011223344556677", page_input.machine.cpu, "1.51 %"):
@@ -173,6 +201,25 @@ def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path)
     assert len(pd.read_csv(tmp_path / "tables" / "stability.csv")) == 2
     # Nothing else on the page takes the two arithmetics for methods.
     assert page.words.count("float32") == 1
+
+
+def test_what_lies_between_fabrics_is_shown_where_it_was_measured(written, page_input, tmp_path):
+    assert "latents" not in written[1].ids and "#latents" not in written[1].targets
+    subject = Record(method="woven", fabric="denim")
+    path = subject.model_copy(update={"note": "yarns of satin_8"})
+    curve = tuple(zip(SHARES, (0.01, 0.15, 0.2, 0.1, 0.02), strict=True))
+    records = [path.of("path_error", 0.2, 64, curve=curve), path.of("reencode_error", 0.2, 64, curve=curve[::-1])]
+    edit = subject.model_copy(update={"note": "a colour"})
+    records.append(edit.of("encode_time", 0.25, 25, unit="ms", low=0.24, high=0.31))
+    more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *records]})
+    page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
+    assert "latents" in page.ids and "#latents" in page.targets
+    words = page.words.replace(" ", "")
+    assert "denim→yarnsofsatin8latentsblended1.0%15.0%20.0%10.0%2.0%" in words
+    assert "denim→yarnsofsatin8encodedanew2.0%10.0%20.0%15.0%1.0%" in words
+    assert "acolour0.25ms0.24…0.31" in words
+    table = pd.read_csv(tmp_path / "tables" / "between.csv")
+    assert table["share"].tolist() == [*SHARES, *SHARES[::-1]]
 
 
 def test_what_accuracy_costs_is_shown_where_it_was_measured(written, page_input, tmp_path):

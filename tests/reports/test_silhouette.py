@@ -6,7 +6,17 @@ import pytest
 from pipeline.truth.curved import opacity
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.silhouette import EdgeOptions, edge_of, edge_queries, silhouette, true_edge
+from reports.options import EdgeOptions
+from reports.silhouette import (
+    edge_of,
+    edge_queries,
+    measure_silhouette,
+    read_edge,
+    render_edge,
+    silhouette,
+    silhouette_table,
+    true_edge,
+)
 from weaves.fabric import load_fabric
 
 TINY = EdgeOptions(
@@ -99,3 +109,33 @@ def test_opacity_falls_towards_the_outline_and_flatter_cylinders_hide_more():
     assert (means[1] > means[0] - 0.02).all()
     assert (means[2] > means[1] - 0.02).all()
     assert means[2].mean() > means[0].mean() + 0.05
+
+
+def test_records_are_those_of_the_edge_that_was_rendered(tmp_path):
+    path = tmp_path / "edge.exr"
+    render_edge(DENIM, TINY, path)
+    truth = true_edge(DENIM, TINY)
+    np.testing.assert_allclose(read_edge(path).coverage, truth.coverage, atol=1e-7)
+    np.testing.assert_allclose(read_edge(path).light, truth.light, rtol=1e-6, atol=1e-9)
+    records = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
+    assert [record.metric for record in records] == [
+        "silhouette_coverage",
+        "silhouette_displacement",
+        "silhouette_light",
+    ]
+    np.testing.assert_allclose([r.value for r in records], silhouette(Flat(), DENIM, TINY, truth), rtol=1e-5)
+    assert {(r.method, r.fabric, r.role) for r in records} == {("flat", "denim", "seen")}
+
+
+def test_the_table_is_the_mean_over_fabrics(tmp_path):
+    path = tmp_path / "edge.exr"
+    render_edge(DENIM, TINY, path)
+    first = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
+    second = [
+        record.model_copy(update={"fabric": "basket", "value": 3 * record.value, "role": "unseen"}) for record in first
+    ]
+    (row,) = silhouette_table([*first, *second]).itertuples()
+    assert (row.method, row.setting, row.fabrics) == ("flat", "", 2)
+    expected = [2 * record.value for record in first]
+    assert [row.coverage, row.displacement, row.light] == pytest.approx(expected)
+    assert silhouette_table([]).empty

@@ -6,7 +6,7 @@ import pytest
 from pipeline.scenes.options import ViewOptions
 from reports.cells import fixed, percent, plain, scientific, signed, size, times
 from reports.options import BenchOptions
-from reports.wording import caveats, headline, learnt
+from reports.wording import beaten, caveats, cheapest_sentences, headline, learnt
 
 
 def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8):
@@ -33,6 +33,28 @@ def test_learnt_leaves_points_out():
         {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
     )
     assert learnt(errors) == [("woven", "")]
+    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
+
+
+def test_the_cheapest_is_said_of_what_was_measured():
+    table = pd.DataFrame(
+        {
+            "role": ["seen", "seen", "seen", "unseen"],
+            "method": ["point_sampled", "quadrature", "woven", "woven"],
+            "setting": ["k = 2", "k = 4", "", ""],
+            "ns": [500.0, 1500.0, 4000.0, 4000.0],
+            "error": [0.3, 0.04, 0.05, 0.011],
+            "front": [True, True, False, True],
+        }
+    )
+    seen, unseen = (text.replace("\u00a0", " ") for text in cheapest_sentences(table, (0.5, 0.1, 0.05, 0.02, 0.01)))
+    assert seen == (
+        "Seen fabrics, error of the colour: for 50 % the cheapest is points, k = 2 (500 ns); for 10 % and 5 % the "
+        "cheapest is quadrature, k = 4 (1,500 ns); 2 % and 1 % are reached by none."
+    )
+    assert unseen.endswith("for 50 %, 10 %, 5 % and 2 % the cheapest is woven (4,000 ns); 1 % is reached by none.")
+    assert beaten(table) == {"seen": ["woven"], "unseen": []}
+    assert cheapest_sentences(table[:0]) == []
 
 
 @pytest.mark.parametrize("footprint", ["major", "geometric_mean"])

@@ -128,7 +128,7 @@ def test_irregular_drafts_of_many_floats(side):
 
 
 def test_without_shadows_no_cloth_makes_light():
-    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above it.
+    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
 
     Diffuse: exactly bounded. Specular, scattered once: far below.
     """
