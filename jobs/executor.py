@@ -81,7 +81,7 @@ def execute(
     prepare : callable, optional
         Called once in one worker before all others, such as to compile kernels.
     recorded : callable
-        Called in this process after a receipt is written.
+        Called in this process after a receipt is written, or products are taken from another data set.
     console : Console, optional
         Where progress is shown.
 
@@ -92,7 +92,14 @@ def execute(
     """
     out = out.resolve()
     ledger = Ledger(out)
-    before = [task for task in tasks if ledger.state(task) == "done" or ledger.adopt(task)]
+    before = []
+    for task in tasks:
+        done = ledger.state(task) == "done"
+        if not done and ledger.adopt(task):
+            recorded(task)  # to whom it was not there a moment ago
+            done = True
+        if done:
+            before.append(task)
     finished = {task.id for task in before}
     todo = {task.id: task for task in tasks if task.id not in finished and task.stage in stages}
     _refuse_gaps(list(todo.values()), tasks, finished)

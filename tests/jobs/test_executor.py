@@ -12,7 +12,8 @@ import pytest
 from rich.console import Console
 
 from jobs.executor import execute
-from jobs.ledger import Ledger
+from jobs.ledger import Ledger, measure
+from jobs.task import Task
 from weaves.errors import BadInput, WorkFailed
 
 HERE = Path(__file__).parent
@@ -127,3 +128,18 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(tmp_path, fake, blow):
     assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
     expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
     assert hashes(tmp_path) == expected
+
+
+def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
+    """A second data set that shares a shard must hear of it: its manifest was written when the shard was not there."""
+    (tmp_path / "datasets" / "a").mkdir(parents=True)
+    (tmp_path / "datasets" / "a" / "part-x.parquet").write_bytes(b"twelve bytes")
+    first, twin = (Task("generate", "shards", "a shard", {"rows": 3}, (f"datasets/{n}/part-x.parquet",)) for n in "ab")
+    ledger = Ledger(tmp_path)
+    ledger.finish(first, {"part-x.parquet": measure(tmp_path / first.products[0])}, 1.0)
+    recorded = []
+    summary = execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    assert recorded == [twin] == summary.before and not summary.ran
+    recorded.clear()
+    execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    assert not recorded
