@@ -124,7 +124,7 @@ def evaluation_table(summary: Any) -> Table:
         "–"
         if summary.median_relative_error != summary.median_relative_error
         else f"{summary.median_relative_error:.2%}",
-        _number(summary.points / answered) if answered else "–",
+        _number(summary.points / answered) if answered and summary.points else "–",
         _number(answered / summary.seconds) if summary.seconds else "–",
     )
     return table

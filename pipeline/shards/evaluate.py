@@ -87,13 +87,14 @@ class Summary:
     def add(self, answers: Answers) -> None:
         """Count answered rows."""
         size, error = (np.linalg.norm(x, axis=1) for x in (answers.mean, answers.standard_error))
-        relative = np.log10(np.maximum(error[size > 0] / size[size > 0], 1e-30))
+        known = (size > 0) & (error > 0)  # a model states no errors
+        relative = np.log10(np.maximum(error[known] / size[known], 1e-30))
         self._relative += np.histogram(np.clip(relative, -8.0, 2.0), self._EDGES)[0]
         self.points += int(answers.count.sum(dtype=np.int64))
 
     @property
     def median_relative_error(self) -> float:
-        """Median of |standard errors| / |means| over rows that return light; NaN if there are none."""
+        """Median of |standard errors| / |means| over rows that return light and state errors; NaN if there are none."""
         total = np.cumsum(self._relative)
         if not total[-1]:
             return float("nan")
