@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +20,14 @@ PRETRAINED: Final = Path(__file__).parent.parent / "pipeline" / "models" / "pret
 def pretrained_names() -> list[str]:
     """Return the names of the models that come with the package."""
     return sorted(path.parent.name for path in PRETRAINED.glob("*/card.json"))
+
+
+def refuse_options_of_the_truth(chosen: Mapping[str, object]) -> None:
+    """Refuse what means nothing to a model: it answers as it was trained."""
+    for name, value in chosen.items():
+        if value is not None:
+            allowed = "leave it out with --model: a model answers as it was trained"
+            raise BadInput("evaluate", f"--{name.replace('_', '-')}", value, allowed)
 
 
 def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
@@ -56,4 +65,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         shares = through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
         return method.predict(fabric, queries), shares
 
-    return Answerer(answer, {"model": method.name, "card": (folder / "card.json").read_text(encoding="utf-8")})
+    about = {"model": method.name, "card": (folder / "card.json").read_text(encoding="utf-8")}
+    if domain is None:
+        return Answerer(answer, about)
+    return Answerer(answer, about, lambda queries: domain.faults(queries, method.name))

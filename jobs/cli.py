@@ -137,20 +137,20 @@ def evaluate(
     from jobs.evaluating import truth_options
     from weaves.fabric import load_fabric
 
-    options = truth_options(
-        estimator=estimator,
-        relative_error=relative_error,
-        absolute_error=absolute_error,
-        max_count=max_count,
-        footprint=footprint,
-        frame=frame,
-        normaliser=normaliser,
-    )
-    cloth = load_fabric(fabric)
-    other = None
+    chosen = {
+        "estimator": estimator,
+        "relative_error": relative_error,
+        "absolute_error": absolute_error,
+        "max_count": max_count,
+        "footprint": footprint,
+        "frame": frame,
+        "normaliser": normaliser,
+    }
+    options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
     if model is not None:
-        from jobs.answering import answerer
+        from jobs.answering import answerer, refuse_options_of_the_truth
 
+        refuse_options_of_the_truth(chosen | {"seed": seed or None, "workers": workers or None})
         other = answerer(model, cloth, extrapolate)
     answer(cloth, queries, out, options, seed, workers, skip_bad, other)
 

@@ -209,6 +209,7 @@ def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
         (training.id,),
         cost=10.0,
         size=4000,
+        alone=True,  # edits are timed
         setting={
             "make": "latents",
             "model": options.model_dump(mode="json"),

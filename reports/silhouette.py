@@ -5,7 +5,7 @@ An orthographic camera looks at right angles at a cylinder of radius r; its pict
 the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacity: what the cloth hides of the ground
 [Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance pi.
 
-A method without `transparency` knows no curved cloth. It is asked as a flat material is used on a curved surface: the
+A method without `missed` knows no curved cloth. It is asked as a flat material is used on a curved surface: the
 same questions with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
 """
 
@@ -38,7 +38,7 @@ Floats = npt.NDArray[np.float64]
 class SeesThrough(Protocol):
     """A method that knows what a curved cloth does not hide."""
 
-    def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
 
 
@@ -115,7 +115,7 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     queries = edge_queries(options, fabric.weave.repeat)
     method.prepare(fabric)
     if isinstance(method, SeesThrough):
-        coverage = 1.0 - method.transparency(fabric, queries)
+        coverage = 1.0 - method.missed(fabric, queries)
         return _edge(fabric, queries, coverage, method.predict(fabric, queries, options.seed), options)
     front = np.flatnonzero(queries.wi[:, 2] > 0)
     asked = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)

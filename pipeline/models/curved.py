@@ -1,7 +1,7 @@
 """A neural material for curved surfaces: reflectance with the curvature as an input, and opacity [Kuznetsov2022Curved].
 
 Cloth on a curved surface lies wholly below its boundary. A camera ray enters the boundary, and may leave it again
-without a hit: that share is the transparency, and it makes the silhouette. Three modules, each a texture over the
+without a hit: that share is missed, and it makes the silhouette. Three modules, each a texture over the
 repeat and a perceptron; the first two do not know the light:
 
     opacity       texture 7 + wo + kappa -> 24 -> 24 -> 24 -> 1, through a sigmoid
@@ -13,7 +13,7 @@ step in it. Over a footprint that cosine has a distribution: its mean and deviat
 sqrt(kappa), from `pipeline.truth.curved.grazing_cosine`, and the opacity is that Gaussian's share below wo.z. For that
 variant gaps count as filled, as they do in its truth.
 
-The transparency of a shard is another thing: what goes straight through the cloth at the points that the viewer sees.
+A shard's transparency is another thing: what goes straight through the cloth at the points that the viewer sees.
 So the truth of the silhouette is asked when a network is built (pipeline.models.silhouettes). ADAPTED as in `neumip`:
 four components, specular ones in log space, counts of texels and steps. The paper has one level and no footprint:
 `levels = 1` is its network.
@@ -250,7 +250,7 @@ class Curved:
             fabric, queries, lambda view, wi: to_components(network(view, wi), network.options.log_k)
         )
 
-    def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
         network = self._asked(fabric, queries)
         return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1))[:, 0]

@@ -1,7 +1,7 @@
-"""What a trained model was taught: questions and cloths outside of it are refused, never guessed at.
+"""What a trained model was taught: kinds of questions and cloths outside of it are refused, never guessed at.
 
-The domain is on the model card. Footprints beyond the trained sizes are the exception: a larger one is the average of
-the repeat, which models of a repeat know, and a smaller one is nearly a point.
+The domain is on the model card. Within a kind that it knows a model is asked beyond the trained ranges: larger
+footprints are the average of the repeat, smaller ones nearly points, and grazing angles are close to those it saw.
 """
 
 from __future__ import annotations
@@ -52,11 +52,18 @@ class Domain(BaseModel):
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""
-        for rows, column, value, allowed in self._strangers(queries):
-            if rows.any():
-                row = int(np.flatnonzero(rows)[0])
-                where = f"{int(rows.sum())} rows; first row {row}: {column}"
-                raise BadInput("queries", where, value[row].tolist(), f"the model {model} was trained {allowed} only")
+        if found := self.faults(queries, model):
+            row = min(found)
+            column, value, allowed = found[row]
+            raise BadInput("queries", f"{len(found)} rows; first row {row}: {column}", value, allowed)
+
+    def faults(self, queries: Queries, model: str) -> dict[int, tuple[str, object, str]]:
+        """Return the queries it was not taught, as `pipeline.truth.query.faults` does those that have no answer."""
+        found: dict[int, tuple[str, object, str]] = {}
+        for rows, column, values, allowed in self._strangers(queries):
+            for row in np.flatnonzero(rows).tolist():
+                found.setdefault(row, (column, values[row].tolist(), f"the model {model} was trained {allowed} only"))
+        return found
 
     def refuse_fabric(self, fabric: Fabric, model: str) -> None:
         """Refuse a fabric whose yarns lie outside those trained on."""

@@ -379,6 +379,8 @@ class TableOptions(_Options):
 
     model: Literal["table"] = "table"
     """Which file of `pipeline.models` implements it."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel it knows; must be the kernel of the truth."""
     name: Name = "table"
     """Name in tables."""
     nodes: Annotated[list[Annotated[int, Field(ge=4, le=64)]], Field(min_length=1, max_length=16)] = [8, 12, 16, 24, 32]
@@ -400,6 +402,8 @@ class QuadratureOptions(_Options):
 
     model: Literal["quadrature"] = "quadrature"
     """Which file of `pipeline.models` implements it."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel it knows; must be the kernel of the truth."""
     name: Name = "quadrature"
     """Name in tables."""
     nodes: Annotated[list[Annotated[int, Field(ge=2, le=16)]], Field(min_length=1, max_length=15)] = [
@@ -434,6 +438,8 @@ class PrefilteredOptions(_Options):
 
     model: Literal["prefiltered"] = "prefiltered"
     """Which file of `pipeline.models` implements it."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel it knows; must be the kernel of the truth."""
     name: Name = "prefiltered"
     """Name in tables."""
     texels_per_yarn: int = Field(default=16, ge=1, le=128)

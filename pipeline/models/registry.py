@@ -50,10 +50,18 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     Raises
     ------
     BadInput
-        If a folder holds no model, a broken one, or one of another design.
+        If a folder holds no model, a broken one, or one of another design or version.
     """
     trained = [_read(folder, options) for folder in folders]
-    methods: list[Method] = module_of(options.model).restore(options, trained)
+    try:
+        methods: list[Method] = module_of(options.model).restore(options, trained)
+    except BadInput:
+        raise
+    except (RuntimeError, KeyError, ValueError) as error:
+        where = ", ".join(str(folder) for folder in folders)
+        raise BadInput(
+            where, "", "not a whole model", "card and weights do not fit together: train it again"
+        ) from error
     return methods
 
 
@@ -71,6 +79,10 @@ def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]
     card = _read_card(folder)
     if card.get("options") != options.model_dump(mode="json"):
         raise BadInput(str(folder / CARD), "options", card.get("options"), "trained with other options; train it again")
+    version = card.get("version", {}).get("model")
+    if version != options.version:
+        allowed = f"this is version {options.version} of {options.model}: train it again"
+        raise BadInput(str(folder / CARD), "version", version, allowed)
     try:
         return card, safetensors.torch.load_file(folder / WEIGHTS)
     except (FileNotFoundError, SafetensorError) as error:

@@ -1,7 +1,7 @@
 """Any list of questions answered: Parquet in, the same rows with their answers out, in bounded memory.
 
-Row i of the result is row i of the file, and its numbers depend on the seed and on i alone, not on how the file is cut
-into row groups or chunks, nor on how many threads answer these. Rows that have no answer stop everything before
+Row i of the result is row i of the file, and the truth's numbers depend on the seed and on i alone, not on how the file
+is cut into row groups or chunks, nor on how many threads answer these. Rows that have no answer stop everything before
 anything is computed, or, if they are to be skipped, have null answers and are listed beside the result.
 """
 
@@ -29,6 +29,7 @@ from pipeline.shards.questions import (
     OPTIONAL,
     ROW_GROUP,
     BadRow,
+    Faults,
     blocks,
     check_columns,
     open_questions,
@@ -39,7 +40,7 @@ from pipeline.shards.schema import SCHEMA_VERSION
 from pipeline.shards.version import VERSION
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Answers, Queries
+from pipeline.truth.query import Answers, Queries, faults
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -58,10 +59,13 @@ class Answerer(NamedTuple):
         Takes questions, returns components (N, 4) and transparency (N,), float32. BadInput if it cannot.
     about : dict
         What the result's metadata says of it.
+    faults : callable
+        The questions that it cannot answer, beside those that have no answer at all.
     """
 
     answer: Callable[[Queries], tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]
     about: dict[str, Any]
+    faults: Faults = lambda queries: {}
 
 
 class Summary:
@@ -147,10 +151,15 @@ def evaluate_file(
         raise BadInput("evaluate", "--out", str(out), "is a folder; the path of a file is needed")
     if out.exists() and queries.exists() and out.samefile(queries):
         raise BadInput("evaluate", "--out", str(out), "must not be the file of the queries")
+
+    def wrong(questions: Queries) -> dict[int, tuple[str, object, str]]:
+        found = faults(questions)
+        return (other.faults(questions) | found) if other else found
+
     with open_questions(queries) as file, ExitStack() as stack:
         check_columns(queries, file.schema_arrow)
         if not skip_bad:
-            refuse_bad(queries, file, fabric.weave.repeat)
+            refuse_bad(queries, file, fabric.weave.repeat, wrong)
         about = _about(fabric, queries, file.schema_arrow, options, seed, other)
         schema = _schema(file.schema_arrow, about, skip_bad or other is not None)
         result = stack.enter_context(atomic_path(out))
@@ -163,7 +172,7 @@ def evaluate_file(
         summary = Summary()
         crew = _Crew(fabric, options, seed, stack.enter_context(_threads(1 if other else threads)), other)
         for block in blocks(queries, file):
-            questions, bad = questions_of(block, summary.rows, fabric.weave.repeat)
+            questions, bad = questions_of(block, summary.rows, fabric.weave.repeat, wrong)
             if listing:
                 listing.writerows(bad)
             good = np.ones(len(questions.u), np.bool_)

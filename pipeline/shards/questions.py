@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -103,12 +103,16 @@ def check_columns(path: Path, schema: pa.Schema) -> None:
             raise BadInput(where, f"type of column {name}", str(kind), "must be float (32 bits) or double (64 bits)")
 
 
-def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int]) -> None:
+Faults = Callable[[Queries], dict[int, tuple[str, object, str]]]
+"""What is wrong with questions: row -> (column, value, what is allowed)."""
+
+
+def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong: Faults = faults) -> None:
     """Read all questions once and refuse the file if any has no answer."""
     asked = [name for name in QUERY_COLUMNS if name in file.schema_arrow.names]
     first, count, start = None, 0, 0
     for block in blocks(path, file, asked):
-        _, bad = questions_of(block, start, repeat)
+        _, bad = questions_of(block, start, repeat, wrong)
         first = first or next(iter(bad), None)
         count += len(bad)
         start += len(block)
@@ -118,8 +122,13 @@ def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int]) -> Non
         raise BadInput(str(path), f"row {first.row}, column {first.column}", first.value, allowed)
 
 
-def questions_of(block: pa.Table, start: int, repeat: tuple[int, int]) -> tuple[Queries, list[BadRow]]:
-    """Return a block's questions in single precision and its bad rows; `start` is the file's index of its first row."""
+def questions_of(
+    block: pa.Table, start: int, repeat: tuple[int, int], wrong: Faults = faults
+) -> tuple[Queries, list[BadRow]]:
+    """Return a block's questions in single precision and its bad rows.
+
+    `start` is the file's index of its first row; `wrong` tells what has no answer.
+    """
     given = {name: block[name].to_numpy() for name in QUERY_COLUMNS if name in block.column_names}
     single: dict[str, npt.NDArray[np.float32]] = {}
     for name in QUERY_COLUMNS:
@@ -136,7 +145,7 @@ def questions_of(block: pa.Table, start: int, repeat: tuple[int, int]) -> tuple[
             single[name][far] = np.fmod(column[far], repeat[name == "v"]).astype(np.float32)
     questions = queries_of(single)
     return questions, [
-        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(faults(questions).items())
+        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(wrong(questions).items())
     ]
 
 

@@ -117,8 +117,8 @@ def train(
             done = step + 1
             if done % interval == 0 or done == training.steps:
                 state.mark(done)
-            if done % looks == 0 and done < training.steps:
-                error, noise = held_out.error_and_noise(state.weights())
+            if done % looks == 0 and done < training.steps and (seen := held_out.error_and_noise(state.weights())):
+                error, noise = seen
                 state.curve[-1] |= {"held_out_mse": error, "held_out_noise": noise}
                 if training.stop_at_noise and error <= 2.0 * noise:
                     break

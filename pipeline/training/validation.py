@@ -46,10 +46,10 @@ class HeldOut:
         self._rows = {name: manifest.read(folder, name, "validation") for name in names}
         self._share = max(rows // max(len(names), 1), 1)
 
-    def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
-        """Return the mean squared error over all components, as measured, and the truth's own; 0 without queries."""
+    def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float] | None:
+        """Return the mean squared error over all components, as measured, and the truth's own; None without queries."""
         if not self._rows:
-            return 1.0, 0.0
+            return None
         share = max(min(self._share, _LOOK_ROWS // len(self._rows)), 1)
         sums = np.zeros(2)
         for name, prediction, _, answers in self._answered(weights, share):

@@ -71,7 +71,7 @@ _REACH: Final = 3.0  # standard deviations at which a footprint is cut
 _SLIVER: Final = 0.05  # pieces of a footprint thinner than so many deviations are left out
 _LEAST: Final = 0.02  # least deviation of a horizon, in sines: what a map of nearest nodes does not know
 _RAMP, _RAMP_SIGMA = np.float32(0.02), np.float32(0.4)  # width of the ramp in a narrow footprint
-_MOST: Final = 4096  # nodes of a narrow footprint, at most
+_BANDS: Final = 49  # of yarns and gaps that a narrow footprint reaches into, at most: seven an axis
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _THIRD = np.float32(1.0 / math.sqrt(3.0))
@@ -138,10 +138,10 @@ class GaussQuadrature:
         grid: int = 16,
         azimuths: int = 32,
     ) -> None:
-        field = model_of(fabric, TruthOptions()).front
+        model = model_of(fabric, TruthOptions())
         self.shadows, self.soft, self.along = shadows, soft, along
-        self.map = horizon_map(field, grid, azimuths)
-        self.nodes = gauss_nodes(field, self.map, across, along)
+        self.map = horizon_map(model.front, model.back, grid, azimuths)
+        self.nodes = gauss_nodes(model.front, self.map, across, along)
 
     def answer(self, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the components (N, 4); queries are round, flat and lit from the front."""
@@ -283,9 +283,10 @@ def _answer(
     nodes = table.grid * table.grid
     flat = table.pieces.reshape(table.pieces.size)
     wide, own_weight = fixed.lanes.copy(), np.zeros(count, np.float32)
-    narrow, places = np.zeros((ROWS, _MOST), np.float32), np.zeros((INTEGERS, _MOST), np.int32)
     values, shared = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     kinds, most = fixed.positions.shape
+    room = _BANDS * fixed.own_positions.shape[1] ** 2
+    narrow, places = np.zeros((ROWS, room), np.float32), np.zeros((INTEGERS, room), np.int32)
     of_x, of_y = np.zeros((ends, kinds, most), np.float32), np.zeros((picks, kinds, most), np.float32)
     touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
     line = np.zeros((4, most), np.float32)

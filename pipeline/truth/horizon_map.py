@@ -80,13 +80,17 @@ class HorizonMap(NamedTuple):
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 
-def horizon_map(field: HeightField, grid: int, azimuths: int) -> HorizonMap:
-    """Tabulate one side of a cloth, `grid` nodes a block and side."""
+def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> HorizonMap:
+    """Tabulate one side of a cloth, `grid` nodes a block and side; `back` is the other one, which hides gaps too.
+
+    `azimuths` is even.
+    """
     picks, ends = field.top.shape
     pieces = np.zeros((picks, ends, SLOTS, 5))
     blocks = np.zeros((picks, ends, SLOTS), np.int32)
     xs: list[npt.NDArray[np.float64]] = []
     ys: list[npt.NDArray[np.float64]] = []
+    gaps: list[bool] = []
     size = azimuths * grid * grid
     for orbit in orbits(field.top):
         pick, end = orbit[0]
@@ -95,9 +99,16 @@ def horizon_map(field: HeightField, grid: int, azimuths: int) -> HorizonMap:
                 pieces[p, e, slot] = _piece(field, p, e, slot, family, low, high)
                 blocks[p, e, slot] = len(xs) * size
             x, y = _nodes(field, family, low, high, grid)
+            gaps.append(family == GAP)
             xs.append(end + x)
             ys.append(pick + y)
-    slopes = horizons(field, np.concatenate(xs), np.concatenate(ys), azimuths, False).astype(np.float64)
+    x, y = np.concatenate(xs), np.concatenate(ys)
+    slopes = horizons(field, x, y, azimuths, False).astype(np.float64)
+    gap = np.repeat(gaps, grid * grid)
+    if gap.any():
+        # Who looks through a gap sees it if nothing on the other side of the cloth, seen from -wo, hides it either.
+        other = horizons(back, x[gap], y[gap], azimuths, True)
+        slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, azimuths // 2, axis=0))
     sines = (slopes / np.sqrt(1.0 + slopes * slopes)).reshape(azimuths, len(xs), grid * grid)
     return HorizonMap(
         repeat=np.array([ends, picks], np.int64),

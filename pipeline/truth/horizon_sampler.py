@@ -69,7 +69,8 @@ class HorizonSampler:
     """
 
     def __init__(self, fabric: Fabric, grid: int = 16, azimuths: int = 32) -> None:
-        self.map = horizon_map(model_of(fabric, TruthOptions()).front, grid, azimuths)
+        model = model_of(fabric, TruthOptions())
+        self.map = horizon_map(model.front, model.back, grid, azimuths)
 
     def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> npt.NDArray[np.float32]:
         """Return the components from `count` points a query, (N, 4); queries are round, flat and lit from the front."""

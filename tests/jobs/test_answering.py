@@ -29,7 +29,12 @@ def network():
 def folder(network, tmp_path):
     """Return a folder with a model as training leaves it, taught on two fabrics."""
     domain = Domain.of({}, [load_fabric("denim"), load_fabric("silk_charmeuse")])
-    card = {"model": "woven", "options": SMALL.model_dump(mode="json"), "domain": domain.model_dump(mode="json")}
+    card = {
+        "model": "woven",
+        "version": {"model": 1},
+        "options": SMALL.model_dump(mode="json"),
+        "domain": domain.model_dump(mode="json"),
+    }
     (tmp_path / "model").mkdir()
     (tmp_path / "model" / "card.json").write_text(json.dumps(card))
     (tmp_path / "model" / "model.safetensors").write_bytes(safetensors.torch.save(network.state_dict()))
@@ -66,6 +71,7 @@ def test_a_model_answers_and_states_no_error(network, folder, tmp_path):
     [
         ("denim", {"behind": 1.0}, [], "the model woven was trained for light from the viewer's side only"),
         ("gauze", {}, [], "roughness = 0.6: the model woven was trained on"),
+        ("denim", {}, ["--model", "selvage", "--frame", "macro"], "--frame = 'macro': leave it out with --model"),
         ("denim", {}, ["--model", "nobody"], "--model = 'nobody': the folder of a trained model or a name is needed"),
     ],
 )
@@ -76,6 +82,35 @@ def test_what_it_was_not_taught_is_one_sentence(fabric, options, more, message, 
     complaint = capsys.readouterr().err
     assert code == 2 and message in " ".join(complaint.split()), complaint
     assert "Traceback" not in complaint and not out.exists()
+
+
+def test_rows_it_was_not_taught_are_named_before_anything_is_computed_and_can_be_skipped(folder, tmp_path, capsys):
+    """Row 3,000 of 3,001 lies beyond the first run of rows that a thread answers."""
+    queries = draw_queries(QueryOptions(), (4, 4), 1, 0, 3001)
+    queries.wi[3000] *= np.float32([1, 1, -1])
+    path, out = file_of(queries, tmp_path / "queries.parquet"), tmp_path / "result.parquet"
+    asked_for = ["evaluate", "denim", path, "--out", str(out), "--model", str(folder)]
+    assert main(asked_for) == 2
+    complaint = " ".join(capsys.readouterr().err.split())
+    assert "row 3000" in complaint and "light from the viewer's side only" in complaint and not out.exists()
+    assert main([*asked_for, "--skip-bad"]) == 0
+    assert pq.read_table(out)["diffuse_warp"].null_count == 1
+    assert "3000" in (tmp_path / "result.bad.csv").read_text()
+
+
+def test_a_model_of_another_version_is_refused(folder, tmp_path, capsys):
+    card = json.loads((folder / "card.json").read_text())
+    (folder / "card.json").write_text(json.dumps(card | {"version": {"model": 99}}))
+    path = file_of(asked(), tmp_path / "queries.parquet")
+    assert main(["evaluate", "denim", path, "--out", str(tmp_path / "r.parquet"), "--model", str(folder)]) == 2
+    assert "version = 99: this is version 1 of woven" in " ".join(capsys.readouterr().err.split())
+
+
+def test_weights_that_do_not_fit_the_card_are_refused(folder, tmp_path, capsys):
+    (folder / "model.safetensors").write_bytes(safetensors.torch.save({"a": torch.zeros(2)}))
+    path = file_of(asked(), tmp_path / "queries.parquet")
+    assert main(["evaluate", "denim", path, "--out", str(tmp_path / "r.parquet"), "--model", str(folder)]) == 2
+    assert "do not fit together" in " ".join(capsys.readouterr().err.split())
 
 
 def test_it_can_be_asked_beyond_its_yarns(folder, tmp_path):

@@ -53,7 +53,7 @@ class Truth(Flat):
     def predict(self, fabric, queries, seed=0):
         return estimate(fabric, queries, TINY.truth, TINY.seed).mean
 
-    def transparency(self, fabric, queries):
+    def missed(self, fabric, queries):
         return 1 - opacity(fabric, queries, TINY.truth, TINY.seed)[0]
 
 

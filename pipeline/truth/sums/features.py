@@ -65,6 +65,7 @@ _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least
 _FADED = np.float32(1e-4)  # of the bare area: of patches of which less is seen, most are hidden, and answer 0
 _TINY = np.float32(1e-18)
+_SMALLEST = np.float32(1e-3)  # standard deviation, in yarn spacings
 _STEEPEST = np.float32(3.0)  # slope of a half vector
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
@@ -172,8 +173,9 @@ def read_queries(table: Table, queries: Queries) -> Reading:
         Footprints along the axes.
     """
     across = np.abs(np.sin(queries.angle)) > 0.5  # the first axis lies along y
-    first = np.where(across, queries.sigma_minor, queries.sigma)
-    second = np.where(across, queries.sigma, queries.sigma_minor)
+    # A thousandth of a yarn is a point: smaller footprints would fall between the digits of a place.
+    size, minor = (np.maximum(deviation, _SMALLEST) for deviation in (queries.sigma, queries.sigma_minor))
+    first, second = np.where(across, minor, size), np.where(across, size, minor)
     u, v, x, y, wi, wo = (
         np.ascontiguousarray(column, np.float32)
         for column in (queries.u, queries.v, first, second, queries.wi, queries.wo)

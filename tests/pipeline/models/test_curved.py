@@ -85,7 +85,7 @@ def test_curvature_enters_as_asked(way):
 def test_neither_opacity_nor_offset_knows_the_light():
     method, queries = _method(), _queries(50)
     other = queries._replace(wi=-queries.wi)
-    np.testing.assert_array_equal(method.transparency(DENIM, queries), method.transparency(DENIM, other))
+    np.testing.assert_array_equal(method.missed(DENIM, queries), method.missed(DENIM, other))
     assert (method.predict(DENIM, queries) != method.predict(DENIM, other)).any()
 
 
@@ -181,7 +181,7 @@ def test_method_answers_at_extremes_and_refuses_what_it_was_not_taught():
     for behind in (False, True):
         queries = _queries(40, behind=behind)
         queries = queries._replace(u=queries.u * np.float32(1e6), sigma=queries.sigma * np.float32(1e-4))
-        prediction, through = method.predict(DENIM, queries), method.transparency(DENIM, queries)
+        prediction, through = method.predict(DENIM, queries), method.missed(DENIM, queries)
         assert prediction.shape == (40, 4)
         assert np.isfinite(prediction).all()
         assert (prediction >= 0).all()
@@ -193,7 +193,7 @@ def test_method_answers_at_extremes_and_refuses_what_it_was_not_taught():
     about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.0}}
     taught = _method(domain=Domain.of(about, [DENIM]))
     with pytest.raises(BadInput, match=r"trained up to 0\.2"):
-        taught.transparency(DENIM, _queries(4, curvature=0.3))
+        taught.missed(DENIM, _queries(4, curvature=0.3))
     with pytest.raises(BadInput, match="wi"):
         taught.predict(DENIM, _queries(4, behind=True))
 

@@ -38,7 +38,9 @@ def test_a_folder_without_a_model_is_bad_input(tmp_path):
 
 def test_missing_or_broken_weights_are_bad_input(tmp_path):
     options = WovenOptions()
-    (tmp_path / "card.json").write_text(json.dumps({"options": options.model_dump(mode="json")}))
+    (tmp_path / "card.json").write_text(
+        json.dumps({"options": options.model_dump(mode="json"), "version": {"model": 1}})
+    )
     with pytest.raises(BadInput, match=r"model\.safetensors"):
         load_model(tmp_path)
     (tmp_path / "model.safetensors").write_bytes(b"\0" * 16)
