@@ -472,7 +472,7 @@ class SelvageOptions(_Options):
     colour_weight: float = Field(default=1.0, ge=0, le=1e4)
     """Weight of the squared error of the whole colour beside those of the components."""
     bound: bool = True
-    """Never answer more than the sums do without shadows: the directional albedo is then at most 1."""
+    """Never answer more than the sums do without shadows: the diffuse components then return at most what arrives."""
     narrow_nodes: int = Field(default=0, ge=0, le=16)
     """Nodes across a yarn of the Gauss rule (`quadrature`) that answers small footprints in place of the network; 0:
     the network answers all."""

@@ -8,7 +8,7 @@ perceptron reads that and puts out four factors, one for each component that the
 
 Factors lie between 0 and 2 and begin at 1: before the first step the network is the sums, and however little it has
 learnt of a cloth, its colours, highlights and repeat are the cloth's own. With `bound` no component exceeds what the
-sums give without shadows of the light, and the directional albedo is at most 1 (pipeline.truth.sums.features says why).
+sums give without shadows of the light, and the diffuse ones return at most what arrives (pipeline.truth.sums.features).
 With `narrow_nodes` small footprints, where so few nodes err most, are left to a Gauss rule of that many nodes; between
 the two ends of `seam` both are blended.
 
