@@ -186,7 +186,7 @@ def bench(
     recipe: Annotated[
         str,
         Parameter(
-            help="Recipe; or `stability`: rounding at the extremes; `truth`: its speed and errors; `sampler`: what it saves."
+            help="Recipe; or `stability`: rounding at the extremes; `truth`: its errors; `sampler`: what it saves."
         ),
     ],
     *,
