@@ -7,7 +7,7 @@ import safetensors.torch
 import torch
 
 from pipeline.models.method import Method
-from pipeline.models.options import NeumipOptions, WovenOptions
+from pipeline.models.options import NeumipOptions, SelvageOptions, WovenOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
@@ -20,8 +20,12 @@ from weaves.errors import BadInput, WorkFailed
 WOVEN = WovenOptions(map_texels=16, encoder_channels=4, hidden=32, log_k=10, diffuse_weight=10)
 NEUMIP = NeumipOptions(texels_per_yarn=4, log_k=10, diffuse_weight=10)
 SHORT = TrainingOptions(steps=30, batch=256, fabrics=2, checkpoint_every=8, curve_points=5, device="cpu")
-FABRICS = {"woven": ["polyester_lining", "cotton_twill"], "neumip": ["cotton_twill"]}
-OPTIONS = {"woven": WOVEN, "neumip": NEUMIP}
+FABRICS = {
+    "woven": ["polyester_lining", "cotton_twill"],
+    "neumip": ["cotton_twill"],
+    "selvage": ["polyester_lining", "cotton_twill"],
+}
+OPTIONS = {"woven": WOVEN, "neumip": NEUMIP, "selvage": SelvageOptions(width=16, measured_rows=64)}
 
 
 class Killed(KeyboardInterrupt):
@@ -40,7 +44,7 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("model", ["woven", "neumip"])
+@pytest.mark.parametrize("model", ["woven", "neumip", "selvage"])
 def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path):
     """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike."""
     whole, resumed = tmp_path / "whole", tmp_path / "resumed"
