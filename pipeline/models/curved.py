@@ -31,10 +31,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.fingerprint import fingerprint
-from pipeline.models.domain import Domain, domain_of
 from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import CHUNK, GPU_CHUNK, Batch, in_repeat
+from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import CurvedOptions
 from pipeline.models.silhouettes import Silhouettes, View, draw_silhouettes
 from pipeline.models.texture import FEATURE_SCALE, Perceptron, level_shapes, read_pyramid, shifted
@@ -210,38 +209,8 @@ def _view_inputs(options: CurvedOptions) -> int:
     return _axes(options) + (2 if options.curvature_input == "touch" else 1)
 
 
-class Curved:
-    """Trained materials for curved surfaces, one network for each fabric.
-
-    Parameters
-    ----------
-    name : str
-        Name of the method.
-    networks : dict
-        From the fingerprint of a fabric's optics to its network.
-    domain : Domain, optional
-        What they were taught; anything if left out.
-    device : torch.device
-        Where they compute.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        networks: dict[str, CurvedNetwork],
-        domain: Domain | None = None,
-        device: torch.device | None = None,
-    ) -> None:
-        self.name, self.setting, self.domain = name, "", domain
-        self._device = device or torch.device("cpu")
-        self._networks = {key: network.eval().to(self._device) for key, network in networks.items()}
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Tell whether this fabric was trained."""
-        return fingerprint(fabric.optics()) in self._networks
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Do nothing: the textures are in memory."""
+class Curved(OneMaterial[CurvedNetwork]):
+    """Trained materials for curved surfaces, one network for each fabric."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
@@ -255,13 +224,9 @@ class Curved:
         network = self._asked(fabric, queries)
         return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1))[:, 0]
 
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of textures and perceptrons, float32."""
-        return 4 * sum(weight.numel() for weight in self._networks[fingerprint(fabric.optics())].parameters())
-
     def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
         """Return the fabric's network; BadInput for what it was not taught."""
-        network = self._networks[fingerprint(fabric.optics())]
+        network = self.network_of(fabric)
         limit = network.options.largest_curvature
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
@@ -299,11 +264,5 @@ def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
 
 def restore(options: CurvedOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Curved]:
     """Return one method that holds all trained fabrics."""
-    networks, domain = {}, None
-    for card, weights in trained:
-        domain = domain_of(card)
-        (fabric,) = card["fabrics"]
-        ends, picks = fabric["repeat"]
-        networks[fabric["optics"]] = CurvedNetwork(options, (ends, picks))
-        networks[fabric["optics"]].load_state_dict(weights)
+    networks, domain = restored(trained, lambda repeat: CurvedNetwork(options, repeat))
     return [Curved(options.name, networks, domain)]

@@ -25,10 +25,9 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.fingerprint import fingerprint
-from pipeline.models.domain import Domain, domain_of
 from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, in_chunks, in_repeat
+from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import NeumipOptions
 from pipeline.models.texture import FEATURE_SCALE, Perceptron, level_shapes, read_pyramid, shifted
 from pipeline.truth.query import Queries
@@ -123,54 +122,20 @@ class NeumipNetwork(nn.Module):
         return self._blur if self.training else 0.0
 
 
-class Neumip:
-    """Trained textures, one network for each fabric.
-
-    Parameters
-    ----------
-    name : str
-        Name of the method.
-    networks : dict
-        From the fingerprint of a fabric's optics to its network.
-    domain : Domain, optional
-        What they were taught; anything if left out.
-    device : torch.device
-        Where they compute.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        networks: dict[str, NeumipNetwork],
-        domain: Domain | None = None,
-        device: torch.device | None = None,
-    ) -> None:
-        self.name, self.setting, self.domain = name, "", domain
-        self._device = device or torch.device("cpu")
-        self._networks = {key: network.eval().to(self._device) for key, network in networks.items()}
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Tell whether this fabric was trained."""
-        return fingerprint(fabric.optics()) in self._networks
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Do nothing: the textures are in memory."""
+class Neumip(OneMaterial[NeumipNetwork]):
+    """Trained textures, one network for each fabric."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        network = self._networks[fingerprint(fabric.optics())]
+        network = self.network_of(fabric)
 
         def answer(*columns: Tensor) -> Tensor:
             components = to_components(network(*columns), network.options.log_k)
             return components * (columns[3][:, 2:] > 0.0) if network.options.ignore_curvature else components
 
         return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of textures and perceptrons, float32."""
-        return 4 * sum(weight.numel() for weight in self._networks[fingerprint(fabric.optics())].parameters())
 
 
 def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
@@ -181,11 +146,5 @@ def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
 
 def restore(options: NeumipOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Neumip]:
     """Return one method that holds all trained fabrics."""
-    networks, domain = {}, None
-    for card, weights in trained:
-        domain = domain_of(card)
-        (fabric,) = card["fabrics"]
-        ends, picks = fabric["repeat"]
-        networks[fabric["optics"]] = NeumipNetwork(options, (ends, picks))
-        networks[fabric["optics"]].load_state_dict(weights)
+    networks, domain = restored(trained, lambda repeat: NeumipNetwork(options, repeat))
     return [Neumip(options.name, networks, domain)]

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.models.options import TableOptions
 from pipeline.models.sampler import Sampler
+from pipeline.models.table import restore as restore_table
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
@@ -76,3 +78,13 @@ def test_patches_that_nobody_sees_still_have_samples():
     fabric, wo = FABRICS[2], unit(89.8, 3.0)
     wi, pdf = Sampler(4).sample(fabric, asked(None, wo, 0.01, 64), np.random.default_rng(1).random((64, 3)))
     assert np.isfinite(wi).all() and (pdf > 0).all()
+
+
+def test_value_and_density_come_together():
+    fabric, wo = FABRICS[0], unit(40.0, 10.0)
+    (method,) = restore_table(TableOptions(nodes=[8]), [])
+    wi = np.tile(unit(20.0, 200.0), (5, 1))
+    queries = asked(wi, wo, 0.5, 5)
+    values, pdf = Sampler().eval_pdf(method, fabric, queries)
+    np.testing.assert_array_equal(values, method.predict(fabric, queries))
+    np.testing.assert_array_equal(pdf, Sampler().pdf(fabric, queries))

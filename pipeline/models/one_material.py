@@ -1,0 +1,74 @@
+"""A method whose networks know one fabric each: textures and perceptrons, as `neumip` and `curved` train them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import Domain, domain_of
+from weaves.fabric import Fabric
+
+Net = TypeVar("Net", bound=nn.Module)
+
+
+class OneMaterial(Generic[Net]):
+    """Trained networks, one for each fabric.
+
+    Parameters
+    ----------
+    name : str
+        Name of the method.
+    networks : dict
+        From the fingerprint of a fabric's optics to its network.
+    domain : Domain, optional
+        What they were taught; anything if left out.
+    device : torch.device
+        Where they compute.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        networks: dict[str, Net],
+        domain: Domain | None = None,
+        device: torch.device | None = None,
+    ) -> None:
+        self.name, self.setting, self.domain = name, "", domain
+        self._device = device or torch.device("cpu")
+        self._networks = {key: network.eval().to(self._device) for key, network in networks.items()}
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Tell whether this fabric was trained."""
+        return fingerprint(fabric.optics()) in self._networks
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Do nothing: the textures are in memory."""
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of textures and perceptrons, float32."""
+        return 4 * sum(weight.numel() for weight in self.network_of(fabric).parameters())
+
+    def network_of(self, fabric: Fabric) -> Net:
+        """Return the network of a fabric that is covered."""
+        return self._networks[fingerprint(fabric.optics())]
+
+
+def restored(
+    trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]], make: Callable[[tuple[int, int]], Net]
+) -> tuple[dict[str, Net], Domain | None]:
+    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught.
+
+    `make` returns an untrained network for a repeat (ends, picks).
+    """
+    networks, domain = {}, None
+    for card, weights in trained:
+        domain = domain_of(card)
+        (fabric,) = card["fabrics"]
+        ends, picks = fabric["repeat"]
+        networks[fabric["optics"]] = make((ends, picks))
+        networks[fabric["optics"]].load_state_dict(weights)
+    return networks, domain
