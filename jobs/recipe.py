@@ -223,7 +223,17 @@ def _refuse_contradictions(recipe: Recipe, where: str) -> None:
         if (value := getattr(training_truth, name)) != getattr(truth, name):
             allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
             raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
+    queries = recipe.dataset.queries
+    asked = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
+    plain = TruthOptions()
     for index, model in enumerate(recipe.models):
+        for kind in (kind for kind, there in asked.items() if there and kind not in model.options.kinds):
+            allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
+            raise BadInput(where, f"models.{index}.name", model.options.name, allowed)
+        for name in () if model.options.any_physics else ("frame", "normaliser", "geometry", "shadows", "variation"):
+            if (value := getattr(truth, name)) != (own := getattr(plain, name)):
+                allowed = f"{model.options.name} (models.{index}) knows {name} = {own!r} only"
+                raise BadInput(where, f"dataset.truth.{name}", value, allowed)
         footprint = getattr(model.options, "footprint", truth.footprint)
         if footprint != truth.footprint:
             key = f"models.{index}.footprint"

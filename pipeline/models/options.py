@@ -25,6 +25,9 @@ class _Options(BaseModel):
     """Whether a trained model knows a single fabric."""
     blends: ClassVar[bool] = False
     """Whether it answers for what lies between two fabrics, from blended latents."""
+    any_physics: ClassVar[bool] = False
+    """Whether it learns whatever frame, normaliser, geometry, shadows and variation the truth has; else it knows the
+    default ones."""
     seconds: ClassVar[tuple[float, float]] = (2e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
 
@@ -32,6 +35,11 @@ class _Options(BaseModel):
     def departures(self) -> tuple[str, ...]:
         """What is not as published, in words for the page."""
         return ()
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Which of `behind`, `stretch` and `curvature` (`QueryOptions`) its queries may have."""
+        return frozenset()
 
     @property
     def knobs(self) -> tuple[int, ...]:
@@ -51,6 +59,8 @@ Count = Annotated[int, Field(ge=1, le=4096)]
 
 class WovenOptions(_Options):
     """One network for many fabrics and scales [Chen2024Woven]."""
+
+    any_physics: ClassVar[bool] = True
 
     blends: ClassVar[bool] = True
 
@@ -115,11 +125,17 @@ class WovenOptions(_Options):
         }
         return tuple(change for change, made in changes.items() if made)
 
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Light from behind, with `transmission`."""
+        return frozenset({"behind"} if self.transmission else ())
+
 
 class NeumipOptions(_Options):
     """One offset texture, one feature pyramid and one small decoder for each fabric [Kuznetsov2021NeuMIP]."""
 
     of_one_material: ClassVar[bool] = True
+    any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (1.2e-5, 1.5e-6)
 
     model: Literal["neumip"] = "neumip"
@@ -167,6 +183,11 @@ class NeumipOptions(_Options):
         """What is not as published, in words for the page."""
         changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Curved cloth lit from all around, answered as if it were flat, with `ignore_curvature`."""
+        return frozenset({"behind", "curvature"} if self.ignore_curvature else ())
 
 
 class CurvedOptions(_Options):
@@ -252,6 +273,11 @@ class CurvedOptions(_Options):
         }
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))
 
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Curved cloth lit from all around."""
+        return frozenset({"behind", "curvature"})
+
 
 class PointSampledOptions(_Options):
     """The point model at k random points of the footprint [Jin2022Woven]; nothing is trained."""
@@ -286,6 +312,11 @@ class PointSampledOptions(_Options):
     def knobs(self) -> tuple[int, ...]:
         """The numbers of points."""
         return tuple(self.counts)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """All, with exact visibility."""
+        return frozenset({"behind", "stretch", "curvature"} if self.visibility == "exact" else ())
 
 
 class BtfOptions(_Options):

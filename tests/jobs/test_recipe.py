@@ -63,6 +63,8 @@ def test_a_recipe_of_ones_own(files):
         ("steps = 10", "stepps = 10", ["models.0.training.stepps = 10", "did you mean 'steps'"]),
         ("counts = [1, 2]", "[models.training]", ["models.2", "nothing to train"]),
         ('model = "neumip"', 'model = "neumip"\nname = "woven"', ["models = 'woven'", "names must differ"]),
+        ("sigma = [0.05, 8.0]", "behind = 0.5", ["models.0.name = 'woven'", "does not know queries with behind"]),
+        ("relative_error = 0.05", 'frame = "macro"', ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
         ("frames = 4", "frmes = 4", ["bench.frmes = 4", "did you mean 'frames'"]),
         ("population = 800", "", ["dataset.rows.population = 0", "must be > 0"]),
         ('exclude = ["twill 4/4"]', 'exclude = ["twill 4/5"]', ["dataset.population.exclude = 'twill 4/5'"]),
