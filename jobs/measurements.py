@@ -17,8 +17,9 @@ from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
+from reports.options import LATENT_PAIRS
 from reports.options import VERSION as BENCH_VERSION
-from weaves.fabric import Fabric
+from weaves.fabric import Fabric, load_fabric
 
 _TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
 
@@ -192,8 +193,10 @@ def _method_task(
 def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
     """Return the measurements of what lies between latents; of presets, whatever the recipe's fabrics are."""
     options, dataset = model.options, recipe.dataset
+    names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
     spec = {
         "measure": "latents",
+        "presets": {name: load_fabric(name).optics() for name in names},
         "versions": [TRUTH_VERSION, BENCH_VERSION, options.version],
         "options": options.model_dump(mode="json"),
         "models": [training.id],

@@ -25,6 +25,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.metrics import COLOUR_WEIGHTS, colour_error
+from reports.options import LATENT_PAIRS
 from reports.record import Metric, Provenance, Record
 from reports.timing import synchronise
 from weaves.fabric import Fabric, load_fabric
@@ -71,14 +72,8 @@ class Blends(Protocol):
 
 def pairs() -> list[Pair]:
     """Return the pairs: three drafts, each with the yarns of another preset, and two drafts of the same yarns."""
-    chosen: list[tuple[str, str, Literal["yarns", "draft"]]] = [
-        ("denim", "satin_8", "yarns"),
-        ("silk_charmeuse", "wool_gabardine", "yarns"),
-        ("polyester_lining", "basket", "yarns"),
-        ("basket", "denim", "draft"),
-    ]
     result = []
-    for one, other, differs in chosen:
+    for one, other, differs in LATENT_PAIRS:
         first, second = load_fabric(one), load_fabric(other)
         update = {"draft": second.draft} if differs == "draft" else {"warp": second.warp, "weft": second.weft}
         result.append(Pair(first, first.model_copy(update={"name": other} | update), differs))

@@ -6,7 +6,7 @@ every benchmark task and every Record.
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -15,6 +15,14 @@ from pipeline.truth.options import TruthOptions
 
 VERSION: Final = 1
 """Version of the measurements' numbers."""
+
+LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
+    ("denim", "satin_8", "yarns"),
+    ("silk_charmeuse", "wool_gabardine", "yarns"),
+    ("polyester_lining", "basket", "yarns"),
+    ("basket", "denim", "draft"),
+)
+"""Presets between whose latents errors are measured: each first one, with the yarns or the draft of the other."""
 
 Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""

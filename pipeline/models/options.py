@@ -61,7 +61,6 @@ class WovenOptions(_Options):
     """One network for many fabrics and scales [Chen2024Woven]."""
 
     any_physics: ClassVar[bool] = True
-
     blends: ClassVar[bool] = True
 
     model: Literal["woven"] = "woven"
@@ -503,7 +502,8 @@ class SelvageOptions(_Options):
     colour_weight: float = Field(default=1.0, ge=0, le=1e4)
     """Weight of the squared error of the whole colour beside those of the components."""
     bound: bool = True
-    """Never answer more than the sums do without shadows: the diffuse components then return at most what arrives."""
+    """Never answer more than the sums do without shadows: the diffuse components then return at most what arrives. What
+    the rule of `narrow_nodes` answers is not bounded."""
     narrow_nodes: int = Field(default=0, ge=0, le=16)
     """Nodes across a yarn of the Gauss rule (`quadrature`) that answers small footprints in place of the network; 0:
     the network answers all."""
@@ -517,6 +517,8 @@ class SelvageOptions(_Options):
 
     @model_validator(mode="after")
     def _seam_has_a_width(self) -> SelvageOptions:
+        if self.narrow_nodes == 1:
+            raise ValueError("narrow_nodes must be 0 or from 2 to 16")
         if not 0 < self.seam[0] < self.seam[1]:
             raise ValueError(f"seam must be [low, high] with 0 < low < high, got {list(self.seam)}")
         return self
