@@ -28,12 +28,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import CHUNK, Batch
 from pipeline.models.options import QuadratureOptions, SelvageOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.quadrature import Quadrature
-from pipeline.models.sums import Tables, refuse
+from pipeline.models.sums import refuse
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.features import (
@@ -158,8 +158,7 @@ class Selvage:
         self._network = network.eval()
         nodes = network.options.narrow_nodes
         self._rule = Quadrature(nodes, QuadratureOptions()) if nodes else None
-        self._tables = Tables()
-        self._biases: dict[str, Tensor] = {}
+        self._cloths = PerFabric(self._tabulate)
         # Transposed weights; the normalisation folds into the first layer.
         layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
         first, *others = layers
@@ -175,7 +174,7 @@ class Selvage:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric, once."""
-        self._prepared(fabric)
+        self._cloths.of(fabric)
         if self._rule:
             self._rule.prepare(fabric)
 
@@ -184,22 +183,24 @@ class Selvage:
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
         refuse(queries, self.name)
-        result = np.empty((len(queries.u), 4), np.float32)
+        if self._rule is None:
+            return self._corrected(fabric, queries)
+        # How much of each answer is the network's.
         low, high = self._network.options.seam
-        # How much of each answer is the network's: all of it, if there is no rule for small footprints.
         place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
-        share = np.clip(place, 0.0, 1.0)[:, None] if self._rule else np.ones((len(result), 1), np.float32)
+        share = np.clip(place, 0.0, 1.0)[:, None]
         by_network, by_rule = (np.flatnonzero(rows) for rows in (share[:, 0] > 0.0, share[:, 0] < 1.0))
-        result[by_network] = self._corrected(fabric, queries.take(by_network))
-        if self._rule and by_rule.size:
+        result = np.zeros((len(share), 4), np.float32)
+        if by_network.size:
+            result[by_network] = self._corrected(fabric, queries.take(by_network))
+        if by_rule.size:
             narrow = self._rule.predict(fabric, queries.take(by_rule))
-            network = np.where(share[by_rule] > 0.0, result[by_rule], np.float32(0.0))
-            result[by_rule] = share[by_rule] * network + (1.0 - share[by_rule]) * narrow
+            result[by_rule] = share[by_rule] * result[by_rule] + (1.0 - share[by_rule]) * narrow
         return result
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the sums and the network."""
-        table, bias = self._prepared(fabric)
+        table, bias = self._cloths.of(fabric)
         result = np.empty((len(queries.u), 4), np.float32)
         bounded = self._network.options.bound
         with torch.inference_mode():
@@ -218,15 +219,14 @@ class Selvage:
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table and of the network."""
         rule = self._rule.bytes_stored(fabric) if self._rule else 0
-        return rule + self._tables.of(fabric).nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        return (
+            rule + self._cloths.of(fabric)[0].nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        )
 
-    def _prepared(self, fabric: Fabric) -> tuple[Table, Tensor]:
+    def _tabulate(self, fabric: Fabric) -> tuple[Table, Tensor]:
         """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
-        table, key = self._tables.of(fabric), fingerprint(fabric.optics())
-        if key not in self._biases:
-            weight, bias = self._first
-            self._biases[key] = bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
-        return table, self._biases[key]
+        table, (weight, bias) = tabulate(fabric), self._first
+        return table, bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
 
 
 def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:

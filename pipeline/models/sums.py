@@ -13,28 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.method import CHUNK
 from pipeline.models.options import SumsOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.features import along_axes, read_queries
-from pipeline.truth.sums.table import Table, tabulate
+from pipeline.truth.sums.table import tabulate
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-
-
-class Tables:
-    """The tables of fabrics, each built once."""
-
-    def __init__(self) -> None:
-        self._tables: dict[str, Table] = {}
-
-    def of(self, fabric: Fabric) -> Table:
-        """Return the table of a fabric."""
-        key = fingerprint(fabric.optics())
-        if key not in self._tables:
-            self._tables[key] = tabulate(fabric)
-        return self._tables[key]
 
 
 def refuse(queries: Queries, model: str) -> None:
@@ -62,7 +48,7 @@ class Sums:
 
     def __init__(self, name: str = "sums") -> None:
         self.name, self.setting = name, ""
-        self._tables = Tables()
+        self._tables = PerFabric(tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be tabulated."""

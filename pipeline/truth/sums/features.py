@@ -158,8 +158,8 @@ def cloth_features(table: Table) -> Single:
 
 def along_axes(queries: Queries) -> npt.NDArray[np.bool_]:
     """Say which footprints are round or lie along the axes: those that the sums know, (N,)."""
-    turned = np.abs(np.sin(2.0 * queries.angle.astype(np.float64))) < 1e-6
-    return np.asarray(turned | (queries.sigma == queries.sigma_minor))
+    found = np.asarray(queries.sigma == queries.sigma_minor)
+    return found if found.all() else found | (np.abs(np.sin(2.0 * queries.angle.astype(np.float64))) < 1e-6)
 
 
 def read_queries(table: Table, queries: Queries) -> Reading:

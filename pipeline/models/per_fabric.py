@@ -1,0 +1,46 @@
+"""What a method works out once for each fabric, and looks up from then on.
+
+Fabrics of equal optics share it. A fabric object seen before is known by its identity, for fingerprints take longer
+than the answers to a few hundred queries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from pipeline.fingerprint import fingerprint
+from weaves.fabric import Fabric
+
+Made = TypeVar("Made")
+
+_MOST_OBJECTS = 256  # fabric objects remembered; an editor makes a new one at every edit
+
+
+class PerFabric(Generic[Made]):
+    """Products of fabrics, each made when it is first asked for and then kept.
+
+    Parameters
+    ----------
+    make : callable
+        Turns a fabric into its product; must depend on the fabric's optics alone.
+    """
+
+    def __init__(self, make: Callable[[Fabric], Made]) -> None:
+        self._make = make
+        self._products: dict[str, Made] = {}
+        # The fabric is kept beside its product: an identity is another object's once its own is gone.
+        self._objects: dict[int, tuple[Fabric, Made]] = {}
+
+    def of(self, fabric: Fabric) -> Made:
+        """Return the product of a fabric."""
+        known = self._objects.get(id(fabric))
+        if known is not None:
+            return known[1]
+        key = fingerprint(fabric.optics())
+        if key not in self._products:
+            self._products[key] = self._make(fabric)
+        if len(self._objects) >= _MOST_OBJECTS:
+            self._objects.clear()
+        self._objects[id(fabric)] = fabric, self._products[key]
+        return self._products[key]
