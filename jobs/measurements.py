@@ -21,7 +21,7 @@ from reports.options import LATENT_PAIRS
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import Fabric, load_fabric
 
-_TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
+_TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads", "size_rows"}  # options of the timing alone
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from pipeline.shards.manifest import Manifest
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
 from reports.bench import measure_errors, measure_timing, measure_truth
+from reports.equal_time import measure_by_size
 from reports.frames import measure_aliasing, measure_truth_frames, render_frames
 from reports.furnace import measure_furnace
 from reports.latents import measure_edits, measure_paths, pairs
@@ -92,11 +93,14 @@ def latents(task: Task, out: Path, progress: Progress) -> None:
 
 
 def timing(task: Task, out: Path, progress: Progress) -> None:
-    """Time all methods side by side."""
+    """Time all methods side by side, on all queries and by the size of their footprints."""
     options, folder = _options(task), out / task.setting["dataset"]
     manifest = Manifest.load(folder)
     methods = [one for model in task.setting["models"] for one in _methods(model["options"], model["folders"], out)]
-    records = measure_timing(methods, manifest, folder, options, Provenance(dataset=manifest.fingerprint))
+    provenance = Provenance(dataset=manifest.fingerprint)
+    records = measure_timing(methods, manifest, folder, options, provenance)
+    progress(0.4)
+    records += measure_by_size(methods, manifest, folder, options, provenance)
     write_records(out / task.products[0], records, this_machine(options.threads))
 
 

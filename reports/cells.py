@@ -87,6 +87,26 @@ def front_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
     return result
 
 
+def equal_time_rows(table: pd.DataFrame) -> dict[str, Row]:
+    """Return for each measure the names of the sizes, and a row a method and rival: its error, and the rival's over it.
+
+    A rival that has no setting as fast says so.
+    """
+    result: dict[str, Row] = {}
+    for measure, group in table.groupby("measure", sort=False) if len(table) else ():
+        sizes, lines = list(dict.fromkeys(group["size"])), []
+        for (method, setting, rival), found in group.groupby(["method", "setting", "rival"], sort=False):
+            by_size = {row.size: row for row in rows(found)}
+            cells = []
+            for size in sizes:
+                row = by_size[size]
+                other = times(row.ratio) if math.isfinite(row.rival_error) else "too slow"
+                cells.append({"text": f"{percent(row.error)} · {other}", "beaten": row.ratio < 1.0})
+            lines.append(_line(str(method), str(setting)) | {"rival": display(str(rival)), "cells": cells})
+        result[str(measure)] = {"sizes": sizes, "rows": lines}
+    return result
+
+
 def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str, Any]:
     """Return the rows of the aliasing table in groups, and the variance that the motion itself brings."""
     motion = [record.value for record in records if record.metric == "motion"]

@@ -19,6 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from reports.aliasing import HALF_NYQUIST
+from reports.equal_time import SIZES
 from reports.record import TRUTH
 from reports.style import Scheme, display, new_figure
 from reports.summary import BASELINE, PAPER, of_baseline, rows
@@ -111,6 +112,41 @@ def error_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
         lower, faster = PAPER
         step = f"the paper: {math.sqrt(lower):.1f}× lower at {faster}× the time"
         handles.append(Line2D([], [], color=scheme.muted, linestyle=(0, (3, 2)), label=step))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
+    return figure
+
+
+def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw error against time for each size of footprints: colour above, its specular part below.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `equal_time.size_table`.
+    """
+    sizes, measures = [size for size in SIZES if size in set(table["size"])], ("colour", "specular")
+    colours = scheme.colours(table["method"])
+    height = 5.6 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
+    figure, flat = new_figure(max(2.3 * len(sizes), _NARROWEST), height, len(sizes), sharey=True, lines=len(measures))
+    panels = np.asarray(flat).reshape(len(measures), len(sizes))
+    for measure, line in zip(measures, panels, strict=True):
+        for axes, size in zip(line, sizes, strict=True):
+            found = table[(table["size"] == size) & (table[measure] > 0)]
+            for method, knobs in found.groupby("method", sort=False):
+                knobs = knobs.sort_values("ns")
+                axes.plot(
+                    knobs["ns"], knobs[measure], color=colours[str(method)], marker=scheme.marker(str(method)),
+                    markersize=4.5, linewidth=1.1,
+                )  # fmt: skip
+            axes.set(xscale="log", yscale="log", title=f"sigma {size}" if measure == measures[0] else "")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
+            axes.yaxis.set_minor_locator(NullLocator())
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        line[0].set_ylabel(f"relative RMSE, {measure}")
+    panels[-1, len(sizes) // 2].set_xlabel("time of a query, ns")
+    handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
     return figure
 

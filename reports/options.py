@@ -86,6 +86,8 @@ class BenchOptions(BaseModel):
     """Calls of each method before the clock counts."""
     threads: int = Field(default=1, ge=1, le=1024)
     """Threads each timed method may use."""
+    size_rows: int = Field(default=512, ge=16)
+    """Most queries of each fabric and class of footprints of which errors and times at equal time are measured."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth of the pictures and of the random points of the baseline."""
 

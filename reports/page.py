@@ -18,6 +18,7 @@ from pipeline.atomic import atomic_write
 from pipeline.models.options import CLASSES
 from pipeline.scenes.options import Scene
 from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
+from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
 from reports.options import BenchOptions
 from reports.record import TRUTH, Machine, Record, Role, to_table
@@ -25,7 +26,7 @@ from reports.silhouette import silhouette_table
 from reports.stability import Finding, from_records
 from reports.style import DARK, LIGHT, Scheme, display, render
 from reports.tradeoff import tradeoff_table
-from reports.wording import DEFINITIONS, beaten, caveats, cheapest_sentences, headline, learnt
+from reports.wording import DEFINITIONS, beaten, caveats, cheapest_sentences, equal_time_sentences, headline, learnt
 from weaves.fabric import Fabric
 
 
@@ -120,6 +121,8 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "silhouettes": silhouette_table(page.records),
     }
     tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"])
+    tables["by_size"] = size_table(page.records)
+    tables["equal_time"] = equal_time_table(tables["by_size"])
     between = summary.path_table(page.records)
     if len(between):
         tables["between"] = between
@@ -182,6 +185,8 @@ def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
         plots["errors"] = (figures.errors, errors, tables["errors_by_fabric"])
     if tables["tradeoff"]["error"].notna().any():
         plots["error-against-time"] = (figures.error_against_time, tables["tradeoff"])
+    if len(tables["by_size"]):
+        plots["error-by-size"] = (figures.error_by_size, tables["by_size"])
     if len(aliasing):
         plots["aliasing"] = (figures.aliasing, aliasing)
     if curves:
@@ -231,6 +236,8 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         front_columns=cells.FRONT,
         cheapest=cheapest_sentences(tables["tradeoff"]),
         beaten=beaten(tables["tradeoff"]),
+        equal_time=cells.equal_time_rows(tables["equal_time"]),
+        equal_time_sentences=equal_time_sentences(tables["equal_time"]),
         errors=cells.error_rows(errors, per_material),
         by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
         aliasing=cells.aliasing_rows(tables["aliasing"], page.records),

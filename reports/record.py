@@ -79,9 +79,13 @@ Metric = Literal[
     "silhouette_coverage",
     "silhouette_displacement",
     "silhouette_light",
+    "size_colour",
+    "size_specular",
+    "size_diffuse",
+    "size_time",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
-`accuracy`, `bias`, `effort`, `latents` and `silhouette`."""
+`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`."""
 
 
 class Provenance(BaseModel):

@@ -146,10 +146,13 @@ def render(plot: Callable[..., Figure], scheme: Scheme, *data: Any) -> bytes:
     return buffer.getvalue()
 
 
-def new_figure(width: float, height: float, columns: int = 1, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a figure of `columns` axes side by side, `width` by `height` inches."""
+def new_figure(
+    width: float, height: float, columns: int = 1, sharey: bool = False, lines: int = 1
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `columns` axes side by side in `lines`, `width` by `height` inches; `sharey` of a line."""
     figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
-    return figure, list(figure.subplots(1, columns, sharey=sharey, squeeze=False)[0])
+    axes = figure.subplots(lines, columns, sharey="row" if sharey else False, squeeze=False)
+    return figure, list(axes.ravel())
 
 
 def _parameters(scheme: Scheme) -> dict[Any, Any]:

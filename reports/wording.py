@@ -12,6 +12,7 @@ from typing import Final
 import pandas as pd
 
 from pipeline.scenes.options import ViewOptions
+from reports.equal_time import SIZES, WHOLE
 from reports.options import BenchOptions
 from reports.record import TRUTH
 from reports.style import display
@@ -87,6 +88,35 @@ def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) ->
             parts.append(f"{_and(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
         result.append(f"{str(role).capitalize()} fabrics, error of the colour: {'; '.join(parts)}.")
     return result
+
+
+def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:
+    """Return for each method whether any rival errs less in the same time, and where, from `equal_time_table`."""
+    result = []
+    found = table[(table["measure"] == measure) & table["ratio"].notna()]
+    for (method, setting), group in found.groupby(["method", "setting"], sort=False):
+        name, lost = display(str(method), str(setting)), group[group["ratio"] < 1.0]
+        if len(lost):
+            parts = [_where(str(rival), part) for rival, part in lost.groupby("rival", sort=False)]
+            result.append(f"{name}: in the same time, less error by {'; '.join(parts)}.")
+        else:
+            (closest,) = rows(group.nsmallest(1, "ratio"))
+            near = f"{display(closest.rival)}, {closest.ratio:.2f}× its error {_size(closest.size)}"
+            result.append(f"{name}: in the same time no rival errs less at any size; the closest is {near}.")
+    return result
+
+
+def _where(rival: str, lost: pd.DataFrame) -> str:
+    """Return where a rival errs less, and how much at best."""
+    sizes = [size for size in lost["size"] if size != WHOLE]
+    places = (
+        "at every size" if len(sizes) == len(SIZES) else f"at {_and(sizes)}" if sizes else "over all sizes together"
+    )
+    return f"{display(rival)} {places} (down to {lost['ratio'].min():.2f}×)"
+
+
+def _size(name: str) -> str:
+    return "over all sizes" if name == WHOLE else f"at footprints {name}"
 
 
 def beaten(table: pd.DataFrame) -> dict[str, list[str]]:
