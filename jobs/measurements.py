@@ -232,7 +232,7 @@ def _timing_task(
         "measure": "timing",
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "options": bench.model_dump(mode="json", include={"rows", *_TIMED}),
+        "options": bench.model_dump(mode="json", include={"rows", "bounds", *_TIMED}),
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
         "trainings": [task.id for task in trainings],
     }

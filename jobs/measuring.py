@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from jobs.task import Task
+from pipeline.models.bounded import counterpart
 from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
 from pipeline.models.registry import load_methods
@@ -63,7 +64,7 @@ def method(task: Task, out: Path, progress: Progress) -> None:
     fabric = manifest.fabrics[name]
     provenance = Provenance(dataset=manifest.fingerprint, model=" ".join(task.spec["models"]))
     records: list[Record] = []
-    methods = _methods(setting["model"], setting["models"], out)
+    methods = _methods(setting["model"], setting["models"], out, options.bounds)
     for index, one in enumerate(methods):
         records += measure_errors(one, manifest, folder, name, role, options, provenance)
         records += measure_furnace(one, fabric, role, provenance)
@@ -96,10 +97,12 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     """Time all methods side by side, on all queries and by the size of their footprints."""
     options, folder = _options(task), out / task.setting["dataset"]
     manifest = Manifest.load(folder)
-    methods = [one for model in task.setting["models"] for one in _methods(model["options"], model["folders"], out)]
+    asked = [(model["options"], model["folders"], out) for model in task.setting["models"]]
     provenance = Provenance(dataset=manifest.fingerprint)
+    methods = [one for ask in asked for one in _methods(*ask, options.bounds)]
     records = measure_timing(methods, manifest, folder, options, provenance)
     progress(0.4)
+    methods = [one for ask in asked for one in _methods(*ask)]
     records += measure_by_size(methods, manifest, folder, options, provenance)
     write_records(out / task.products[0], records, this_machine(options.threads))
 
@@ -133,6 +136,8 @@ def _options(task: Task) -> BenchOptions:
     return BenchOptions.model_validate(task.setting["options"])
 
 
-def _methods(options: Mapping[str, Any], folders: list[str], out: Path) -> list[Method]:
-    """Load the methods that a model's options describe."""
-    return load_methods(TypeAdapter[Any](ModelOptions).validate_python(options), [out / folder for folder in folders])
+def _methods(options: Mapping[str, Any], folders: list[str], out: Path, bounds: bool = False) -> list[Method]:
+    """Load the methods that a model's options describe; with `bounds` each trained one's counterpart too."""
+    model = TypeAdapter[Any](ModelOptions).validate_python(options)
+    methods = load_methods(model, [out / folder for folder in folders])
+    return methods + [counterpart(one) for one in methods if bounds and folders]

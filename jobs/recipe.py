@@ -226,6 +226,8 @@ def _refuse_contradictions(recipe: Recipe, where: str) -> None:
     queries = recipe.dataset.queries
     asked = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
     plain = TruthOptions()
+    if recipe.bench.bounds and (kinds := [kind for kind, there in asked.items() if there]):
+        raise BadInput(where, "bench.bounds", True, f"the bound does not know queries with {' and '.join(kinds)}")
     for index, model in enumerate(recipe.models):
         for kind in (kind for kind, there in asked.items() if there and kind not in model.options.kinds):
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"

@@ -125,19 +125,30 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     }
 
 
-def energy_rows(energy: pd.DataFrame) -> list[Row]:
+ENERGY: Final = ("diffuse, k_d = 1", "specular, k_s = 1", "in its own colours", "MSE, seen", "ns a query")
+"""Columns of `energy_rows` after the method."""
+
+
+def energy_rows(energy: pd.DataFrame, errors: pd.DataFrame, timing: pd.DataFrame) -> list[Row]:
     """Return the rows of the table of energies, in groups; what sends back more than arrives is marked."""
-    return groups(
-        [
+    lines = []
+    for row in rows(energy):
+        albedos = (row.diffuse, row.specular, row.colour)
+        cells = [f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in albedos]
+        mse = _number(errors[errors["role"] == "seen"] if len(errors) else errors, row, "mse")
+        lines.append(
             _line(row.method, row.setting)
-            | {
-                "cells": [
-                    f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in (row.diffuse, row.specular, row.colour)
-                ]
-            }
-            for row in rows(energy)
-        ]
-    )
+            | {"cells": [*cells, scientific(mse), grouped(_number(timing, row, "median_ns"))]}
+        )
+    return groups(lines)
+
+
+def _number(table: pd.DataFrame, row: Any, column: str) -> float:
+    """Return a column of the row of the same method and setting in another table; NaN if there is none."""
+    if table.empty:
+        return math.nan
+    found = table[(table["method"] == row.method) & (table["setting"] == row.setting)][column]
+    return float(found.iloc[0]) if len(found) else math.nan
 
 
 SILHOUETTE: Final = ("coverage, RMSE", "edge too far out, yarn spacings", "light, RMSE", "fabrics")
@@ -373,6 +384,11 @@ def times(value: float) -> str:
 def percent(value: float, digits: int = 1) -> str:
     """Return ``1.5 %``."""
     return NONE if _missing(value) else f"{100 * value:.{digits}f} %"
+
+
+def grouped(value: float) -> str:
+    """Return ``1,696``."""
+    return NONE if _missing(value) else f"{value:,.0f}"
 
 
 def fixed(value: float) -> str:

@@ -86,6 +86,9 @@ class BenchOptions(BaseModel):
     """Calls of each method before the clock counts."""
     threads: int = Field(default=1, ge=1, le=1024)
     """Threads each timed method may use."""
+    bounds: bool = False
+    """Measure every trained network a second time: under the energy bound of `pipeline.models.bounded`, or without it
+    if it is bounded by itself. For flat cloth lit from the viewer's side."""
     size_rows: int = Field(default=512, ge=16)
     """Most queries of each fabric and class of footprints of which errors and times at equal time are measured."""
     seed: int = Field(default=0, ge=0, lt=2**63)

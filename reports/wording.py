@@ -66,8 +66,9 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
 
 
 def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
-    """Return the methods that are neither the truth nor among those that nothing is trained for."""
-    keys = dict.fromkeys(zip(errors["method"], errors["setting"], strict=True))
+    """Return the first setting of each method that is neither the truth nor among those that nothing is trained for."""
+    first = errors.drop_duplicates("method")
+    keys = zip(first["method"], first["setting"], strict=True)
     return [key for key in keys if key[0] not in untrained and key[0] != TRUTH]
 
 

@@ -155,6 +155,7 @@ class Selvage:
 
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
+        self.bound = network.options.bound
         self._network = network.eval()
         nodes = network.options.narrow_nodes
         self._rule = Quadrature(nodes, QuadratureOptions()) if nodes else None
@@ -198,11 +199,16 @@ class Selvage:
             result[by_rule] = share[by_rule] * result[by_rule] + (1.0 - share[by_rule]) * narrow
         return result
 
+    def with_bound(self, bound: bool) -> Selvage:
+        """Return the same network, bounded in energy or not."""
+        other = Selvage(self._network, self.domain)
+        other.bound, other.setting = bound, "bounded" if bound else "unbounded"
+        return other
+
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the sums and the network."""
         table, bias = self._cloths.of(fabric)
         result = np.empty((len(queries.u), 4), np.float32)
-        bounded = self._network.options.bound
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK):
                 rows = slice(start, start + CHUNK)
@@ -212,7 +218,7 @@ class Selvage:
                     x = torch.addmm(shift, functional.leaky_relu_(x, _SLOPE), weight)
                 x.sigmoid_().mul_(_LARGEST)
                 np.multiply(x.numpy(), components, out=result[rows])
-                if bounded:
+                if self.bound:
                     np.minimum(result[rows], bounds, out=result[rows])
         return result
 

@@ -33,7 +33,7 @@ def test_learnt_leaves_points_out():
         {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
     )
     assert learnt(errors) == [("woven", "")]
-    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
+    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1")]
 
 
 def test_the_cheapest_is_said_of_what_was_measured():

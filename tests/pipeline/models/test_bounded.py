@@ -1,0 +1,59 @@
+"""The energy bound: whatever a method answers, no more diffuse light leaves than arrives."""
+
+import numpy as np
+import pytest
+
+from pipeline.models.bounded import Bounded, counterpart
+from pipeline.models.sums import Sums
+from pipeline.shards.queries import QueryOptions, draw_queries
+from reports.furnace import measure_furnace
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+
+class Bright:
+    """A network gone wrong: it answers a thousand times too much, everywhere."""
+
+    name, setting = "bright", ""
+
+    def covers(self, fabric):
+        return fabric.name != "basket"
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        return np.full((len(queries.u), 4), 1e3, np.float32)
+
+    def bytes_stored(self, fabric):
+        return 7
+
+
+@pytest.mark.parametrize("name", ["polyester_lining", "silk_charmeuse", "twill_4_4", "voile"])
+def test_the_brightest_method_returns_at_most_what_arrives(name):
+    # The integral is a sum over 256 directions of a smooth lobe: good to 1 %.
+    found = {r.metric: r.value for r in measure_furnace(Bounded(Bright()), load_fabric(name), "seen")}
+    assert found["furnace_diffuse"] <= 1.01
+    assert found["furnace_specular"] < 0.6
+
+
+def test_what_is_below_the_bound_stays_as_it_is():
+    # Shadows only take light away: the sums themselves lie below their bound.
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 500)
+    sums = Sums()
+    np.testing.assert_allclose(Bounded(sums).predict(fabric, queries), sums.predict(fabric, queries), rtol=1e-6)
+
+
+def test_it_is_named_apart_and_answers_for_the_same_fabrics():
+    bounded = counterpart(Bright())
+    assert (bounded.name, bounded.setting) == ("bright", "bounded")
+    assert not bounded.covers(load_fabric("basket"))
+    assert bounded.bytes_stored(load_fabric("denim")) > 7
+
+
+def test_light_from_behind_is_refused():
+    fabric = load_fabric("voile")
+    queries = draw_queries(QueryOptions(behind=1.0), fabric.weave.repeat, 3, 0, 5)
+    with pytest.raises(BadInput, match="light from the viewer's side"):
+        Bounded(Bright()).predict(fabric, queries)
