@@ -9,16 +9,8 @@ from pipeline.models.angular_samples import AngularSamples
 from pipeline.models.domain import Domain
 from pipeline.models.method import Batch
 from pipeline.models.options import UnifiedBtfOptions
-from pipeline.models.unified_btf import (
-    UnifiedBtf,
-    UnifiedBtfNetwork,
-    angles_of,
-    averaged,
-    build,
-    decoder,
-    read_texels,
-    restore,
-)
+from pipeline.models.set_encoder import angles_of, read_texels
+from pipeline.models.unified_btf import UnifiedBtf, UnifiedBtfNetwork, averaged, build, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput

@@ -8,7 +8,8 @@ from pipeline.models.method import Batch, Method
 from pipeline.models.options import WovenOptions
 from pipeline.models.placement import SYMMETRIES, Placement, moved
 from pipeline.models.placement import standard as standard_of
-from pipeline.models.woven import Woven, WovenNetwork, read_cloth
+from pipeline.models.woven import Woven, WovenNetwork
+from pipeline.models.woven_cloth import read_cloth
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
