@@ -7,15 +7,15 @@ One network for each fabric, so that eight numbers a texel are enough; with 3 ou
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from torch import Tensor
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain
+from pipeline.models.method import Trained
 from pipeline.models.options import BtfAutoencoderOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.unified_btf import UnifiedBtf, UnifiedBtfNetwork, restored
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -37,6 +37,7 @@ class BtfAutoencoder:
     def __init__(self, name: str, methods: dict[str, UnifiedBtf], domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = name, "", domain
         self._methods = methods
+        self._known = PerFabric(lambda fabric: methods[fingerprint(fabric.optics())])
 
     def covers(self, fabric: Fabric) -> bool:
         """Tell whether this fabric was trained."""
@@ -44,15 +45,15 @@ class BtfAutoencoder:
 
     def prepare(self, fabric: Fabric) -> None:
         """Encode the fabric's texels, once."""
-        self._methods[fingerprint(fabric.optics())].prepare(fabric)
+        self._known.of(fabric).prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
-        return self._methods[fingerprint(fabric.optics())].predict(fabric, queries, seed)
+        return self._known.of(fabric).predict(fabric, queries, seed)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the latents, float32."""
-        return self._methods[fingerprint(fabric.optics())].bytes_stored(fabric)
+        return self._known.of(fabric).bytes_stored(fabric)
 
 
 def build(options: BtfAutoencoderOptions, fabrics: Sequence[Fabric]) -> UnifiedBtfNetwork:
@@ -61,9 +62,7 @@ def build(options: BtfAutoencoderOptions, fabrics: Sequence[Fabric]) -> UnifiedB
     return UnifiedBtfNetwork(options, [fabric])
 
 
-def restore(
-    options: BtfAutoencoderOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
-) -> list[BtfAutoencoder]:
+def restore(options: BtfAutoencoderOptions, trained: Trained) -> list[BtfAutoencoder]:
     """Return one method that holds all trained fabrics."""
     methods, domain = {}, None
     for card, weights in trained:

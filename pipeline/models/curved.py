@@ -21,9 +21,8 @@ four components, specular ones in log space, counts of texels and steps. The pap
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -32,11 +31,13 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from pipeline.models.losses import to_components, to_network, weighted_error
-from pipeline.models.method import CHUNK, GPU_CHUNK, Batch, in_repeat
+from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import CurvedOptions
+from pipeline.models.perceptron import perceptron
 from pipeline.models.silhouettes import Silhouettes, View, draw_silhouettes
-from pipeline.models.texture import FEATURE_SCALE, Perceptron, level_shapes, read_pyramid, shifted
+from pipeline.models.texture import level_shapes, random_pyramid, read_pyramid, shifted
+from pipeline.models.texture_network import TextureNetwork
 from pipeline.truth.cloth import model_of
 from pipeline.truth.curved import has_gaps
 from pipeline.truth.options import TruthOptions
@@ -44,12 +45,12 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_TEXTURES = ("opacity_levels", "depth", "levels")
+_LAYERS = 3  # hidden ones of all perceptrons
 _SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): a step of no width cannot be learnt
 _NO_FALL = -1.0  # finite, because weights are averaged
 
 
-class CurvedNetwork(nn.Module):
+class CurvedNetwork(TextureNetwork):
     """Textures and perceptrons of one fabric.
 
     Parameters
@@ -64,6 +65,8 @@ class CurvedNetwork(nn.Module):
         Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
     """
 
+    textures: ClassVar[tuple[str, ...]] = ("opacity_levels", "depth", "levels")
+    options: CurvedOptions
     fall: Tensor
 
     def __init__(
@@ -79,16 +82,15 @@ class CurvedNetwork(nn.Module):
         shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)
         channels, hidden, view = options.channels, options.hidden, _view_inputs(options)
         coarse = level_shapes(options.silhouette_texels_per_yarn, options.levels, repeat)
-        self.opacity_levels = _features(channels, coarse)
-        self.opacity = Perceptron(channels + view, hidden, 2 if options.silhouette == "grazing" else 1)
-        self.levels = _features(channels, shapes)
-        self.decoder = Perceptron(channels + view + _axes(options), hidden, 4)
-        self.depth: nn.Parameter | None = None
-        self.offset: Perceptron | None = None
+        self.opacity_levels = random_pyramid(channels, coarse)
+        self.opacity = perceptron(channels + view, hidden, _LAYERS, 2 if options.silhouette == "grazing" else 1)
+        self.levels = random_pyramid(channels, shapes)
+        self.decoder = perceptron(channels + view + _axes(options), hidden, _LAYERS, 4)
+        self.depth = None
+        self.offset: nn.Sequential | None = None
         if options.offset:
             self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
-            self.offset = Perceptron(channels + view, hidden, 1)
-        self._blur = 0.0  # standard deviation, in finest texels
+            self.offset = perceptron(channels + view, hidden, _LAYERS, 1)
 
     def forward(self, view: View, wi: Tensor) -> Tensor:
         """Answer in network space, (n, 4), for light from wi (n, 3)."""
@@ -142,35 +144,6 @@ class CurvedNetwork(nn.Module):
         square = (target[:, 0] - mean).square() + target[:, 1]
         return ((deviation / _SHARPEST).log() + 0.5 * square / deviation.square()).mean()
 
-    def start_at(self, target: Tensor) -> None:
-        """Set the last bias to the mean target."""
-        with torch.no_grad():
-            last = self.decoder[-1]
-            assert isinstance(last, nn.Linear)
-            last.bias.copy_(to_network(target, self.options.log_k).mean(dim=0))
-
-    def schedule(self, progress: float) -> None:
-        """Halve the blur again and again, and freeze the offset texture, at `progress` in [0, 1)."""
-        options = self.options
-        self._blur = options.blur * 2.0 ** (-progress / options.blur_halving)
-        if self.depth is not None:
-            self.depth.requires_grad_(progress < options.offset_frozen)
-
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return two groups: perceptrons at `rate`, textures faster."""
-        textures = [weight for name, weight in self.named_parameters() if name.split(".")[0] in _TEXTURES]
-        chosen = {id(weight) for weight in textures}
-        others = [weight for weight in self.parameters() if id(weight) not in chosen]
-        return [{"params": others, "lr": rate}, {"params": textures, "lr": rate * self.options.texture_rate}]
-
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        total = sum(math.prod(shape) for shape in layers.values())
-        textures = sum(math.prod(shape) for name, shape in layers.items() if name.split(".")[0] in _TEXTURES)
-        counts = {"textures": textures, "perceptrons": total - textures, "total": total}
-        return {"parameters": counts, "layers": layers}
-
     def _silhouette(self, view: View) -> Tensor:
         texels = self.options.silhouette_texels_per_yarn
         features = self._read(list(self.opacity_levels), view.u, view.v, view.sigma, texels)
@@ -193,12 +166,7 @@ class CurvedNetwork(nn.Module):
     def _read(self, levels: list[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels: int = 0) -> Tensor:
         finest = self.options.texels_per_yarn
         texels = texels or finest
-        blur = self._blur * texels / finest if self.training else 0.0
-        return read_pyramid(levels, u, v, sigma, texels, blur)
-
-
-def _features(channels: int, shapes: Sequence[tuple[int, int]]) -> nn.ParameterList:
-    return nn.ParameterList(nn.Parameter(FEATURE_SCALE * torch.randn(channels, *shape)) for shape in shapes)
+        return read_pyramid(levels, u, v, sigma, texels, self.blur * texels / finest)
 
 
 def _axes(options: CurvedOptions) -> int:
@@ -215,14 +183,16 @@ class Curved(OneMaterial[CurvedNetwork]):
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         network = self._asked(fabric, queries)
-        return self._in_chunks(
-            fabric, queries, lambda view, wi: to_components(network(view, wi), network.options.log_k)
-        )
+
+        def answer(view: View, wi: Tensor) -> Tensor:
+            return to_components(network(view, wi), network.options.log_k)
+
+        return self._in_chunks(fabric, queries, answer, 4)
 
     def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
         network = self._asked(fabric, queries)
-        return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1))[:, 0]
+        return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
 
     def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
         """Return the fabric's network; BadInput for what it was not taught."""
@@ -238,20 +208,12 @@ class Curved(OneMaterial[CurvedNetwork]):
         return network
 
     def _in_chunks(
-        self, fabric: Fabric, queries: Queries, answer: Callable[[View, Tensor], Tensor]
+        self, fabric: Fabric, queries: Queries, answer: Callable[[View, Tensor], Tensor], width: int
     ) -> npt.NDArray[np.float32]:
-        """Answer some rows at a time, without gradients; a chunk is what the cache holds."""
+        """Answer some rows at a time, without gradients."""
+        columns = (*View._fields, "wi")
         near = in_repeat(queries, fabric.weave.repeat)
-        columns = (near.u, near.v, near.sigma, near.wo, near.curvature, near.wi)
-        chunk = CHUNK if self._device.type == "cpu" else GPU_CHUNK
-        # One chunk at least, so that no rows have answers of the right width too.
-        answers = []
-        with torch.inference_mode():
-            for start in range(0, max(len(near.u), 1), chunk):
-                rows = slice(start, start + chunk)
-                *view, wi = (torch.from_numpy(np.array(c[rows], np.float32)).to(self._device) for c in columns)
-                answers.append(answer(View(*view), wi).numpy(force=True))
-        return np.concatenate(answers)
+        return in_chunks(near, lambda *asked: answer(View(*asked[:-1]), asked[-1]), self._device, columns, width)
 
 
 def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
@@ -262,7 +224,7 @@ def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
     return CurvedNetwork(options, fabric.weave.repeat, draw_silhouettes(options, fabric), fall)
 
 
-def restore(options: CurvedOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Curved]:
+def restore(options: CurvedOptions, trained: Trained) -> list[Curved]:
     """Return one method that holds all trained fabrics."""
     networks, domain = restored(trained, lambda repeat: CurvedNetwork(options, repeat))
     return [Curved(options.name, networks, domain)]

@@ -6,13 +6,13 @@ sees batches of torch tensors.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -22,6 +22,14 @@ CHUNK = 4096
 
 GPU_CHUNK = 2**18
 """Rows inferred at a time on a GPU."""
+
+KNOWN = ("u", "v", "sigma", "wi", "wo")
+"""Columns of round footprints of flat cloth: what the published networks know."""
+
+Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
+"""Cards and weights of trained models."""
+
+Net = TypeVar("Net", bound=nn.Module)
 
 
 @runtime_checkable
@@ -100,8 +108,18 @@ class Network(Protocol):
         """Describe layers and parameter counts for the model card."""
 
 
+def loaded(network: Net, weights: dict[str, Tensor]) -> Net:
+    """Return a network with these weights; RuntimeError if they are another network's."""
+    network.load_state_dict(weights)
+    return network
+
+
 def in_chunks(
-    queries: Queries, answer: Callable[[Tensor, Tensor, Tensor, Tensor, Tensor], Tensor], device: torch.device
+    queries: Queries,
+    answer: Callable[..., Tensor],
+    device: torch.device,
+    columns: Sequence[str] = KNOWN,
+    width: int = 4,
 ) -> npt.NDArray[np.float32]:
     """Answer queries some rows at a time, without gradients.
 
@@ -110,23 +128,26 @@ def in_chunks(
     queries : Queries
         N questions.
     answer : callable
-        Takes float32 tensors u, v, sigma (rows,), wi, wo (rows, 3) on `device`; returns (rows, 4).
+        Takes the columns as float32 tensors (rows,) or (rows, 3) on `device`; returns (rows, width).
     device : torch.device
         Where `answer` computes.
+    columns : sequence of str
+        What it is given of the queries.
+    width : int
+        Numbers that it answers to each.
 
     Returns
     -------
-    float32 (N, 4)
+    float32 (N, width)
     """
-    result = np.empty((len(queries.u), 4), np.float32)
+    result = np.empty((len(queries.u), width), np.float32)
+    asked = [getattr(queries, name) for name in columns]
     chunk = CHUNK if device.type == "cpu" else GPU_CHUNK
     with torch.inference_mode():
         for start in range(0, len(result), chunk):
             rows = slice(start, start + chunk)
             # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
-            # Round footprints of flat cloth: what the published networks know.
-            known = (queries.u, queries.v, queries.sigma, queries.wi, queries.wo)
-            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in known]
+            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in asked]
             result[rows] = answer(*tensors).numpy(force=True)
     return result
 

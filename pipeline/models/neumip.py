@@ -16,9 +16,8 @@ a mask. So are the counts of texels, queries and steps; the published training t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,15 +25,19 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.models.losses import to_components, to_network, weighted_error
-from pipeline.models.method import Batch, in_chunks, in_repeat
+from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import NeumipOptions
-from pipeline.models.texture import FEATURE_SCALE, Perceptron, level_shapes, read_pyramid, shifted
+from pipeline.models.perceptron import perceptron
+from pipeline.models.texture import level_shapes, random_pyramid, read_pyramid, shifted
+from pipeline.models.texture_network import TextureNetwork
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
+_LAYERS = 3  # hidden ones of both perceptrons
 
-class NeumipNetwork(nn.Module):
+
+class NeumipNetwork(TextureNetwork):
     """Textures and perceptrons of one fabric.
 
     Parameters
@@ -45,25 +48,25 @@ class NeumipNetwork(nn.Module):
         Extent of the fabric's repeat in x and y, in yarn spacings.
     """
 
+    textures: ClassVar[tuple[str, ...]] = ("levels", "depth")
+    options: NeumipOptions
+
     def __init__(self, options: NeumipOptions, repeat: tuple[int, int]) -> None:
         super().__init__()
         self.options, self.repeat = options, repeat
         self.shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)  # (rows, columns), finest first
-        self.levels = nn.ParameterList(
-            nn.Parameter(FEATURE_SCALE * torch.randn(options.channels, *shape)) for shape in self.shapes
-        )
-        self.decoder = Perceptron(options.channels + 4, options.hidden, 4)
-        self.depth: nn.Parameter | None = None
-        self.offset: Perceptron | None = None
+        self.levels = random_pyramid(options.channels, self.shapes)
+        self.decoder = perceptron(options.channels + 4, options.hidden, _LAYERS, 4)
+        self.depth = None
+        self.offset: nn.Sequential | None = None
         if options.offset:
             self.depth = nn.Parameter(torch.zeros(options.channels, *self.shapes[0]))
-            self.offset = Perceptron(options.channels + 2, options.hidden, 1)
-        self._blur = 0.0  # standard deviation, in finest texels
+            self.offset = perceptron(options.channels + 2, options.hidden, _LAYERS, 1)
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); u, v (n,) are shares of the repeat, sigma is in yarn spacings."""
         if self.offset is not None and self.depth is not None:
-            here = read_pyramid([self.depth], u, v, sigma, self.options.texels_per_yarn, self._now)
+            here = read_pyramid([self.depth], u, v, sigma, self.options.texels_per_yarn, self.blur)
             u, v = shifted(self.offset(torch.cat([here, wo[:, :2]], dim=-1)), u, v, wo, self.repeat)
         features = self._read_pyramid(u, v, sigma)
         output: Tensor = self.decoder(torch.cat([features, wi[:, :2], wo[:, :2]], dim=-1))
@@ -85,41 +88,8 @@ class NeumipNetwork(nn.Module):
             return masked / share
         return weighted_error(self(*flat), target, options.specular_weight, options.diffuse_weight)
 
-    def start_at(self, target: Tensor) -> None:
-        """Set the last bias to the mean target."""
-        with torch.no_grad():
-            last = self.decoder[-1]
-            assert isinstance(last, nn.Linear)
-            last.bias.copy_(to_network(target, self.options.log_k).mean(dim=0))
-
-    def schedule(self, progress: float) -> None:
-        """Halve the blur again and again, and freeze the offset texture, at `progress` in [0, 1)."""
-        options = self.options
-        self._blur = options.blur * 2.0 ** (-progress / options.blur_halving)
-        if self.depth is not None:
-            self.depth.requires_grad_(progress < options.offset_frozen)
-
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return two groups: perceptrons at `rate`, textures faster."""
-        textures = [weight for name, weight in self.named_parameters() if name.split(".")[0] in ("levels", "depth")]
-        chosen = {id(weight) for weight in textures}
-        others = [weight for weight in self.parameters() if id(weight) not in chosen]
-        return [{"params": others, "lr": rate}, {"params": textures, "lr": rate * self.options.texture_rate}]
-
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        total = sum(math.prod(shape) for shape in layers.values())
-        textures = sum(math.prod(shape) for name, shape in layers.items() if name.split(".")[0] in ("levels", "depth"))
-        counts = {"textures": textures, "perceptrons": total - textures, "total": total}
-        return {"parameters": counts, "layers": layers}
-
     def _read_pyramid(self, u: Tensor, v: Tensor, sigma: Tensor) -> Tensor:
-        return read_pyramid(list(self.levels), u, v, sigma, self.options.texels_per_yarn, self._now)
-
-    @property
-    def _now(self) -> float:
-        return self._blur if self.training else 0.0
+        return read_pyramid(list(self.levels), u, v, sigma, self.options.texels_per_yarn, self.blur)
 
 
 class Neumip(OneMaterial[NeumipNetwork]):
@@ -144,7 +114,7 @@ def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
     return NeumipNetwork(options, fabric.weave.repeat)
 
 
-def restore(options: NeumipOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Neumip]:
+def restore(options: NeumipOptions, trained: Trained) -> list[Neumip]:
     """Return one method that holds all trained fabrics."""
     networks, domain = restored(trained, lambda repeat: NeumipNetwork(options, repeat))
     return [Neumip(options.name, networks, domain)]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable
+from typing import Generic
 
 import torch
-from torch import Tensor, nn
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain, domain_of
+from pipeline.models.method import Net, Trained, loaded
+from pipeline.models.per_fabric import PerFabric
 from weaves.fabric import Fabric
-
-Net = TypeVar("Net", bound=nn.Module)
 
 
 class OneMaterial(Generic[Net]):
@@ -40,6 +39,7 @@ class OneMaterial(Generic[Net]):
         self.name, self.setting, self.domain = name, "", domain
         self._device = device or torch.device("cpu")
         self._networks = {key: network.eval().to(self._device) for key, network in networks.items()}
+        self._known = PerFabric(lambda fabric: self._networks[fingerprint(fabric.optics())])
 
     def covers(self, fabric: Fabric) -> bool:
         """Tell whether this fabric was trained."""
@@ -54,12 +54,10 @@ class OneMaterial(Generic[Net]):
 
     def network_of(self, fabric: Fabric) -> Net:
         """Return the network of a fabric that is covered."""
-        return self._networks[fingerprint(fabric.optics())]
+        return self._known.of(fabric)
 
 
-def restored(
-    trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]], make: Callable[[tuple[int, int]], Net]
-) -> tuple[dict[str, Net], Domain | None]:
+def restored(trained: Trained, make: Callable[[tuple[int, int]], Net]) -> tuple[dict[str, Net], Domain | None]:
     """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught.
 
     `make` returns an untrained network for a repeat (ends, picks).
@@ -69,6 +67,5 @@ def restored(
         domain = domain_of(card)
         (fabric,) = card["fabrics"]
         ends, picks = fabric["repeat"]
-        networks[fabric["optics"]] = make((ends, picks))
-        networks[fabric["optics"]].load_state_dict(weights)
+        networks[fabric["optics"]] = loaded(make((ends, picks)), weights)
     return networks, domain

@@ -9,14 +9,14 @@ precision, at a tenth of the time and with a bias that more points do not lower 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.options import PointSampledOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
 from pipeline.truth.horizon_sampler import HorizonSampler
 from pipeline.truth.options import TruthOptions
@@ -51,8 +51,8 @@ class PointSampled:
     ) -> None:
         self.name, self.setting = name, f"k = {count}"
         self.count, self.sequence = count, sequence
-        self._truth = TruthOptions(footprint=footprint)
-        self._samplers: dict[str, PointSampler] = {}
+        truth = TruthOptions(footprint=footprint)
+        self._samplers = PerFabric(lambda fabric: PointSampler(fabric, truth))
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: nothing is learnt."""
@@ -60,21 +60,15 @@ class PointSampled:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric, once."""
-        self._sampler(fabric)
+        self._samplers.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4), with the random numbers named by `seed`."""
-        return self._sampler(fabric).sample(queries, self.count, seed, self.sequence == "r2")
+        return self._samplers.of(fabric).sample(queries, self.count, seed, self.sequence == "r2")
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the tables that the point model reads."""
-        return self._sampler(fabric).bytes_stored()
-
-    def _sampler(self, fabric: Fabric) -> PointSampler:
-        key = fingerprint(fabric.optics())
-        if key not in self._samplers:
-            self._samplers[key] = PointSampler(fabric, self._truth)
-        return self._samplers[key]
+        return self._samplers.of(fabric).bytes_stored()
 
 
 class HorizonSampled:
@@ -88,14 +82,14 @@ class HorizonSampled:
         Name of the method.
     sequence : str
         ``random`` or ``r2``.
-    make : callable
-        Tabulates a fabric; methods of different counts share what it returns.
+    samplers : PerFabric
+        Horizons of each fabric, shared by methods of different counts.
     """
 
-    def __init__(self, count: int, name: str, sequence: Sequence2D, make: Callable[[Fabric], HorizonSampler]) -> None:
+    def __init__(self, count: int, name: str, sequence: Sequence2D, samplers: PerFabric[HorizonSampler]) -> None:
         self.name, self.setting = name, f"k = {count}"
         self.count, self.sequence = count, sequence
-        self._make = make
+        self._samplers = samplers
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: nothing is learnt."""
@@ -103,16 +97,16 @@ class HorizonSampled:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric's horizons, once."""
-        self._make(fabric)
+        self._samplers.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4), with the numbers named by `seed`. BadInput if they are not plain."""
         refuse_other(queries, self.name)
-        return self._make(fabric).sample(queries, self.count, self.sequence == "r2", seed)
+        return self._samplers.of(fabric).sample(queries, self.count, self.sequence == "r2", seed)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the horizon map."""
-        return self._make(fabric).bytes_stored()
+        return self._samplers.of(fabric).bytes_stored()
 
 
 def restore(
@@ -121,12 +115,5 @@ def restore(
     """Return one method for each number of points."""
     if options.visibility == "exact":
         return [PointSampled(count, options.footprint, options.name, options.sequence) for count in options.counts]
-    samplers: dict[str, HorizonSampler] = {}
-
-    def make(fabric: Fabric) -> HorizonSampler:
-        key = fingerprint(fabric.optics())
-        if key not in samplers:
-            samplers[key] = HorizonSampler(fabric, options.horizon_nodes, options.azimuths)
-        return samplers[key]
-
-    return [HorizonSampled(count, options.name, options.sequence, make) for count in options.counts]
+    samplers = PerFabric(lambda fabric: HorizonSampler(fabric, options.horizon_nodes, options.azimuths))
+    return [HorizonSampled(count, options.name, options.sequence, samplers) for count in options.counts]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.options import PrefilteredOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
 from pipeline.truth.prefiltered_maps import WIDENINGS, PrefilteredMaps
 from pipeline.truth.query import Queries
@@ -31,8 +31,8 @@ class Prefiltered:
 
     def __init__(self, options: PrefilteredOptions) -> None:
         self.name, self.setting = options.name, ""
-        self._options = options
-        self._maps: dict[str, PrefilteredMaps] = {}
+        self._widening = WIDENINGS[options.widening]
+        self._maps = PerFabric(lambda fabric: PrefilteredMaps(fabric, options.texels_per_yarn))
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: nothing is learnt."""
@@ -40,22 +40,16 @@ class Prefiltered:
 
     def prepare(self, fabric: Fabric) -> None:
         """Average the fabric's maps, once."""
-        self._of(fabric)
+        self._maps.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
         refuse_other(queries, self.name)
-        return self._of(fabric).answer(queries, WIDENINGS[self._options.widening])
+        return self._maps.of(fabric).answer(queries, self._widening)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of all levels."""
-        return self._of(fabric).bytes_stored()
-
-    def _of(self, fabric: Fabric) -> PrefilteredMaps:
-        key = fingerprint(fabric.optics())
-        if key not in self._maps:
-            self._maps[key] = PrefilteredMaps(fabric, self._options.texels_per_yarn)
-        return self._maps[key]
+        return self._maps.of(fabric).bytes_stored()
 
 
 def restore(options: PrefilteredOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[Prefiltered]:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.options import QuadratureOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
 from pipeline.truth.gauss_nodes import GaussQuadrature
 from pipeline.truth.query import Queries
@@ -35,7 +35,7 @@ class Quadrature:
     def __init__(self, nodes: int, options: QuadratureOptions) -> None:
         self.name, self.setting = options.name, f"k = {nodes}"
         self._nodes, self._options = nodes, options
-        self._rules: dict[str, GaussQuadrature] = {}
+        self._rules = PerFabric(self._tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: nothing is learnt."""
@@ -43,31 +43,28 @@ class Quadrature:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate nodes and horizons, once."""
-        self._rule(fabric)
+        self._rules.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
         refuse_other(queries, self.name)
-        return self._rule(fabric).answer(queries)
+        return self._rules.of(fabric).answer(queries)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of nodes and horizons."""
-        return self._rule(fabric).bytes_stored()
+        return self._rules.of(fabric).bytes_stored()
 
-    def _rule(self, fabric: Fabric) -> GaussQuadrature:
-        key, options = fingerprint(fabric.optics()), self._options
-        if key not in self._rules:
-            along = max(2, round(options.along * self._nodes))
-            self._rules[key] = GaussQuadrature(
-                fabric,
-                self._nodes,
-                along,
-                options.shadows != "none",
-                options.shadows == "soft",
-                options.horizon_nodes,
-                options.azimuths,
-            )
-        return self._rules[key]
+    def _tabulate(self, fabric: Fabric) -> GaussQuadrature:
+        options = self._options
+        return GaussQuadrature(
+            fabric,
+            self._nodes,
+            max(2, round(options.along * self._nodes)),
+            options.shadows != "none",
+            options.shadows == "soft",
+            options.horizon_nodes,
+            options.azimuths,
+        )
 
 
 def restore(options: QuadratureOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[Quadrature]:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.options import TableOptions
+from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
 from pipeline.truth.cloth import Model, columns_of, model_of
 from pipeline.truth.nodes import sum_rows
@@ -39,7 +39,7 @@ class Tabulated:
     def __init__(self, nodes: int, azimuths: int, name: str) -> None:
         self.name, self.setting = name, f"k = {nodes}"
         self._nodes, self._azimuths = nodes, azimuths
-        self._tables: dict[str, tuple[Model, Table]] = {}
+        self._tables = PerFabric(self._tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: nothing is learnt."""
@@ -47,12 +47,12 @@ class Tabulated:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric, once."""
-        self._table(fabric)
+        self._tables.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
         refuse_other(queries, self.name)
-        model, table = self._table(fabric)
+        model, table = self._tables.of(fabric)
         rows = np.arange(len(queries.u))
         # An error without bound: nothing is sampled again.
         means, _, _ = sum_rows(model, table, columns_of(queries), rows, 1.0, np.inf, np.uint64(seed))
@@ -60,15 +60,11 @@ class Tabulated:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table."""
-        return sum(array.nbytes for array in self._table(fabric)[1] if isinstance(array, np.ndarray))
+        return sum(array.nbytes for array in self._tables.of(fabric)[1] if isinstance(array, np.ndarray))
 
-    def _table(self, fabric: Fabric) -> tuple[Model, Table]:
-        key = fingerprint(fabric.optics())
-        if key not in self._tables:
-            model = model_of(fabric, TruthOptions())
-            table = tabulate(model.front, model.back, False, nodes=self._nodes, azimuths=self._azimuths)
-            self._tables[key] = model, table
-        return self._tables[key]
+    def _tabulate(self, fabric: Fabric) -> tuple[Model, Table]:
+        model = model_of(fabric, TruthOptions())
+        return model, tabulate(model.front, model.back, False, nodes=self._nodes, azimuths=self._azimuths)
 
 
 def restore(options: TableOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[Tabulated]:

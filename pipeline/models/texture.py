@@ -7,7 +7,6 @@ is annealed, so that coarse structure is learnt first [Kuznetsov2021NeuMIP].
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 
@@ -15,27 +14,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-FEATURE_SCALE = 0.1
-"""Standard deviation of the first features."""
-
+_FEATURE_SCALE = 0.1  # standard deviation of the first features
 _NO_BLUR = 0.25  # standard deviation, in texels, below which a blur is skipped
 _DEPTH_SCALE = 0.1
 _STEEPEST = 0.6  # smallest wo.z that parallax is computed with
-
-
-class Perceptron(nn.Sequential):
-    """Three hidden layers of ReLU."""
-
-    def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
-        widths = [inputs, hidden, hidden, hidden]
-        layers: list[nn.Module] = []
-        for a, b in itertools.pairwise(widths):
-            layers += [nn.Linear(a, b), nn.ReLU()]
-        super().__init__(*layers, nn.Linear(hidden, outputs))
-        for layer in self:
-            if isinstance(layer, nn.Linear):
-                nn.init.kaiming_normal_(layer.weight)
-                nn.init.zeros_(layer.bias)
 
 
 def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
@@ -48,6 +30,11 @@ def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> 
     while shapes[-1] != (1, 1) and len(shapes) != levels:
         shapes.append((math.ceil(shapes[-1][0] / 2), math.ceil(shapes[-1][1] / 2)))
     return shapes
+
+
+def random_pyramid(channels: int, shapes: Sequence[tuple[int, int]]) -> nn.ParameterList:
+    """Return random textures of these shapes to learn from."""
+    return nn.ParameterList(nn.Parameter(_FEATURE_SCALE * torch.randn(channels, *shape)) for shape in shapes)
 
 
 def shifted(output: Tensor, u: Tensor, v: Tensor, wo: Tensor, repeat: tuple[int, int]) -> tuple[Tensor, Tensor]:

@@ -20,9 +20,8 @@ round footprints only, as published.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,115 +29,30 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.fingerprint import fingerprint
-from pipeline.models.angular_samples import AngularSamples, angular_samples
+from pipeline.models.angular_samples import angular_samples
 from pipeline.models.domain import Domain, domain_of
+from pipeline.models.encoder_decoder import EncoderDecoder
 from pipeline.models.losses import to_components, to_network, weighted_error
-from pipeline.models.method import Batch, in_chunks, in_repeat
+from pipeline.models.method import Batch, Trained, in_chunks, in_repeat, loaded
 from pipeline.models.options import BtfOptions, UnifiedBtfOptions
+from pipeline.models.per_fabric import PerFabric
+from pipeline.models.perceptron import perceptron
+from pipeline.models.set_encoder import ANGLES, SetEncoder, Texels, angles_of, read_texels
 from pipeline.models.texture import level_shapes, read_pyramid
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_ANGLES = 4
-_HIDDEN_LAYERS = 4  # of the decoder
-_WEIGHING_LAYERS = 2  # of the encoder, before the weights
-_COMPONENTS = 4
+_LAYERS = 4  # hidden ones of the decoder
 
 
-def perceptron(widths: Iterable[int]) -> nn.Sequential:
-    """Return fully connected layers with a ReLU between each two."""
-    layers: list[nn.Module] = []
-    for a, b in itertools.pairwise(widths):
-        layers += [nn.Linear(a, b), nn.ReLU()]
-    network = nn.Sequential(*layers[:-1])
-    for layer in network:
-        if isinstance(layer, nn.Linear):
-            nn.init.kaiming_normal_(layer.weight)
-            nn.init.zeros_(layer.bias)
-    return network
-
-
-def decoder(latent: int, hidden: int, outputs: int = _COMPONENTS) -> nn.Sequential:
+def decoder(latent: int, hidden: int, outputs: int = 4) -> nn.Sequential:
     """Return the published decoder: latent and angles to `outputs` numbers."""
-    return perceptron([latent + _ANGLES, *[hidden] * _HIDDEN_LAYERS, outputs])
+    return perceptron(latent + ANGLES, hidden, _LAYERS, outputs)
 
 
-def angles_of(wi: Tensor, wo: Tensor, kind: str) -> Tensor:
-    """Return directions (..., 3), above the cloth, as four numbers (..., 4).
-
-    ``disc``: x and y. ``stereographic``: x and y over 1 + z, which stays smooth at grazing angles.
-    """
-    if kind == "disc":
-        return torch.cat([wi[..., :2], wo[..., :2]], dim=-1)
-    return torch.cat([w[..., :2] / (1.0 + w[..., 2:]) for w in (wi, wo)], dim=-1)
-
-
-class SetEncoder(nn.Module):
-    """Angular samples of texels to their latents, whatever the samples' number and order [Zaheer2017DeepSets]."""
-
-    def __init__(self, options: BtfOptions) -> None:
-        super().__init__()
-        widths = [_ANGLES, *[options.encoder_hidden] * _WEIGHING_LAYERS, options.weights]
-        self.weigh = perceptron(widths)
-        self.join = nn.Linear(_COMPONENTS * options.weights, options.latent)
-        self.register_buffer("scale", torch.ones(_COMPONENTS))
-        self.scale: Tensor
-
-    def forward(self, angles: Tensor, values: Tensor) -> Tensor:
-        """Encode T texels seen under the same n pairs of directions.
-
-        Parameters
-        ----------
-        angles : Tensor (n, 4)
-            Directions.
-        values : Tensor (n, T, 4)
-            Samples.
-
-        Returns
-        -------
-        Tensor (T, latent)
-        """
-        count, texels, _ = values.shape
-        weights = self.weigh(angles) / count
-        mean = (values.flatten(1).t() @ weights).reshape(texels, -1)  # component by component, m numbers each
-        scale = self.scale.repeat_interleave(weights.shape[1])
-        return functional.relu(functional.linear(mean, self.join.weight * scale, self.join.bias))
-
-
-class Texels(NamedTuple):
-    """What the encoder reads of a fabric.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns.
-    angles : float32 Tensor (n, 4)
-        Directions.
-    values : float16 Tensor (n, rows x columns, 4)
-        Samples in the encoder's space.
-    """
-
-    shape: tuple[int, int]
-    angles: Tensor
-    values: Tensor
-
-    def to(self, device: torch.device) -> Texels:
-        """Return the same on a device."""
-        return Texels(self.shape, self.angles.to(device), self.values.to(device))
-
-
-def read_texels(samples: AngularSamples, options: BtfOptions) -> Texels:
-    """Bring samples into the encoder's space, once: half of a training step otherwise."""
-    wi, wo, values = (torch.from_numpy(part) for part in (samples.wi, samples.wo, samples.values))
-    if options.log_samples:
-        values = to_network(values.to(torch.float32), options.log_k).to(torch.float16)
-    return Texels(samples.shape, angles_of(wi, wo, options.angles), values)
-
-
-class UnifiedBtfNetwork(nn.Module):
+class UnifiedBtfNetwork(EncoderDecoder):
     """Encoder and decoder, with the samples of the fabrics they are trained on.
 
     Parameters
@@ -148,6 +62,9 @@ class UnifiedBtfNetwork(nn.Module):
     fabrics : sequence of Fabric
         Training fabrics, addressed by index in batches; none for inference.
     """
+
+    encoder: SetEncoder
+    decoder: nn.Sequential
 
     def __init__(self, options: BtfOptions, fabrics: Sequence[Fabric] = ()) -> None:
         super().__init__()
@@ -210,22 +127,6 @@ class UnifiedBtfNetwork(nn.Module):
             last.weight.mul_(0.1)
             self.encoder.scale.copy_(1.0 / seen.square().mean(dim=0).sqrt().clamp_min(1e-6))
 
-    def schedule(self, progress: float) -> None:
-        """Change nothing over the training."""
-
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return one group: all weights learn at the same rate."""
-        return [{"params": list(self.parameters()), "lr": rate}]
-
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        counts = {
-            part: sum(weight.numel() for weight in module.parameters())
-            for part, module in (("encoder", self.encoder), ("decoder", self.decoder))
-        }
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        return {"parameters": counts | {"total": sum(counts.values())}, "layers": layers}
-
 
 def averaged(latents: Tensor) -> list[Tensor]:
     """Return the MIP pyramid (latent, rows, columns) of latents (rows, columns, latent), finest first.
@@ -257,7 +158,7 @@ class UnifiedBtf:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self._device = device or torch.device("cpu")
         self._network = network.eval().to(self._device)
-        self._pyramids: dict[str, list[Tensor]] = {}
+        self._pyramids = PerFabric(self._encode)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be encoded."""
@@ -265,13 +166,13 @@ class UnifiedBtf:
 
     def prepare(self, fabric: Fabric) -> None:
         """Draw the fabric's samples from the truth and encode them, once: one forward pass, no optimisation."""
-        self._pyramid(fabric)
+        self._pyramids.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        network, pyramid = self._network, self._pyramid(fabric)
+        network, pyramid = self._network, self._pyramids.of(fabric)
 
         def answer(u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
             output = network.decode(network.read(pyramid, u, v, sigma), wi, wo)
@@ -282,17 +183,14 @@ class UnifiedBtf:
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the fabric's latents, float32; the encoder is not needed to render."""
         weights = sum(weight.numel() for weight in self._network.decoder.parameters())
-        return 4 * (weights + sum(level.numel() for level in self._pyramid(fabric)))
+        return 4 * (weights + sum(level.numel() for level in self._pyramids.of(fabric)))
 
-    def _pyramid(self, fabric: Fabric) -> list[Tensor]:
-        key = fingerprint(fabric.optics())
-        if key not in self._pyramids:
-            network = self._network
-            samples = angular_samples(fabric, network.options)
-            with torch.inference_mode():
-                texels = read_texels(samples, network.options).to(self._device)
-                self._pyramids[key] = [level.contiguous() for level in averaged(network.encode(texels))]
-        return self._pyramids[key]
+    def _encode(self, fabric: Fabric) -> list[Tensor]:
+        network = self._network
+        samples = angular_samples(fabric, network.options)
+        with torch.inference_mode():
+            texels = read_texels(samples, network.options).to(self._device)
+            return [level.contiguous() for level in averaged(network.encode(texels))]
 
 
 def build(options: UnifiedBtfOptions, fabrics: Sequence[Fabric]) -> UnifiedBtfNetwork:
@@ -300,9 +198,7 @@ def build(options: UnifiedBtfOptions, fabrics: Sequence[Fabric]) -> UnifiedBtfNe
     return UnifiedBtfNetwork(options, fabrics)
 
 
-def restore(
-    options: UnifiedBtfOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
-) -> list[UnifiedBtf]:
+def restore(options: UnifiedBtfOptions, trained: Trained) -> list[UnifiedBtf]:
     """Return the method that a trained network is."""
     return [UnifiedBtf(*restored(options, card, weights)) for card, weights in trained]
 
@@ -311,9 +207,7 @@ def restored(
     options: BtfOptions, card: dict[str, Any], weights: dict[str, Tensor]
 ) -> tuple[UnifiedBtfNetwork, Domain | None]:
     """Return a trained network and its domain; BadInput if its samples are answered by other physics than its rows."""
-    network = UnifiedBtfNetwork(options)
-    network.load_state_dict(weights)
-    domain = domain_of(card)
+    network, domain = loaded(UnifiedBtfNetwork(options), weights), domain_of(card)
     if domain is not None:
         domain.refuse_truth(options.truth, options.name)
         # Whatever else the rows held: footprints are read as round, and the cloth as flat.

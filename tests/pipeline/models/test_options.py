@@ -1,10 +1,11 @@
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.models.options import ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.models.options import CLASSES, ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
 from pipeline.training.options import TrainingOptions
 
 MODEL = TypeAdapter(ModelOptions)
@@ -14,6 +15,12 @@ def test_model_tells_the_options_apart():
     kinds = {"woven": WovenOptions, "neumip": NeumipOptions, "point_sampled": PointSampledOptions}
     for model, kind in kinds.items():
         assert type(MODEL.validate_python({"model": model})) is kind
+
+
+@pytest.mark.parametrize("model", CLASSES)
+def test_options_lie_in_the_file_of_their_model(model):
+    assert CLASSES[model].__module__ == f"pipeline.models.options.{model}"
+    assert find_spec(f"pipeline.models.{model}") is not None
 
 
 @pytest.mark.parametrize(

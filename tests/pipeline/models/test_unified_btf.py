@@ -5,20 +5,10 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.angular_samples import AngularSamples
 from pipeline.models.domain import Domain
 from pipeline.models.method import Batch
 from pipeline.models.options import UnifiedBtfOptions
-from pipeline.models.unified_btf import (
-    UnifiedBtf,
-    UnifiedBtfNetwork,
-    angles_of,
-    averaged,
-    build,
-    decoder,
-    read_texels,
-    restore,
-)
+from pipeline.models.unified_btf import UnifiedBtf, UnifiedBtfNetwork, averaged, build, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -28,24 +18,11 @@ SMALL = UnifiedBtfOptions(texels_per_yarn=2, samples=8, fewest_samples=4, encode
 LINING, BASKET = load_fabric("polyester_lining"), load_fabric("basket")
 
 
-def made_up(count: int, texels: int = 6, seed: int = 0) -> AngularSamples:
-    """Return smooth, positive samples of texels that differ, without asking the truth."""
-    drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
-    phase = np.arange(4 * texels).reshape(texels, 4)
-    wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
-    values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
-    return AngularSamples((1, texels), drawn.wi, drawn.wo, values.astype(np.float16))
-
-
 def network(seed: int = 0, **changes: object) -> UnifiedBtfNetwork:
     torch.manual_seed(seed)
     built = UnifiedBtfNetwork(SMALL.model_copy(update=changes)).eval()
     built.encoder.scale.fill_(10.0)
     return built
-
-
-def encoded(model: UnifiedBtfNetwork, samples: AngularSamples, chosen: np.ndarray | None = None) -> torch.Tensor:
-    return model.encode(read_texels(samples, model.options), chosen)
 
 
 def batch_of(queries: Queries, target: torch.Tensor) -> Batch:
@@ -58,57 +35,6 @@ def batch_of(queries: Queries, target: torch.Tensor) -> Batch:
 def test_decoder_has_the_published_weights(latent, published):
     """With RGB out: Rainer et al. 2020 and 2019."""
     assert sum(weight.numel() for weight in decoder(latent, 106, outputs=3).parameters()) == published
-
-
-def test_angles_tell_light_from_viewer():
-    wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
-    torch.testing.assert_close(angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
-    torch.testing.assert_close(angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
-
-
-@torch.inference_mode()
-def test_order_of_the_samples_does_not_matter():
-    """Only the rounding of the sums may differ."""
-    samples, model = made_up(500), network()
-    shuffled = encoded(model, samples, np.random.default_rng(0).permutation(500))
-    torch.testing.assert_close(shuffled, encoded(model, samples), rtol=1e-4, atol=1e-6)
-
-
-@torch.inference_mode()
-def test_number_of_the_samples_does_not_matter():
-    """Every sample given twice says nothing new."""
-    samples, model = made_up(50), network()
-    torch.testing.assert_close(encoded(model, samples, np.tile(np.arange(50), 3)), encoded(model, samples))
-
-
-@torch.inference_mode()
-def test_latents_converge_as_the_samples_grow():
-    """The encoder averages, so 50 to 5,000 samples leave an error that falls as n^(-1/2).
-
-    Expected: slope -0.5 in the logarithms. 64 independent sets leave about 0.02 on it; 0.1 is five deviations.
-    """
-    model = network()
-    exact = encoded(model, made_up(200_000, seed=99))
-    counts, errors = (50, 500, 5000), []
-    for count in counts:
-        differences = [encoded(model, made_up(count, seed=seed)) - exact for seed in range(64)]
-        errors.append(float(torch.stack(differences).square().mean().sqrt()))
-    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert slope == pytest.approx(-0.5, abs=0.1)
-    assert errors[-1] < 0.1 * float(exact.square().mean().sqrt())
-
-
-@torch.inference_mode()
-def test_averaged_latents_are_the_latent_of_the_averaged_texel():
-    """Exactly so where no ReLU of the latent is on its other side: all of the encoder behind it is linear in values."""
-    samples, model = made_up(200), network(log_samples=False)
-    values = samples.values.astype(np.float32).mean(axis=1, keepdims=True)  # not rounded to half precision
-    together = AngularSamples((1, 1), samples.wi, samples.wo, values)
-    for offset, tolerance in ((10.0, 1e-5), (-10.0, 1e-5)):
-        model.encoder.join.bias.fill_(offset)
-        expected = encoded(model, together)[0, 0]
-        torch.testing.assert_close(encoded(model, samples).mean(dim=(0, 1)), expected, rtol=tolerance, atol=tolerance)
-        assert (expected > 0).all() == (offset > 0)
 
 
 def test_pyramid_is_averaged_down_to_one_texel():

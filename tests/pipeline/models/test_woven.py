@@ -7,14 +7,13 @@ import torch
 from pipeline.models.method import Batch, Method
 from pipeline.models.options import WovenOptions
 from pipeline.models.placement import SYMMETRIES, Placement, moved
-from pipeline.models.placement import standard as standard_of
-from pipeline.models.woven import Woven, WovenNetwork, read_cloth
+from pipeline.models.woven import Woven, WovenNetwork
+from pipeline.models.woven_cloth import read_cloth
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
-from weaves.surface import surface_at
 
 SMALL = WovenOptions(map_texels=16, encoder_channels=4)
 
@@ -35,11 +34,6 @@ def queries(u, v, sigma, wi=(0.6, 0.0, 0.8), wo=(0.0, -0.28, 0.96)):
     return Queries.round(u, v, sigma, *directions)
 
 
-@pytest.mark.parametrize("one_blob", ["plain", "periodic"])
-def test_decoder_has_the_published_number_of_parameters(one_blob):
-    assert WovenNetwork(WovenOptions(one_blob=one_blob)).architecture()["parameters"]["decoder"] == 86_660
-
-
 def test_decoder_stores_the_published_bytes(twill):
     method = Woven(WovenNetwork(WovenOptions(one_blob="plain")))
     assert method.bytes_stored(twill) == 4 * (86_660 + 64)  # 0.35 MB
@@ -49,49 +43,6 @@ def test_the_picture_costs_its_filters_and_itself(twill):
     network = WovenNetwork(WovenOptions())
     assert network.architecture()["parameters"]["decoder"] == 86_660 + 64 * 128
     assert Woven(network).bytes_stored(twill) == 4 * (86_660 + 64 * 128 + 64 + 64)
-
-
-def test_fusion_can_be_left_out():
-    counts = WovenNetwork(WovenOptions(one_blob="periodic", spatial_fusion=False)).architecture()["parameters"]
-    layers = (64 + 24 + 5 + 1) * 128, 2 * (128 + 1) * 128, (128 + 1) * 64, (64 + 1) * 4
-    assert counts["decoder"] == sum(layers)
-
-
-def test_encoder_reads_surface_and_parameters_at_the_right_place(twill):
-    """Texel (row, column) is the point (u, v) = (column + 1/2, row + 1/2)/side of the repeat."""
-    options = WovenOptions(map_texels=32, standard=False)
-    maps, parameters, _ = read_cloth([twill], options)
-    ends, picks = twill.weave.repeat
-    point = surface_at(twill, np.array([(5 + 0.5) / 32 * ends]), np.array([(20 + 0.5) / 32 * picks]))
-    np.testing.assert_allclose(maps[0, :3, 20, 5], point.normal[0], atol=1e-6)
-    np.testing.assert_allclose(maps[0, 3:, 20, 5], point.tangent[0], atol=1e-6)
-    expected = [twill.warp.roughness, twill.weft.roughness, twill.warp.relief, twill.weft.relief]
-    np.testing.assert_allclose(parameters[0], expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("standard", [False, True])
-def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard, twill):
-    """One end and three picks of four, 4 and 12 texels of 16: the maps of the rolled drawdown, the same point seen."""
-    options = SMALL.model_copy(update={"standard": standard})
-    cloth = read_cloth([twill], options)
-    begun = cloth.begun(np.array([[1 / 4, 3 / 4]]))
-    seen = standard_of(twill)[0] if standard else twill
-    rolled = seen.model_copy(update={"draft": Matrix(rows=tuple(seen.weave.rolled(1, 3).rows()))})
-    plain = options.model_copy(update={"standard": False})
-    np.testing.assert_allclose(begun.maps, read_cloth([rolled], plain).maps, atol=1e-6)
-
-    # A query lies on the same texel of the maps before and after.
-    u, v = torch.tensor([[0.3]]), torch.tensor([[0.9]])
-    up = torch.tensor([[[0.0, 0.0, 1.0]]])
-    before, after = (one.placement.move(u, v, up, up)[:2] for one in (cloth, begun))
-    assert after[0].item() == pytest.approx((before[0].item() + 1 / 4) % 1, abs=1e-6)
-    assert after[1].item() == pytest.approx((before[1].item() + 3 / 4) % 1, abs=1e-6)
-
-
-def test_without_one_blobs_three_numbers_tell_the_place():
-    """Of the published decoder the first layer alone changes: 3 numbers enter it in place of 24."""
-    network = WovenNetwork(WovenOptions(one_blob="none"))
-    assert network.architecture()["parameters"]["decoder"] == 86_660 - 21 * 128
 
 
 def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size(twill):
@@ -164,23 +115,6 @@ def test_between_a_fabric_and_itself_is_nothing_else(twill):
     np.testing.assert_allclose(method.predict_between(twill, twill, 0.3, asked), expected, rtol=1e-4, atol=1e-5)
 
 
-def test_what_is_blended_lies_in_the_same_place():
-    """Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's.
-
-    With the yarns exchanged, second = the first seen through the mirror x = y, whose own standard position is the same;
-    in the first one's position it is another cloth.
-    """
-    plain = load_fabric("polyester_lining")
-    exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
-    alone = [read_cloth([fabric], SMALL) for fabric in (plain, exchanged)]
-    assert alone[0].placement.exchange.item() != alone[1].placement.exchange.item()
-    together = read_cloth([plain, exchanged], SMALL, like=plain)
-    for part in together.placement:
-        assert torch.equal(part[0], part[1])
-    torch.testing.assert_close(together.maps[:1], alone[0].maps)
-    torch.testing.assert_close(together.parameters[1], alone[0].parameters[0][[1, 0, 3, 2]])
-
-
 def test_fabrics_of_other_repeats_cannot_be_blended(twill):
     method = Woven(WovenNetwork(SMALL))
     with pytest.raises(BadInput, match="the repeat of cotton_twill is needed, 4 x 4, to blend the two"):
@@ -202,16 +136,6 @@ def test_large_footprints_see_no_place(twill):
     """Far above one repeat, the `local` network answers the same wherever it is asked."""
     answers = Woven(WovenNetwork(SMALL)).predict(twill, queries([0.1, 1.7, 3.2], [2.2, 0.4, 3.9], 50.0))
     np.testing.assert_allclose(answers, np.broadcast_to(answers[:1], answers.shape), rtol=1e-5)
-
-
-def test_the_picture_is_seen_from_the_place_asked_about():
-    """Filters correlated with the picture around the repeat, read at one entry: the sum written out."""
-    decoder = WovenNetwork(SMALL).decoder
-    picture = torch.rand(1, 64, generator=torch.Generator().manual_seed(3))
-    responses = decoder.filters(picture[:, decoder.seen])[0]
-    weights = decoder.filters.weight.detach().reshape(-1, 8, 8).numpy()
-    around = np.roll(picture.reshape(8, 8).numpy(), (-2, -7), axis=(0, 1))  # entry (2, 7) comes to (0, 0)
-    np.testing.assert_allclose(responses[2 * 8 + 7].detach(), (weights * around).sum(axis=(1, 2)), rtol=1e-5, atol=1e-6)
 
 
 def test_predictions_repeat_with_the_cloth(twill):

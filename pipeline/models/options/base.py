@@ -1,0 +1,60 @@
+"""What the options of all models share: what a model says of itself, and the fields that several of them have.
+
+Fields are declared by each model, in its own order: a base would move them to the front of every card.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
+"""A name that can stand in a file name and in a task id."""
+
+Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
+"""The footprint of a method that knows one kernel."""
+
+LogK = Annotated[float, Field(gt=0, le=1e4, description="k of the specular space g(x) = ln(k x + 1).")]
+"""How far highlights are squeezed before they are learnt (`pipeline.models.losses`)."""
+
+Weight = Annotated[float, Field(ge=0, le=1e4)]
+"""A factor of one term of a loss."""
+
+
+class Options(BaseModel):
+    """What every model says of itself; each has a field ``model``, its file's name, and a field ``name``, its own."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    version: ClassVar[int] = 1
+    """Raised by hand when a model's numbers change; part of the fingerprint of what is trained or measured."""
+    learns: ClassVar[bool] = True
+    """Whether there is anything to train."""
+    of_one_material: ClassVar[bool] = False
+    """Whether a trained model knows a single fabric."""
+    blends: ClassVar[bool] = False
+    """Whether it answers for what lies between two fabrics, from blended latents."""
+    any_physics: ClassVar[bool] = False
+    """Whether it learns whatever frame, normaliser, geometry, shadows and variation the truth has; else it knows the
+    default ones."""
+    seconds: ClassVar[tuple[float, float]] = (2e-5, 3e-6)
+    """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        return ()
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Which of `behind`, `stretch` and `curvature` (`QueryOptions`) its queries may have."""
+        return frozenset()
+
+    @property
+    def knobs(self) -> tuple[int, ...]:
+        """Values k of the speed-accuracy knob, each a method of its own with the setting ``k = ...``; none: one method.
+
+        The seconds of a prediction are then those of k = 1.
+        """
+        return ()
