@@ -243,8 +243,8 @@ def _timing_task(
         spec,
         _records(f"timing-{identity('bench', spec)[:8]}"),
         (*test, *(task.id for task in trainings)),
-        cost=20.0,
-        size=8000,
+        cost=60.0,
+        size=60_000,
         setting={
             "make": "timing",
             "dataset": folder_of(parts),

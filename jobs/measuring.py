@@ -24,6 +24,7 @@ from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from reports.silhouette import measure_silhouette, render_edge
+from reports.timing import thread_counts
 from weaves.fabric import Fabric
 
 Progress = Callable[[float], None]
@@ -97,7 +98,7 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     manifest = Manifest.load(folder)
     methods = [one for model in task.setting["models"] for one in _methods(model["options"], model["folders"], out)]
     records = measure_timing(methods, manifest, folder, options, Provenance(dataset=manifest.fingerprint))
-    write_records(out / task.products[0], records, this_machine(options.threads))
+    write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
 
 
 def page(task: Task, out: Path, progress: Progress) -> None:
