@@ -44,11 +44,11 @@ def test_a_shift_of_5_percent_is_marked_and_only_where_it_is():
 
 
 def test_nothing_is_marked_where_nothing_differs():
-    """Of 400 comparisons of 20 equal methods at most 5 % mark any; 33 marks or more have a chance below 1 %."""
+    """Of 200 comparisons of 20 equal methods at most 5 % mark any: 19 or more do with a chance below 1 %."""
     random = np.random.default_rng(2)
-    marked = sum(set(verdicts(readings(random), readings(random))) != {"no difference shown"} for _ in range(400))
+    marked = sum(set(verdicts(readings(random), readings(random))) != {"no difference shown"} for _ in range(200))
     assert LEVEL == 0.05
-    assert marked < 33
+    assert marked < 19
 
 
 def test_errors_are_held_against_their_standard_errors():
