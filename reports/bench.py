@@ -30,8 +30,8 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.models.method import Method
 
-LEAST_EDITS: Final = 5
-"""Fabrics never seen before that a method is timed to prepare; one for each named fabric if those are more."""
+EDITS: Final = 5
+"""Fabrics never seen before that a method is timed to prepare."""
 
 _COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
     "rrmse_specular_warp",
@@ -169,7 +169,7 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
     An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
     """
     times = []
-    for fabric, edit in zip(islice(cycle(fabrics), max(len(fabrics), LEAST_EDITS)), edits, strict=False):
+    for fabric, edit in zip(islice(cycle(fabrics), EDITS), edits, strict=False):
         warp = fabric.warp.model_copy(update={"relief": fabric.warp.relief * (1 - 1e-4 * edit)})
         new = fabric.model_copy(update={"name": f"{fabric.name}, edit {edit}", "warp": warp})
         if not method.covers(new):

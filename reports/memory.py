@@ -8,7 +8,6 @@ page. Memory of a GPU is not part of it.
 from __future__ import annotations
 
 import ctypes
-import gc
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -34,7 +33,6 @@ def peak_memory(call: Callable[[], object], repeats: int = 3) -> float | None:
 
 def _start_anew() -> bool:
     """Hand freed memory back and forget the largest size so far; False where that cannot be done."""
-    gc.collect()
     try:
         ctypes.CDLL(None).malloc_trim(0)
         Path("/proc/self/clear_refs").write_text(_RESET_LARGEST)

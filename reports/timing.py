@@ -23,7 +23,7 @@ from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]
 
-LONGEST: Final = 0.1
+LONGEST: Final = 0.05
 """Seconds that one timed call of a method, over all its fabrics, should not exceed by much."""
 
 FEWEST: Final = 16

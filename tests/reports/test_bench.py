@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reports.bench import LEAST_EDITS, measure_errors, measure_timing, measure_truth
+from reports.bench import EDITS, measure_errors, measure_timing, measure_truth
 
 
 def by_metric(records):
@@ -69,7 +69,7 @@ def test_what_answers_cost_is_measured_of_every_method_and_the_truth(dataset, po
     # The oracle knows denim alone: no fabric can be added to it.
     adding = [r for r in records if r.metric == "prepare_time"]
     assert [(r.method, r.setting) for r in adding] == names[:3]
-    assert all(r.unit == "ms" and len(r.samples) == r.count == LEAST_EDITS for r in adding)
+    assert all(r.unit == "ms" and len(r.samples) == r.count == EDITS for r in adding)
 
 
 def test_fabrics_to_add_are_all_new(dataset, points, options):
@@ -85,5 +85,5 @@ def test_fabrics_to_add_are_all_new(dataset, points, options):
     measure_timing([Noting(1), Noting(2)], manifest, folder, options)
     named = [fabric.optics() for fabric in manifest.fabrics.values()]
     added = [optics for optics in known if optics not in named]
-    assert len(added) == 2 * LEAST_EDITS
+    assert len(added) == 2 * EDITS
     assert all(one not in added[:index] for index, one in enumerate(added))
