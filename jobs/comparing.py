@@ -49,8 +49,9 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     said = (
         f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
     )
-    level = f"the chance of any false mark is at most {LEVEL:.0%} (p-values after Holm)"
-    console.print(f"{said}; {level}", soft_wrap=True, highlight=False)
+    level = f"the scatter of the readings marks any by chance at most once in {1 / LEVEL:.0f} comparisons (Holm)"
+    load = "Load on the machine is not part of that scatter: compare two runs of A first, on a quiet machine."
+    console.print(f"{said}; {level}.", *([load] if found.times else []), soft_wrap=True, highlight=False)
 
 
 def records_file(path: Path, recipe: str = "") -> Path:
