@@ -236,6 +236,20 @@ def status(recipe: RecipeName, *, out: Out = OUT) -> None:
     Console().print(status_table(tasks_of(load_recipe(recipe), measured_alone(out)), Ledger(out)))
 
 
+@app.command(sort_key=12)
+def compare(
+    a: Annotated[Path, Parameter(help="Folder of products, folder of a page, or file of Records.")],
+    b: Annotated[Path, Parameter(help="Another one: the table says what B is, held against A.")],
+    *,
+    recipe: Annotated[str, Parameter(help="Name of the recipe, where a folder of products has several pages.")] = "",
+    other_machine: Annotated[bool, Parameter(help="Compare measurements of different machines, too.")] = False,
+) -> None:
+    """Compare two benchmarks and mark which differences are real."""
+    from jobs.comparing import compare as compared
+
+    compared(a, b, recipe, other_machine)
+
+
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     tokens = sys.argv[1:] if tokens is None else tokens

@@ -21,7 +21,7 @@ from reports.options import LATENT_PAIRS
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import Fabric, load_fabric
 
-_TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads", "size_rows"}  # options of the timing alone
+_TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
 
 
 @dataclass(frozen=True)
@@ -243,8 +243,8 @@ def _timing_task(
         spec,
         _records(f"timing-{identity('bench', spec)[:8]}"),
         (*test, *(task.id for task in trainings)),
-        cost=20.0,
-        size=8000,
+        cost=60.0,
+        size=60_000,
         setting={
             "make": "timing",
             "dataset": folder_of(parts),

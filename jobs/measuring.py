@@ -26,6 +26,7 @@ from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from reports.silhouette import measure_silhouette, render_edge
+from reports.timing import thread_counts
 from weaves.fabric import Fabric
 
 Progress = Callable[[float], None]
@@ -104,7 +105,7 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     progress(0.4)
     methods = [one for ask in asked for one in _methods(*ask)]
     records += measure_by_size(methods, manifest, folder, options, provenance)
-    write_records(out / task.products[0], records, this_machine(options.threads))
+    write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
 
 
 def page(task: Task, out: Path, progress: Progress) -> None:

@@ -1,4 +1,4 @@
-"""The measurements on held-out queries: errors, the truth's own, and time.
+"""The measurements on held-out queries: errors, the truth's own, and what answers cost.
 
 Each function stands alone, so that a task system can run them apart; so do those of `reports.pictures` and
 `reports.frames`. Random methods get seeds that are named by what is measured: no number depends on what ran before.
@@ -6,7 +6,9 @@ Each function stands alone, so that a task system can run them apart; so do thos
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import count, cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -18,17 +20,18 @@ from pipeline.shards.manifest import Manifest
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
+from reports.memory import peak_memory
 from reports.metrics import COLOUR_WEIGHTS, Error, colour_error, component_errors
 from reports.options import BenchOptions
 from reports.record import TRUTH, Metric, Provenance, Record, Role
-from reports.timing import Contender, time_side_by_side
+from reports.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
 
-TRUTH_SHARE: Final = 16
-"""The truth is timed on one query for this many of the methods': it takes a hundred times as long."""
+EDITS: Final = 5
+"""Fabrics never seen before that a method is timed to prepare."""
 
 _COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
     "rrmse_specular_warp",
@@ -108,19 +111,23 @@ def measure_timing(
     options: BenchOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
-    """Time methods side by side on held-out queries of all named fabrics, and note the bytes they store.
+    """Time methods side by side on held-out queries of all named fabrics; note bytes, memory and the cost of a fabric.
 
-    One timed call answers `timing_rows` queries, an equal share about each fabric that the method covers; the truth
-    answers one in `TRUTH_SHARE` of them.
+    Returns
+    -------
+    list of Record
+        For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
+        thread, where the system tells (`reports.memory`); `prepare_time`, the time until a fabric never seen before can
+        be asked about, where any fabric can be. Then `time` for each method and number of threads, the truth last, with
+        every reading as `samples` and the queries a fabric as `note` (`reports.timing.affordable`).
     """
     asked = []
-    names = manifest.names("seen", "unseen")
-    share = -(-options.timing_rows // len(names))
-    for name in names:
+    for name in manifest.names("seen", "unseen"):
         cloth, queries, _ = _held_out(manifest, folder, name, options)
-        asked.append((cloth, queries.take(np.arange(share) % len(queries.u))))
+        asked.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
 
-    contenders, subjects, records = [], [], []
+    truth = TruthOptions.model_validate(manifest.about["truth"])
+    entries, records, edits = [], [], count(1)
     for method in methods:
         covered = [(cloth, queries) for cloth, queries in asked if method.covers(cloth)]
         if not covered:
@@ -128,21 +135,49 @@ def measure_timing(
         for cloth, _ in covered:
             method.prepare(cloth)
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
-        contenders.append(Contender(method.predict, covered))
-        subjects.append(subject)
+        entries.append((subject, affordable(Contender(method.predict, covered))))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
         records.append(subject.of("bytes_stored", stored, len(covered), unit="B"))
+        memory = peak_memory(partial(method.predict, *covered[0]))
+        records += [subject.of("peak_memory", memory, 3, unit="B")] if memory is not None else []
+        records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
+    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), asked))
+    entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
+    return records + _times(entries, options)
 
-    truth = TruthOptions.model_validate(manifest.about["truth"])
-    few = [(cloth, queries.take(slice(-(-share // TRUTH_SHARE)))) for cloth, queries in asked]
-    contenders.append(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), few))
-    subjects.append(Record(method=TRUTH, provenance=provenance or Provenance()))
-    timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up, options.threads)
-    for subject, t in zip(subjects, timings, strict=True):
-        records.append(
-            subject.of("time", t.median, t.repeats, unit="ns/query", low=t.first_quartile, high=t.third_quartile)
-        )
+
+def _times(entries: Sequence[tuple[Record, Contender]], options: BenchOptions) -> list[Record]:
+    """Return the times of all contenders on every number of threads, all of them in turns."""
+    runs = [
+        (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
+        for subject, contender in entries
+        for threads in thread_counts(options.threads)
+    ]
+    timings = time_side_by_side([contender for _, contender in runs], options.timing_repeats, options.warm_up)
+    records = []
+    for (subject, contender), timing in zip(runs, timings, strict=True):
+        low, median, high = timing.quartiles
+        about = subject.model_copy(update={"note": f"{len(contender.questions[0][1].u)} queries a fabric"})
+        repeats, samples = len(timing.samples), timing.samples
+        records.append(about.of("time", median, repeats, unit="ns/query", low=low, high=high, samples=samples))
     return records
+
+
+def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:
+    """Return the time to prepare fabrics that nothing knows yet: the named ones in turn, each with an edit of its own.
+
+    An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
+    """
+    times = []
+    for fabric, edit in zip(islice(cycle(fabrics), EDITS), edits, strict=False):
+        warp = fabric.warp.model_copy(update={"relief": fabric.warp.relief * (1 - 1e-4 * edit)})
+        new = fabric.model_copy(update={"name": f"{fabric.name}, edit {edit}", "warp": warp})
+        if not method.covers(new):
+            return []
+        times.append(milliseconds(partial(method.prepare, new)))
+    low, median, high = quartiles(times)
+    found = subject.of("prepare_time", median, len(times), unit="ms", low=low, high=high, samples=tuple(times))
+    return [found]
 
 
 def _held_out(manifest: Manifest, folder: Path, name: str, options: BenchOptions) -> tuple[Fabric, Queries, Answers]:

@@ -164,6 +164,15 @@ def silhouette_rows(table: pd.DataFrame) -> list[Row]:
     return groups(lines)
 
 
+def timing_columns(timing: pd.DataFrame) -> list[str]:
+    """Return the columns of `timing_rows` after the method."""
+    fewest, most = (timing[name].max() if len(timing) else math.nan for name in ("threads", "most_threads"))
+    few = f", {fewest:.0f} threads" if fewest > 1 else ""
+    many = f", {most:.0f} threads" if most > 1 else ", more threads"
+    names = [f"ns a query{few}", "quartiles", "× time", f"ms a frame{few}", f"ns a query{many}", f"ms a frame{many}"]
+    return [*names, "ms to add a fabric", "memory of a call", "bytes stored"]
+
+
 def timing_rows(timing: pd.DataFrame) -> list[Row]:
     """Return the rows of the timing table, in groups."""
     return groups(
@@ -174,6 +183,11 @@ def timing_rows(timing: pd.DataFrame) -> list[Row]:
                     f"{row.median_ns:,.0f}",
                     f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",
                     times(row.time_ratio),
+                    significant(row.frame_ms),
+                    significant(row.most_threads_ns),
+                    significant(row.most_threads_frame_ms),
+                    significant(row.prepare_ms),
+                    size(row.memory),
                     NONE if row.method == TRUTH else size(row.bytes_stored),
                 ],
             }
@@ -379,6 +393,14 @@ def signed(value: float) -> str:
 def times(value: float) -> str:
     """Return ``4.1×``."""
     return NONE if _missing(value) else f"{value:.2g}×" if value < 10 else f"{value:,.0f}×"
+
+
+def significant(value: float) -> str:
+    """Return a number with three digits or all those before the point: ``1,696``, ``12.3``, ``.0456``."""
+    if _missing(value):
+        return NONE
+    digits = max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
+    return re.sub(r"^0(?=\.)", "", f"{value:,.{digits}f}")
 
 
 def percent(value: float, digits: int = 1) -> str:

@@ -29,7 +29,7 @@ from reports.metrics import colour_error
 from reports.options import BenchOptions
 from reports.record import Metric, Provenance, Record
 from reports.summary import rows
-from reports.timing import Contender, time_side_by_side
+from reports.timing import Contender, affordable, time_side_by_side
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -51,6 +51,9 @@ MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
 }
 """What errors are taken of: the Record's metric and the colour of each component."""
 
+LONGEST: Final = 0.01
+"""Seconds of a timed call of one class, over all fabrics."""
+
 COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
 
 _Asked = list[tuple[Fabric, Queries, Answers]]
@@ -65,10 +68,11 @@ def measure_by_size(
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
-    Up to `options.size_rows` queries of each class and fabric; the time over all classes weighs them as they occur.
-    A Record's curve holds (lower edge of the class, value); its value is that over all classes.
+    Errors are of all queries of a class; timed calls, on one thread, of as many as `LONGEST` allows. The time over all
+    classes weighs them as they occur. A Record's curve holds (lower edge of the class, value); its value is that over
+    all classes.
     """
-    classes, shares = _classes(manifest, folder, options)
+    classes, shares = _classes(manifest, folder)
     methods = [one for one in methods if any(one.covers(cloth) for asked in classes.values() for cloth, _, _ in asked)]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
     errors: dict[tuple[int, str], list[tuple[float, float]]] = {}
@@ -78,12 +82,14 @@ def measure_by_size(
             own = [one for one in asked if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
-            contenders.append(Contender(method.predict, [(cloth, queries) for cloth, queries, _ in own]))
+            contenders.append(
+                affordable(Contender(method.predict, [(cloth, queries) for cloth, queries, _ in own]), LONGEST)
+            )
             for name, error in _errors(method, own, options.seed):
                 errors.setdefault((index, name), []).append((low, error))
-        timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up, options.threads)
+        timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
         for index, timing in enumerate(timings):
-            times[index].append((low, timing.median))
+            times[index].append((low, timing.quartiles[1]))
     records = []
     for index, method in enumerate(methods):
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
@@ -159,7 +165,7 @@ def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:
     return float(np.exp(np.interp(math.log(ns), times, errors)))
 
 
-def _classes(manifest: Manifest, folder: Path, options: BenchOptions) -> tuple[dict[float, _Asked], dict[float, float]]:
+def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Asked], dict[float, float]]:
     """Return the queries and the truth of each class by its lower edge, and the share of all queries it holds."""
     classes: dict[float, _Asked] = {}
     counts: dict[float, int] = {}
@@ -170,7 +176,6 @@ def _classes(manifest: Manifest, folder: Path, options: BenchOptions) -> tuple[d
             chosen = np.flatnonzero((size >= low) & (size < high))
             if chosen.size:
                 counts[low] = counts.get(low, 0) + chosen.size
-                chosen = chosen[: options.size_rows]
                 asked = (manifest.fabrics[name], queries.take(chosen), answers.take(chosen))
                 classes.setdefault(low, []).append(asked)
     total = sum(counts.values())

@@ -12,9 +12,9 @@ edit is all that answers wait for: the fabric is looked at and encoded anew. Col
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -27,7 +27,7 @@ from pipeline.truth.query import Answers, Queries
 from reports.metrics import COLOUR_WEIGHTS, colour_error
 from reports.options import LATENT_PAIRS
 from reports.record import Metric, Provenance, Record
-from reports.timing import synchronise
+from reports.timing import milliseconds, quartiles
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
 
@@ -149,10 +149,11 @@ def measure_edits(
     records = []
     for about, edits in (("a yarn", yarns), ("a colour", colours)):
         edited = [fabric.model_copy(update={"warp": fabric.warp.model_copy(update=edit)}) for edit in edits]
-        times = np.array([_milliseconds(method, one) for one in edited][1:])  # the first call warms up
-        low, median, high = (float(q) for q in np.percentile(times, [25, 50, 75]))
+        # The first call warms up.
+        times = tuple(milliseconds(partial(method.prepare, one)) for one in edited)[1:]
+        low, median, high = quartiles(times)
         found = subject.model_copy(update={"note": about})
-        records.append(found.of("encode_time", median, repeats, unit="ms", low=low, high=high))
+        records.append(found.of("encode_time", median, repeats, unit="ms", low=low, high=high, samples=times))
     return records
 
 
@@ -185,11 +186,3 @@ def _faded(first: Answers, second: Answers, share: float) -> Answers:
 
 def _error(values: npt.NDArray[np.float32], answers: Answers) -> float:
     return colour_error(values, answers, COLOUR_WEIGHTS, resamples=0).relative_rmse
-
-
-def _milliseconds(method: Method, fabric: Fabric) -> float:
-    synchronise()
-    start = time.perf_counter()
-    method.prepare(fabric)
-    synchronise()
-    return 1e3 * (time.perf_counter() - start)

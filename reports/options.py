@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pipeline.scenes.options import Scene, ViewOptions
 from pipeline.truth.options import TruthOptions
 
-VERSION: Final = 1
+VERSION: Final = 2
 """Version of the measurements' numbers."""
 
 LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
@@ -78,19 +78,18 @@ class BenchOptions(BaseModel):
     """Frames of the moving plane, for aliasing."""
     frame_size: tuple[Side, Side] = (80, 60)
     """Width and height of those frames, in pixels."""
-    timing_rows: int = Field(default=8192, ge=64)
-    """Queries in one timed call."""
+    timing_rows: int = Field(default=4096, ge=64)
+    """Queries a fabric in one timed call; fewer of the same for a method that would take longer than
+    `reports.timing.LONGEST`."""
     timing_repeats: int = Field(default=25, ge=20, le=10_000)
     """Timed calls of each method, interleaved with those of the others."""
     warm_up: int = Field(default=3, ge=1, le=1000)
     """Calls of each method before the clock counts."""
-    threads: int = Field(default=1, ge=1, le=1024)
-    """Threads each timed method may use."""
+    threads: Annotated[tuple[Annotated[int, Field(ge=0, le=1024)], ...], Field(min_length=1)] = (1, 0)
+    """Numbers of threads that methods are timed with; 0: one a core of the machine. The fewest are what is compared."""
     bounds: bool = False
     """Measure every trained network a second time: under the energy bound of `pipeline.models.bounded`, or without it
     if it is bounded by itself. For flat cloth lit from the viewer's side."""
-    size_rows: int = Field(default=512, ge=16)
-    """Most queries of each fabric and class of footprints of which errors and times at equal time are measured."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth of the pictures and of the random points of the baseline."""
 

@@ -1,4 +1,4 @@
-"""The page: one folder with ``index.html``, its figures and its tables, which needs nothing else.
+"""The page: one folder with ``index.html``, its figures, tables and Records, which needs nothing else.
 
 The same input gives the same bytes. Figures are written first and the page last: a page that exists is whole.
 """
@@ -21,7 +21,7 @@ from reports import accuracy, bias, cells, effort, figures, latents, sampling, s
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
 from reports.options import BenchOptions
-from reports.record import TRUTH, Machine, Record, Role, to_table
+from reports.record import OF_A_PAGE, TRUTH, Machine, Record, Role, to_table, write_records
 from reports.silhouette import silhouette_table
 from reports.stability import Finding, from_records
 from reports.style import DARK, LIGHT, Scheme, display, render
@@ -142,6 +142,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     for done, (name, content) in enumerate(_tiles(page)):
         atomic_write(folder / "figures" / name, content)
         progress(0.4 + 0.6 * min(1.0, (done + 1) / (2 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
+    write_records(folder / OF_A_PAGE, page.records, page.machine)
     index = folder / "index.html"
     atomic_write(index, _html(page, tables, findings, {name.removesuffix("-light.png") for name in images}).encode())
     return index
@@ -246,6 +247,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         silhouettes=cells.silhouette_rows(tables["silhouettes"]),
         silhouette_columns=cells.SILHOUETTE,
         timing=cells.timing_rows(timing),
+        timing_columns=cells.timing_columns(timing),
         paths=cells.path_rows(summary.path_table(page.records)),
         edits=cells.edit_rows(page.records),
         shares=[f"t = {share:g}" for share in latents.SHARES],

@@ -30,6 +30,9 @@ PACKAGES: Final = ("numpy", "scipy", "numba", "torch", "pyarrow", "pandas", "Ope
 TRUTH: Final = "truth"
 """Name of the reference, where methods are named."""
 
+OF_A_PAGE: Final = "records.json"
+"""File in a page's folder that holds all its Records; the machine of the times lies beside it."""
+
 Role = Literal["seen", "unseen"]
 """Whether general models saw the fabric in training."""
 
@@ -53,6 +56,8 @@ Metric = Literal[
     "spectrum",
     "time",
     "bytes_stored",
+    "peak_memory",
+    "prepare_time",
     "worst_error",
     "listed_error",
     "naive_error",
@@ -136,6 +141,10 @@ class Record(BaseModel):
     """Unit of `value`."""
     curve: tuple[tuple[float, float], ...] = ()
     """Points of a curve, where one number does not say it all."""
+    threads: int = 0
+    """Threads that worked at the same time; 0 where it does not matter."""
+    samples: tuple[float, ...] = ()
+    """Every reading behind a time, in `unit`, in the order they were taken."""
     note: str = ""
     """What else there is to say of `value`, such as the input that gave it."""
     provenance: Provenance = Provenance()
@@ -152,9 +161,10 @@ class Record(BaseModel):
         low: float | None = None,
         high: float | None = None,
         curve: tuple[tuple[float, float], ...] = (),
+        samples: tuple[float, ...] = (),
     ) -> Record:
         """Return another number measured on the same subject."""
-        number = {"metric": metric, "value": value, "count": count, "unit": unit, "curve": curve}
+        number = {"metric": metric, "value": value, "count": count, "unit": unit, "curve": curve, "samples": samples}
         bounds = {"standard_error": standard_error, "low": low, "high": high}
         return Record.model_validate(self.model_dump() | number | bounds)
 
@@ -193,11 +203,16 @@ class Machine(BaseModel):
     """UTC, ISO 8601."""
 
 
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def this_machine(threads: int) -> Machine:
     """Describe the machine this runs on; `threads` is what methods were allowed."""
     return Machine(
         cpu=_cpu(),
-        cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        cores=cores(),
         threads=threads,
         system=f"{platform.system()} {platform.machine()}",
         python=platform.python_version(),
@@ -251,12 +266,10 @@ def by_subject(records: Iterable[Record], metrics: Iterable[Metric]) -> dict[tup
 
 
 def to_table(records: Iterable[Record]) -> pd.DataFrame:
-    """Return one row a record, provenance as columns of its own, curves left out."""
-    rows = []
-    for record in records:
-        row = record.model_dump(exclude={"curve", "provenance"})
-        rows.append(row | record.provenance.model_dump())
-    columns = [name for name in Record.model_fields if name not in ("curve", "provenance")]
+    """Return one row a record, provenance as columns of its own, curves and samples left out."""
+    left_out = {"curve", "samples", "provenance"}
+    rows = [record.model_dump(exclude=left_out) | record.provenance.model_dump() for record in records]
+    columns = [name for name in Record.model_fields if name not in left_out]
     table = pd.DataFrame(rows, columns=[*columns, *Provenance.model_fields])
     return table.astype({"standard_error": "float64", "low": "float64", "high": "float64"})
 

@@ -22,6 +22,9 @@ BASELINE: Final = ("point_sampled", "k = 2")
 PAPER: Final = (4.1, 0.83)
 """How much lower the published network's MSE is, and its time relative to the baseline's [Chen2024Woven]."""
 
+FRAME: Final = 1920 * 1080
+"""Queries of a frame, one a pixel."""
+
 COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
 
 _KEYS: Final = ["method", "setting"]
@@ -113,14 +116,26 @@ def path_table(records: Sequence[Record]) -> pd.DataFrame:
 
 
 def timing_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the cost of a query: median and quartiles in nanoseconds, bytes stored, time over that of 2 points."""
+    """Return what answers cost, one row a method.
+
+    Columns: method, setting; on the fewest threads that were timed median_ns, first_quartile_ns, third_quartile_ns (a
+    query), repeats, threads and frame_ms; on the most, where those are more, most_threads, most_threads_ns and
+    most_threads_frame_ms; bytes_stored, memory (bytes a call adds), prepare_ms; time_ratio, the time over that of 2
+    points. A frame is 1920 × 1080 queries.
+    """
     table = to_table(records)
-    times = table[table["metric"] == "time"].set_index(_KEYS)
-    stored = table[table["metric"] == "bytes_stored"].set_index(_KEYS)["value"].rename("bytes_stored")
-    result = times[["value", "low", "high", "count"]].rename(
-        columns={"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
-    )
-    result = result.join(stored).reset_index()
+    times = table[table["metric"] == "time"]
+    threads = times.groupby(_KEYS, sort=False)["threads"]
+    fewest, most = threads.transform("min"), threads.transform("max")
+    names = {"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
+    result = times[times["threads"] == fewest].rename(columns=names).set_index(_KEYS)[[*names.values(), "threads"]]
+    more = times[(times["threads"] == most) & (most > fewest)].set_index(_KEYS)[["threads", "value"]]
+    result = result.join(more.set_axis(["most_threads", "most_threads_ns"], axis=1))
+    result["frame_ms"] = result["median_ns"] * FRAME / 1e6
+    result["most_threads_frame_ms"] = result["most_threads_ns"] * FRAME / 1e6
+    for metric, name in (("bytes_stored", "bytes_stored"), ("peak_memory", "memory"), ("prepare_time", "prepare_ms")):
+        result = result.join(table[table["metric"] == metric].set_index(_KEYS)["value"].rename(name))
+    result = result.reset_index()
     base = result.loc[of_baseline(result), "median_ns"]
     result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
     return result

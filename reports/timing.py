@@ -2,8 +2,9 @@
 
 All methods answer the same queries; they take turns, so that whatever else the machine does falls on all alike. Each is
 called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
-queries of several fabrics in turn, because the cost of the point model depends on the weave. Numbers of different
-machines are never compared.
+queries of several fabrics in turn, because the cost of the point model depends on the weave. On several threads every
+thread makes that call, as a renderer gives each of its threads a tile of the picture; a method itself never uses more
+than one. Numbers of different machines are never compared.
 """
 
 from __future__ import annotations
@@ -11,14 +12,22 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.truth.query import Queries
+from reports.record import cores
 from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]
+
+LONGEST: Final = 0.05
+"""Seconds that one timed call of a method, over all its fabrics, should not exceed by much."""
+
+FEWEST: Final = 16
+"""Least queries a fabric in a call."""
 
 
 class Contender(NamedTuple):
@@ -28,24 +37,37 @@ class Contender(NamedTuple):
     """Answers queries about a fabric."""
     questions: Sequence[tuple[Fabric, Queries]]
     """Fabrics it covers, each with its queries; one timed call answers them all."""
+    threads: int = 1
+    """Threads that make the call, each for itself, at the same time."""
+
+    @property
+    def rows(self) -> int:
+        """Queries that are answered in one reading of the clock."""
+        return self.threads * sum(len(queries.u) for _, queries in self.questions)
+
+    def first(self, rows: int) -> Contender:
+        """Return the same with the first queries of each fabric."""
+        return self._replace(questions=[(fabric, queries.take(slice(rows))) for fabric, queries in self.questions])
 
 
 class Timing(NamedTuple):
-    """Cost of a query in nanoseconds over the repeats."""
+    """Cost of a query in nanoseconds."""
 
-    median: float
-    first_quartile: float
-    third_quartile: float
-    repeats: int
+    samples: tuple[float, ...]
+    """Of every repeat, in their order."""
     rows: int
-    """Queries in each timed call."""
+    """Queries in each of them."""
+
+    @property
+    def quartiles(self) -> tuple[float, float, float]:
+        """First quartile, median and third quartile."""
+        return quartiles(self.samples)
 
 
 def time_side_by_side(
     contenders: Sequence[Contender],
     repeats: int,
     warm_up: int = 3,
-    threads: int = 1,
     clock: Callable[[], int] = time.perf_counter_ns,
 ) -> list[Timing]:
     """Time methods in turns.
@@ -58,8 +80,6 @@ def time_side_by_side(
         Timed calls of each.
     warm_up : int
         Calls of each before that.
-    threads : int
-        Threads that torch and numba may use.
     clock : callable
         Returns nanoseconds.
 
@@ -68,19 +88,66 @@ def time_side_by_side(
     list of Timing
         One a contender, in their order.
     """
-    set_threads(threads)
-    for _ in range(warm_up):
-        for contender in contenders:
-            _call(contender)
+    set_threads(1)
     elapsed: list[list[int]] = [[] for _ in contenders]
-    for _ in range(repeats):
-        for contender, readings in zip(contenders, elapsed, strict=True):
-            synchronise()
-            start = clock()
-            _call(contender)
-            synchronise()
-            readings.append(clock() - start)
-    return [_timing(contender, readings) for contender, readings in zip(contenders, elapsed, strict=True)]
+    with ThreadPoolExecutor(max((contender.threads for contender in contenders), default=1)) as pool:
+        for _ in range(warm_up):
+            for contender in contenders:
+                _call(contender, pool)
+        for _ in range(repeats):
+            for contender, readings in zip(contenders, elapsed, strict=True):
+                synchronise()
+                start = clock()
+                _call(contender, pool)
+                synchronise()
+                readings.append(clock() - start)
+    return [
+        Timing(tuple(reading / contender.rows for reading in readings), contender.rows)
+        for contender, readings in zip(contenders, elapsed, strict=True)
+    ]
+
+
+def affordable(
+    contender: Contender, longest: float = LONGEST, clock: Callable[[], int] = time.perf_counter_ns
+) -> Contender:
+    """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
+
+    Queries a fabric are doubled from `FEWEST` on while the last call says that twice as many will do: their number is a
+    power of 2 times that, or all there are, and so the same in two runs unless a method is near the limit. At most
+    `FEWEST` queries a fabric take longer.
+    """
+    set_threads(1)
+    most = max(len(queries.u) for _, queries in contender.questions)
+    rows = FEWEST
+    _answer(contender.first(rows))  # warms up
+    while rows < most:
+        start = clock()
+        _answer(contender.first(rows))
+        synchronise()
+        if 2e-9 * (clock() - start) > longest:
+            break
+        rows *= 2
+    return contender.first(rows)
+
+
+def thread_counts(asked: Sequence[int]) -> list[int]:
+    """Return numbers of threads in ascending order, each once; 0 asks for one a core that this process may use."""
+    return sorted({count or cores() for count in asked})
+
+
+def quartiles(samples: Sequence[float]) -> tuple[float, float, float]:
+    """Return first quartile, median and third quartile."""
+    low, median, high = (float(q) for q in np.percentile(samples, [25, 50, 75]))
+    return low, median, high
+
+
+def milliseconds(action: Callable[[], object]) -> float:
+    """Return how long a single action takes, in milliseconds."""
+    synchronise()
+    start = time.perf_counter()
+    action()
+    synchronise()
+    return 1e3 * (time.perf_counter() - start)
 
 
 def set_threads(threads: int) -> None:
@@ -97,12 +164,14 @@ def synchronise() -> None:
         torch.cuda.synchronize()
 
 
-def _call(contender: Contender) -> None:
+def _call(contender: Contender, pool: ThreadPoolExecutor) -> None:
+    """Answer on as many threads as asked for; a single one is this one."""
+    if contender.threads == 1:
+        _answer(contender)
+    else:
+        list(pool.map(_answer, [contender] * contender.threads))
+
+
+def _answer(contender: Contender) -> None:
     for fabric, queries in contender.questions:
         contender.predict(fabric, queries)
-
-
-def _timing(contender: Contender, elapsed: Sequence[int]) -> Timing:
-    rows = sum(len(queries.u) for _, queries in contender.questions)
-    low, median, high = (float(q) for q in np.percentile(np.array(elapsed) / rows, [25, 50, 75]))
-    return Timing(median, low, high, len(elapsed), rows)

@@ -39,7 +39,13 @@ DEFINITIONS: Final = {
     "excess energy": "Power of the receding plane beyond half the Nyquist frequency (Hann window, mean over frames) "
     "minus the truth's, over the truth's squared mean. 0 is the truth.",
     "ns a query": "Median time of one query, everything included, of calls that take turns in one process after a "
-    "warm-up; quartiles beside it.",
+    "warm-up; quartiles beside it. One call asks thousands of queries of every fabric, fewer of slow methods. On "
+    "several threads each makes the whole call, as a renderer gives each of its threads a tile.",
+    "ms a frame": "That time for 1920 × 1080 queries, one a pixel.",
+    "ms to add a fabric": "Median time until a fabric never seen before can be asked about, or one after an edit of "
+    "its yarns; the queries wait for nothing else. None where every fabric is trained by itself.",
+    "memory of a call": "What a call on one thread adds to the process at most, answers included, beyond the bytes "
+    "stored. Not of a GPU.",
     "× time": "That time over the time of point sampling at 2 points.",
     "front": "The methods that no other beats on both error (relative RMSE of the colour) and time. Only methods that "
     "answer for the same fabrics are compared; an error that is lost in the noise of the truth takes no part.",

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reports.bench import TRUTH_SHARE, measure_errors, measure_timing, measure_truth
+from reports.bench import EDITS, measure_errors, measure_timing, measure_truth
 
 
 def by_metric(records):
@@ -54,13 +54,36 @@ def test_truth_reports_its_own_error(dataset, options):
     assert record.low < record.value < record.high
 
 
-def test_timing_covers_every_method_and_the_truth(dataset, points, oracle, options):
+def test_what_answers_cost_is_measured_of_every_method_and_the_truth(dataset, points, oracle, options):
     manifest, folder = dataset
-    records = measure_timing([*points, oracle], manifest, folder, options)
-    times = {(r.method, r.setting): r for r in records if r.metric == "time"}
-    assert list(times) == [("point_sampled", f"k = {k}") for k in (1, 2, 16)] + [("oracle", ""), ("truth", "")]
+    records = measure_timing([*points, oracle], manifest, folder, options.model_copy(update={"threads": (2, 1, 2)}))
+    times = {(r.method, r.setting, r.threads): r for r in records if r.metric == "time"}
+    names = [("point_sampled", f"k = {k}") for k in (1, 2, 16)] + [("oracle", ""), ("truth", "")]
+    assert list(times) == [(*name, threads) for name in names for threads in (1, 2)]
     assert all(r.low <= r.value <= r.high and r.unit == "ns/query" for r in times.values())
-    assert times["truth", ""].value > times["point_sampled", "k = 1"].value
+    assert all(len(r.samples) == r.count == 20 and r.value == np.median(r.samples) for r in times.values())
+    assert times["truth", "", 1].value > times["point_sampled", "k = 1", 1].value
+    assert times["point_sampled", "k = 1", 1].note == "64 queries a fabric"
     stored = {r.setting: r.value for r in records if r.metric == "bytes_stored" and r.method == "point_sampled"}
     assert stored == {"k = 1": 1000, "k = 2": 2000, "k = 16": 16000}
-    assert TRUTH_SHARE > 1
+    # The oracle knows denim alone: no fabric can be added to it.
+    adding = [r for r in records if r.metric == "prepare_time"]
+    assert [(r.method, r.setting) for r in adding] == names[:3]
+    assert all(r.unit == "ms" and len(r.samples) == r.count == EDITS for r in adding)
+
+
+def test_fabrics_to_add_are_all_new(dataset, points, options):
+    """No two edits are the same, of one method or of several: tables that methods share would be found."""
+    manifest, folder = dataset
+    known = []
+
+    class Noting(type(points[0])):
+        def prepare(self, fabric):
+            known.append(fabric.optics())
+            super().prepare(fabric)
+
+    measure_timing([Noting(1), Noting(2)], manifest, folder, options)
+    named = [fabric.optics() for fabric in manifest.fabrics.values()]
+    added = [optics for optics in known if optics not in named]
+    assert len(added) == 2 * EDITS
+    assert all(one not in added[:index] for index, one in enumerate(added))

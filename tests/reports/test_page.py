@@ -12,7 +12,7 @@ from reports.exr import write_exr
 from reports.latents import SHARES
 from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
-from reports.record import Record, this_machine
+from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.stability import judge, to_records
 from weaves.fabric import load_fabric
 
@@ -151,6 +151,12 @@ def test_page_says_what_it_is_made_of(written, page_input):
     words = written[1].words
     for fact in ("fedcba9876543210", "tiny-01234567", "0011223344556677", page_input.machine.cpu, "1.51 %"):
         assert fact in words
+
+
+def test_page_keeps_its_records_and_the_machine_of_the_times(written, page_input, made_up):
+    folder, _ = written
+    assert read_records([folder / OF_A_PAGE]) == made_up
+    assert read_machine(folder / OF_A_PAGE) == page_input.machine
 
 
 def test_text_of_files_is_escaped(written):

@@ -30,6 +30,7 @@ RECORDS = [
     SUBJECT.of("flicker", -0.125, 8),
     SUBJECT.of("spectrum", 0.5, 8, curve=((0.1, 1.0), (0.2, 0.25))),
     SUBJECT.of("mse", 0.0, 1),
+    SUBJECT.model_copy(update={"threads": 2}).of("time", 1.5, 2, unit="ns/query", samples=(1.0, 2.0)),
 ]
 
 
@@ -50,11 +51,12 @@ def test_bytes_do_not_depend_on_the_machine_or_the_date(tmp_path):
 
 def test_table_has_a_row_a_record(tmp_path):
     table = to_table(RECORDS)
-    assert len(table) == 4
-    assert table["value"].tolist() == [1.25e-3, -0.125, 0.5, 0.0]
+    assert len(table) == 5
+    assert table["value"].tolist() == [1.25e-3, -0.125, 0.5, 0.0, 1.5]
     assert table["dataset"].unique().tolist() == ["0123456789abcdef"]
     assert math.isnan(table["low"][1])
-    assert "curve" not in table
+    assert table["threads"].tolist() == [0, 0, 0, 0, 2]
+    assert "curve" not in table and "samples" not in table
     assert to_table([]).empty
 
 

@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from reports.cells import significant, timing_columns, timing_rows
 from reports.record import Record
 from reports.summary import (
     aliasing_table,
@@ -106,6 +107,27 @@ def test_aliasing_and_timing():
     assert (woven.median_ns, woven.time_ratio, woven.bytes_stored) == pytest.approx((400, 0.8, 350_000))
     assert truth.time_ratio == pytest.approx(100)
     assert math.isnan(truth.bytes_stored)
+    # 400 ns a query are .83 s a frame of 1920 by 1080.
+    assert woven.frame_ms == pytest.approx(829.44)
+    assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
+
+
+def test_times_on_one_thread_and_on_most_stand_in_one_row():
+    subject = Record(method="woven")
+    records = [
+        subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
+        for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
+    ]
+    records += [subject.of("prepare_time", 12.5, 9, unit="ms"), subject.of("peak_memory", 3e6, 3, unit="B")]
+    table = timing_table(records)
+    (found,) = rows(table)
+    assert (found.threads, found.median_ns, found.most_threads, found.most_threads_ns) == (1, 400, 4, 120)
+    assert found.most_threads_frame_ms == pytest.approx(0.3 * found.frame_ms)
+    (group,) = timing_rows(table)
+    shown = dict(zip(timing_columns(table), group["rows"][0]["cells"], strict=True))
+    assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
+    assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
+    assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "3.00 MB"
 
 
 def test_spectra_are_averaged():
@@ -126,3 +148,11 @@ def test_nothing_measured_gives_empty_tables():
     for table in (error_table, fabric_table, picture_table, aliasing_table, timing_table, summary_table):
         assert table([]).empty
     assert spectra([]) == {}
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1696.4, "1,696"), (12.34, "12.3"), (0.0456, ".0456"), (999.6, "1,000"), (0.0, "0"), (-2.0, "-2.00")],
+)
+def test_three_digits_are_significant(value, text):
+    assert significant(value) == text
