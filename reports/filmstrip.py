@@ -53,20 +53,26 @@ def filmstrip(
         If there are no frames, their sizes differ, a shown value is not finite, or the crop leaves the frames.
     """
     films = {name: np.asarray(frames) for name, frames in rows.items()}
-    size = next((film.shape[1:3] for film in films.values()), (0, 0))
-    crop = crop or Crop(0, 0, *size)
-    for name, film in films.items():
-        if film.ndim not in (3, 4) or film.shape[1:3] != size or film.shape[3:] not in ((), (3,)):
-            raise BadInput("strip of frames", name, film.shape, f"frames of one size {size} are needed")
-    inside = (
-        crop.top >= 0 and crop.left >= 0 and crop.top + crop.height <= size[0] and crop.left + crop.width <= size[1]
-    )
-    if not (inside and crop.height > 0 and crop.width > 0 and count > 0 and all(len(film) for film in films.values())):
-        raise BadInput("strip of frames", "crop", tuple(crop), f"a part of a frame of {size} and one frame are needed")
+    crop = _crop(films, crop)
+    if count < 1:
+        raise BadInput("strip of frames", "count", count, "one frame at least is needed")
     strips = [_strip(name, film[:count], crop, exposure) for name, film in films.items()]
     width = max(strip.shape[1] for strip in strips)
     lines = [np.pad(strip, ((0, GAP), (0, width - strip.shape[1]), (0, 0))) for strip in strips]
     return png(np.concatenate(lines)[:-GAP])
+
+
+def _crop(films: Mapping[str, npt.NDArray[np.floating]], crop: Crop | None) -> Crop:
+    """Return the rectangle that is shown, or say why there is none."""
+    size = next((film.shape[1:3] for film in films.values()), ())
+    for name, film in films.items():
+        if film.ndim - 3 not in (0, 1) or film.shape[1:3] != size or film.shape[3:] not in ((), (3,)) or not film.size:
+            raise BadInput("strip of frames", name, film.shape, f"frames of one size are needed, here {size}")
+    height, width = size or (0, 0)
+    top, left, *_ = crop = crop or Crop(0, 0, height, width)
+    if min(top, left) < 0 or min(crop[2:]) < 1 or top + crop.height > height or left + crop.width > width:
+        raise BadInput("strip of frames", "crop", tuple(crop), f"a part of the frames' {size} is needed")
+    return crop
 
 
 def _strip(name: str, frames: npt.NDArray[np.floating], crop: Crop, exposure: float) -> Bytes8:

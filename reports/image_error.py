@@ -23,6 +23,7 @@ alike (`reports.block_bootstrap`); they say how much the choice of pixels matter
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
@@ -99,6 +100,7 @@ def image_errors(
     standard_error: npt.ArrayLike,
     mask: npt.ArrayLike,
     options: ImageOptions | None = None,
+    floor: Mapping[Metric, float] | None = None,
 ) -> ImageErrors:
     """Measure a picture against the truth's.
 
@@ -108,6 +110,8 @@ def image_errors(
         Linear RGB of the method and of the truth, and the latter's standard error.
     mask : array_like (H, W)
         True where there is lit cloth: the pixels that count. What the others hold does not matter.
+    floor : mapping, optional
+        What `noise_floor` returned for this truth; half of the time is spent on it where it is not given.
 
     Raises
     ------
@@ -120,12 +124,21 @@ def image_errors(
     if t.shape[2] != 3 or min(lit.shape) < window:
         raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
     mse, relative = light_errors(m, t, s, lit, options)
-    grey = float(np.median(t[lit] @ LUMINANCE))
-    noised = t + s * np.random.default_rng(options.seed).standard_normal(t.shape)
-    shown, reference, floor = (np.where(lit[..., None], values, grey) for values in (m, t, noised))
-    maps, floors = (_seen(values, reference, lit, options) for values in (shown, floor))
-    seen = {metric: _measure(metric, maps, floors, lit, options) for metric in SEEN}
+    maps = _seen(m, t, lit, options)
+    floors = floor or noise_floor(t, s, lit, options)
+    seen = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in SEEN}
     return ImageErrors(mse, relative, seen, maps, lit)
+
+
+def noise_floor(
+    truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions | None = None
+) -> dict[Metric, float]:
+    """Return what a noised copy of the truth scores, by the keys of `SEEN`; arguments are those of `image_errors`."""
+    options = options or ImageOptions()
+    _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
+    noised = t + s * np.random.default_rng(options.seed).standard_normal(t.shape)
+    maps = _seen(noised, t, lit, options)
+    return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in SEEN}
 
 
 def light_errors(
@@ -155,13 +168,15 @@ def light_errors(
 
 def _seen(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
     """Return the maps of what an eye sees, (H, W); `square` is that of PSNR."""
+    grey = float(np.median(truth[lit] @ LUMINANCE))
+    picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
     light, light_truth = (np.clip(options.exposure * values, 0.0, 1.0) for values in (picture, truth))
     shown, shown_truth = encoded(light), encoded(light_truth)
     window = {"gaussian_weights": True, "sigma": options.ssim_sigma, "use_sample_covariance": False}
     compare: Any = structural_similarity  # has no types
     similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
     # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
-    unit = 1.0 / (truth[lit] @ LUMINANCE).max()
+    unit = 1.0 / (truth @ LUMINANCE).max()
     return {
         "square": ((shown - shown_truth) ** 2).mean(axis=-1),
         "ssim": similarity.mean(axis=-1),
@@ -183,19 +198,23 @@ def _flip(picture: Floats, truth: Floats, kind: str, options: ImageOptions) -> F
     return np.asarray(errors[..., 0], np.float64)
 
 
-def _measure(metric: Metric, maps: dict[str, Floats], floors: dict[str, Floats], lit: Mask, o: ImageOptions) -> Measure:
-    """Return the mean of a map with its interval; of squared differences, in dB."""
-    rows, floor_rows = (found["square" if metric == "psnr" else metric][lit] for found in (maps, floors))
-    value, floor = float(rows.mean()), float(floor_rows.mean())
-    _, low, high = block_interval(rows, lit, o.block, o.resamples, o.seed)
-    count = int(lit.sum())
-    if metric == "psnr":
-        return Measure(_decibel(value), _decibel(high), _decibel(low), _decibel(floor), count)
-    return Measure(value, low, high, floor, count)
+def _measure(metric: Metric, maps: dict[str, Floats], floor: float, lit: Mask, o: ImageOptions) -> Measure:
+    rows = _rows(metric, maps, lit)
+    _, *ends = block_interval(rows, lit, o.block, o.resamples, o.seed)
+    low, high = sorted(_unit(metric, end) for end in ends)
+    return Measure(_unit(metric, float(rows.mean())), low, high, floor, len(rows))
 
 
-def _decibel(square: float) -> float:
-    return -10.0 * math.log10(square) if square > 0 else math.inf
+def _rows(metric: Metric, maps: dict[str, Floats], lit: Mask) -> Floats:
+    """Return the values whose mean is the measure, one a lit pixel."""
+    return maps["square" if metric == "psnr" else metric][lit]
+
+
+def _unit(metric: Metric, mean: float) -> float:
+    """Return a mean in the unit of its measure: dB of a mean square, else itself."""
+    if metric != "psnr":
+        return mean
+    return -10.0 * math.log10(mean) if mean > 0 else math.inf
 
 
 def _checked(
