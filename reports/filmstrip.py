@@ -45,7 +45,7 @@ def filmstrip(
     count : int
         Consecutive frames shown, from the first on; fewer if there are fewer.
     exposure : float
-        Factor on linear values.
+        Factor on linear values; times the irradiance where frames are without it (`reports.frames`).
 
     Raises
     ------

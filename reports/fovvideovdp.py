@@ -37,7 +37,7 @@ def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOpt
     Parameters
     ----------
     frames, truth : array_like (F, H, W)
-        Linear luminance of the method's frames and of the truth's.
+        Linear luminance of the method's frames and of the truth's, irradiance included (as in `reports.pictures`).
 
     Raises
     ------

@@ -42,7 +42,7 @@ from weaves.errors import BadInput
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-SEEN: Final[dict[Metric, tuple[Metric, str]]] = {
+PERCEIVED: Final[dict[Metric, tuple[Metric, str]]] = {
     "psnr": ("psnr_floor", "dB"),
     "ssim": ("ssim_floor", "1"),
     "flip_ldr": ("flip_ldr_floor", "1"),
@@ -69,8 +69,8 @@ class ImageErrors:
 
     mse: Error
     mse_relative: Error
-    seen: dict[Metric, Measure]
-    """By the keys of `SEEN`."""
+    perceived: dict[Metric, Measure]
+    """By the keys of `PERCEIVED`."""
     maps: dict[str, Floats]
     """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
     mask: Mask
@@ -84,8 +84,8 @@ class ImageErrors:
             subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
         )
         found.append(subject.of("mse_relative_floor", r.noise, r.count))
-        for metric, (floor, unit) in SEEN.items():
-            m = self.seen[metric]
+        for metric, (floor, unit) in PERCEIVED.items():
+            m = self.perceived[metric]
             low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
             if math.isfinite(m.value):
                 found.append(subject.of(metric, m.value, m.pixels, unit=unit, low=low, high=high))
@@ -124,21 +124,21 @@ def image_errors(
     if t.shape[2] != 3 or min(lit.shape) < window:
         raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
     mse, relative = light_errors(m, t, s, lit, options)
-    maps = _seen(m, t, lit, options)
+    maps = _perceived(m, t, lit, options)
     floors = floor or noise_floor(t, s, lit, options)
-    seen = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in SEEN}
-    return ImageErrors(mse, relative, seen, maps, lit)
+    perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
+    return ImageErrors(mse, relative, perceived, maps, lit)
 
 
 def noise_floor(
     truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions | None = None
 ) -> dict[Metric, float]:
-    """Return what a noised copy of the truth scores, by the keys of `SEEN`; arguments are those of `image_errors`."""
+    """Return what a noised copy of the truth scores, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
     options = options or ImageOptions()
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
     noised = t + s * np.random.default_rng(options.seed).standard_normal(t.shape)
-    maps = _seen(noised, t, lit, options)
-    return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in SEEN}
+    maps = _perceived(noised, t, lit, options)
+    return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
 def light_errors(
@@ -166,7 +166,7 @@ def light_errors(
     return mse, relative
 
 
-def _seen(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
+def _perceived(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
     """Return the maps of what an eye sees, (H, W); `square` is that of PSNR."""
     grey = float(np.median(truth[lit] @ LUMINANCE))
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))

@@ -27,7 +27,7 @@ def test_maps_come_back_from_the_file(written):
     assert exr.attributes["method"] == "woven"
     assert (exr.channels["A"] == MASK).all()
     for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
-        assert exr.channels[name][MASK].mean() == pytest.approx(errors.seen[name].value, rel=1e-5)
+        assert exr.channels[name][MASK].mean() == pytest.approx(errors.perceived[name].value, rel=1e-5)
 
 
 def test_squares_of_the_relative_differences_average_to_the_relative_mse(written):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from reports.image_error import SEEN, image_errors, light_errors, noise_floor
+from reports.image_error import PERCEIVED, image_errors, light_errors, noise_floor
 from reports.metrics import squared_error
 from reports.options import ImageOptions
 from reports.record import Record
@@ -29,8 +29,8 @@ def flat(*rgb):
 
 def values(picture, truth=CLOTH, standard_error=EXACT, mask=ALL, **options):
     errors = image_errors(picture, truth, standard_error, mask, ImageOptions(**options))
-    seen = {metric: measure.value for metric, measure in errors.seen.items()}
-    return seen | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
+    perceived = {metric: measure.value for metric, measure in errors.perceived.items()}
+    return perceived | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
 
 
 def losses(picture, truth=CLOTH):
@@ -137,16 +137,16 @@ def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
         assert abs(error.value) < 5 * error.standard_error
         assert error.measured == pytest.approx(error.noise, rel=0.1)
         assert error.low < error.value < error.high
-    for metric, measure in errors.seen.items():
+    for metric, measure in errors.perceived.items():
         assert measure.value == pytest.approx(measure.floor, rel=0.1), metric
-    assert {m: e.floor for m, e in errors.seen.items()} == noise_floor(truth, size, DISC)
+    assert {m: e.floor for m, e in errors.perceived.items()} == noise_floor(truth, size, DISC)
     assert noise_floor(CLOTH, EXACT, DISC)["ssim"] == pytest.approx(1)
 
 
 def test_a_given_floor_is_taken():
-    floor = dict.fromkeys(SEEN, 0.5)
+    floor = dict.fromkeys(PERCEIVED, 0.5)
     errors = image_errors(1.1 * CLOTH, CLOTH, EXACT, ALL, floor=floor)
-    assert {measure.floor for measure in errors.seen.values()} == {0.5}
+    assert {measure.floor for measure in errors.perceived.values()} == {0.5}
 
 
 @pytest.mark.parametrize("garbage", [np.nan, -3.0, 1e30])
@@ -154,8 +154,8 @@ def test_what_is_outside_the_mask_does_not_matter(garbage):
     outside = ~DISC[..., None]
     clean = image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC)
     found = image_errors(*(np.where(outside, garbage, a) for a in (1.1 * CLOTH, CLOTH, 0.01 * CLOTH)), DISC)
-    assert (found.mse, found.mse_relative, found.seen) == (clean.mse, clean.mse_relative, clean.seen)
-    assert all(measure.pixels == DISC.sum() for measure in found.seen.values())
+    assert (found.mse, found.mse_relative, found.perceived) == (clean.mse, clean.mse_relative, clean.perceived)
+    assert all(measure.pixels == DISC.sum() for measure in found.perceived.values())
 
 
 def test_components_are_measured_one_at_a_time():
@@ -170,9 +170,9 @@ def test_a_record_for_every_number():
     subject = Record(method="woven", fabric="denim", scene="sphere")
     records = {r.metric: r for r in image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, ALL).records(subject)}
     light = ["mse", "mse_measured", "truth_noise", "mse_relative", "mse_relative_floor"]
-    assert list(records) == [*light, *(name for metric, (floor, _) in SEEN.items() for name in (metric, floor))]
+    assert list(records) == [*light, *(name for metric, (floor, _) in PERCEIVED.items() for name in (metric, floor))]
     assert all(r.method == "woven" and r.count == SIZE**2 for r in records.values())
-    for metric in ("mse", "mse_relative", *SEEN):
+    for metric in ("mse", "mse_relative", *PERCEIVED):
         assert records[metric].low < records[metric].value < records[metric].high
     assert records["psnr"].unit == "dB"
 
@@ -221,7 +221,7 @@ def test_a_nearly_dark_truth_does_not_end_the_process():
     """FLIP leaves the process (exit code 255) if the reference is below 1e-8: it must never see one."""
     code = (
         "import numpy as np; from reports.image_error import image_errors as e; t = np.full((32, 32, 3), 1e-9);"
-        "print(e(2 * t, t, 0 * t, np.ones((32, 32), bool)).seen['flip_hdr'].value > 0)"
+        "print(e(2 * t, t, 0 * t, np.ones((32, 32), bool)).perceived['flip_hdr'].value > 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
@@ -229,5 +229,5 @@ def test_a_nearly_dark_truth_does_not_end_the_process():
 
 def test_the_same_numbers_every_time():
     first, second = (image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC) for _ in range(2))
-    assert first.seen == second.seen
+    assert first.perceived == second.perceived
     assert all((first.maps[name] == second.maps[name]).all() for name in first.maps)
