@@ -15,9 +15,10 @@ FLIP, HDR       the same for linear values >= 0 over the exposures that the trut
 Delta E         mean CIEDE2000 of L (`weaves.colour.delta_e`).
 
 Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
-subtracted; their floor is the measure of a noised copy, t + s x standard normals (fixed seed), against t: what a
-perfect method would score. Intervals are 95 % percentile bootstraps over square blocks of pixels, since neighbours err
-alike (`reports.block_bootstrap`); they say how much the choice of pixels matters, not the noise floor.
+subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel (option
+`floor_channels`), fixed seed: about what a perfect method would score. Intervals are 95 % percentile bootstraps over
+square blocks of pixels, since neighbours err alike (`reports.block_bootstrap`); they say how much the choice of pixels
+matters, not the noise floor.
 """
 
 from __future__ import annotations
@@ -136,7 +137,8 @@ def noise_floor(
     """Return what a noised copy of the truth scores, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
     options = options or ImageOptions()
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
-    noised = t + s * np.random.default_rng(options.seed).standard_normal(t.shape)
+    channels = 1 if options.floor_channels == "together" else 3
+    noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], channels))
     maps = _perceived(noised, t, lit, options)
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 

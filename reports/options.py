@@ -65,6 +65,10 @@ class ImageOptions(BaseModel):
     """At which FLIP sees pictures; 67 is a 4K display .7 m wide from .7 m."""
     tone_mapper: Literal["aces", "hable", "reinhard"] = "aces"
     """By which HDR-FLIP shows its exposures."""
+    floor_channels: Literal["together", "independent"] = "together"
+    """How the noised copy of the truth errs in the channels of a pixel. Their noise is that of the same points in a few
+    colours: drawn independently it would be coloured, and the noise floor of colour differences several times that of
+    a perfect method."""
     block: int = Field(default=16, ge=1)
     """Side of the blocks of pixels that intervals draw anew; at most a quarter of the picture's shorter side. It
     should exceed the distance over which errors resemble each other."""

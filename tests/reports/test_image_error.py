@@ -123,15 +123,17 @@ def test_aliasing_is_worse_than_filtering():
     assert_ordered(stripes(0.45), stripes(1e-3), truth=truth)
 
 
-def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
+@pytest.mark.parametrize(("draws", "channels"), [(1, "together"), (3, "independent")])
+def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores(draws, channels):
     """A method equal to the field f, the truth f + s z: MSE and relative MSE vanish within 5 standard errors.
 
     The other measures are of f against t; the floor is of t + s z' against t, z' independent: alike but for the
     curvature of the measures, which an error of 4 % of the values leaves small; 10 % allowed.
     """
     size = 0.04 * CLOTH
-    truth = CLOTH + size * np.random.default_rng(2).standard_normal(CLOTH.shape)
-    errors = image_errors(CLOTH, truth, size, DISC)
+    options = ImageOptions(floor_channels=channels)
+    truth = CLOTH + size * np.random.default_rng(2).standard_normal((SIZE, SIZE, draws))
+    errors = image_errors(CLOTH, truth, size, DISC, options)
     assert errors.mse.noise == pytest.approx((size[DISC] ** 2).mean())
     for error in (errors.mse, errors.mse_relative):
         assert abs(error.value) < 5 * error.standard_error
@@ -139,7 +141,7 @@ def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
         assert error.low < error.value < error.high
     for metric, measure in errors.perceived.items():
         assert measure.value == pytest.approx(measure.floor, rel=0.1), metric
-    assert {m: e.floor for m, e in errors.perceived.items()} == noise_floor(truth, size, DISC)
+    assert {m: e.floor for m, e in errors.perceived.items()} == noise_floor(truth, size, DISC, options)
     assert noise_floor(CLOTH, EXACT, DISC)["ssim"] == pytest.approx(1)
 
 
