@@ -7,6 +7,9 @@ noise          <s^2>. Components are taken to be uncorrelated, s_rgb^2 = sum_j c
                they share their points; the page says how much of an error the noise is.
 MSE            MSE measured - noise. The truth's error is independent of the model's, so E[(m - t)^2] = (m - f)^2 + s^2
                and the difference estimates the model's own error (m - f)^2 without bias; it can fall below zero.
+relative MSE   <((m - t)^2 - s^2) / (t^2 + eps <t>^2)>: every pixel counts by its share, the noise subtracted likewise;
+               eps keeps dark pixels from counting without bound. As the weight holds the noisy t, a bias of relative
+               size (s / t)^2 remains [Rousselle2011Adaptive].
 relative RMSE  sqrt(max(MSE, 0)) / <t>, one component at a time.
 colour measure the relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft), which compares fabrics of any colour.
 
@@ -79,6 +82,35 @@ def squared_error(
     value, spread = float(rows.mean()), float(stats.sem(rows)) if len(rows) > 1 else 0.0
     low, high = _interval(rows, value, spread, resamples)
     return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
+
+
+def relative_squared_error(
+    values: npt.ArrayLike,
+    truth: npt.ArrayLike,
+    standard_error: npt.ArrayLike,
+    epsilon: float = 0.01,
+    resamples: int = 500,
+) -> Error:
+    """Return the mean squared error relative to the truth's own square, noise of the truth subtracted.
+
+    Parameters
+    ----------
+    values, truth, standard_error : array_like (N, ...)
+        One row a query or pixel; further axes are channels.
+    epsilon : float
+        Share of the truth's squared mean that is added to the truth's square; positive.
+    resamples : int
+        As in `squared_error`.
+    """
+    weight = relative_weight(truth, epsilon)
+    m, t, s = (np.asarray(array, np.float64) * weight for array in (values, truth, standard_error))
+    return squared_error(m, t, s, resamples)
+
+
+def relative_weight(truth: npt.ArrayLike, epsilon: float = 0.01) -> Floats:
+    """Return 1 / sqrt(t^2 + epsilon <t>^2), in the truth's shape; the truth may not be zero everywhere."""
+    t = np.asarray(truth, np.float64)
+    return np.asarray(1.0 / np.sqrt(t**2 + epsilon * t.mean() ** 2))
 
 
 def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resamples: int = 500) -> Error:

@@ -50,6 +50,55 @@ class EdgeOptions(BaseModel):
     """Of the truth's points."""
 
 
+class ImageOptions(BaseModel):
+    """How a picture is compared with the truth's (`reports.image_error`)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    exposure: float = Field(default=1.6, gt=0)
+    """Factor on linear values before they are shown, as on the page (`reports.tiles`); HDR-FLIP chooses its own."""
+    relative_epsilon: float = Field(default=0.01, gt=0)
+    """What keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
+    ssim_sigma: float = Field(default=1.5, ge=0.5, le=8)
+    """Standard deviation of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them."""
+    pixels_per_degree: float = Field(default=67.0, ge=1, le=200)
+    """At which FLIP sees pictures; 67 is a 4K display .7 m wide from .7 m."""
+    tone_mapper: Literal["aces", "hable", "reinhard"] = "aces"
+    """By which HDR-FLIP shows its exposures."""
+    floor_channels: Literal["together", "independent"] = "together"
+    """How the noised copy of the truth errs in the channels of a pixel. Their noise is that of the same points in a few
+    colours: drawn independently it would be coloured, and the noise floor of colour differences several times that of
+    a perfect method."""
+    block: int = Field(default=16, ge=1)
+    """Side of the blocks of pixels that intervals draw anew; at most a quarter of the picture's shorter side. It
+    should exceed the distance over which errors resemble each other."""
+    resamples: int = Field(default=500, ge=100, le=100_000)
+    """Bootstrap resamples."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Of the resamples and of the noised copy of the truth."""
+
+
+class DisplayOptions(BaseModel):
+    """The display and the place from which FovVideoVDP looks at frames (`reports.fovvideovdp`)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    resolution: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = (3840, 2160)
+    """Width and height in pixels."""
+    diagonal: float = Field(default=30.0, gt=0)
+    """In inches."""
+    distance: float = Field(default=0.7472, gt=0)
+    """Of the eye, in metres."""
+    peak: float = Field(default=200.0, gt=0)
+    """Luminance of white, in candela per square metre."""
+    contrast: float = Field(default=1000.0, gt=1)
+    """Luminance of white over that of black."""
+    frames_per_second: float = Field(default=30.0, gt=0)
+    """At which the frames are shown."""
+    exposure: float = Field(default=1.6, gt=0)
+    """Factor on linear values before they are shown."""
+
+
 class BenchOptions(BaseModel):
     """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
 

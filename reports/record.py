@@ -24,7 +24,19 @@ from reports.metrics import Error
 from reports.options import VERSION
 from weaves.errors import BadInput
 
-PACKAGES: Final = ("numpy", "scipy", "numba", "torch", "pyarrow", "pandas", "OpenEXR", "matplotlib")
+PACKAGES: Final = (
+    "numpy",
+    "scipy",
+    "numba",
+    "torch",
+    "pyarrow",
+    "pandas",
+    "OpenEXR",
+    "matplotlib",
+    "scikit-image",
+    "flip-evaluator",
+    "colour-science",
+)
 """Packages whose versions are noted."""
 
 TRUTH: Final = "truth"
@@ -88,9 +100,23 @@ Metric = Literal[
     "size_specular",
     "size_diffuse",
     "size_time",
+    "mse_relative",
+    "psnr",
+    "ssim",
+    "flip_ldr",
+    "flip_hdr",
+    "delta_e",
+    "mse_relative_floor",
+    "psnr_floor",
+    "ssim_floor",
+    "flip_ldr_floor",
+    "flip_hdr_floor",
+    "delta_e_floor",
+    "fovvideovdp",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
-`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`."""
+`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error` and
+`fovvideovdp`."""
 
 
 class Provenance(BaseModel):

@@ -36,7 +36,7 @@ Bytes8 = npt.NDArray[np.uint8]
 
 def picture(exr: Exr) -> bytes:
     """Return a rendering as it is shown."""
-    return _png(_tone_mapped(exr))
+    return png(_tone_mapped(exr))
 
 
 def difference(exr: Exr, truth: Exr) -> bytes:
@@ -47,7 +47,7 @@ def difference(exr: Exr, truth: Exr) -> bytes:
     share = 0.5 + 0.5 * np.clip((shown - reference) / scale, -1.0, 1.0)
     rgba = mpl.colormaps["RdBu_r"](share, bytes=True)
     rgba[~cloth] = 0
-    return _png(rgba)
+    return png(rgba)
 
 
 def overview(exrs: Sequence[Exr], columns: int) -> bytes:
@@ -55,7 +55,7 @@ def overview(exrs: Sequence[Exr], columns: int) -> bytes:
     pictures = [_tone_mapped(exr) for exr in exrs]
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
     rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
-    return _png(np.concatenate(rows, axis=0))
+    return png(np.concatenate(rows, axis=0))
 
 
 def drawdown(fabric: Fabric) -> bytes:
@@ -64,7 +64,7 @@ def drawdown(fabric: Fabric) -> bytes:
     grey = cells.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
     lines = np.arange(len(grey)) % CELL_PIXELS == 0
     grey[lines], grey[:, lines] = 190, 190
-    return _png(_opaque(np.stack([grey] * 3, axis=-1)), 1)
+    return png(_opaque(np.stack([grey] * 3, axis=-1)), 1)
 
 
 def height(fabric: Fabric) -> bytes:
@@ -73,29 +73,29 @@ def height(fabric: Fabric) -> bytes:
     solid = surface.yarn != GAP
     low, high = surface.height[solid].min(), surface.height[solid].max()
     share = np.where(solid, (surface.height - low) / max(high - low, 1e-12), 0.0)
-    return _png(mpl.colormaps["bone"](_tiled(share, CELL_PIXELS), bytes=True), 1)
+    return png(mpl.colormaps["bone"](_tiled(share, CELL_PIXELS), bytes=True), 1)
 
 
 def normals(fabric: Fabric) -> bytes:
     """Return the normal map: (n + 1) / 2 as red, green, blue; gaps are black."""
     surface = surface_maps(fabric, CELL_PIXELS)
     colours = np.where((surface.yarn != GAP)[..., None], 0.5 * surface.normal + 0.5, 0.0)
-    return _png(_opaque(np.rint(255 * _tiled(colours, CELL_PIXELS)).astype(np.uint8)), 1)
+    return png(_opaque(np.rint(255 * _tiled(colours, CELL_PIXELS)).astype(np.uint8)), 1)
 
 
 def hex_colour(linear: Sequence[float]) -> str:
     """Return a linear RGB colour as ``#rrggbb``."""
-    return "#" + "".join(f"{value:02x}" for value in _encoded(np.asarray(linear)))
+    return "#" + "".join(f"{value:02x}" for value in encoded(np.asarray(linear)))
 
 
 def _tone_mapped(exr: Exr) -> Bytes8:
     cloth = exr.channels["A"] > 0
-    rgb = _encoded(EXPOSURE * exr.stack(*RGB))
+    rgb = encoded(EXPOSURE * exr.stack(*RGB))
     return np.concatenate([rgb * cloth[..., None], np.where(cloth, 255, 0)[..., None]], axis=-1).astype(np.uint8)
 
 
-def _encoded(linear: npt.NDArray[np.floating]) -> Bytes8:
-    """Return sRGB codes of linear values."""
+def encoded(linear: npt.NDArray[np.floating]) -> Bytes8:
+    """Return sRGB codes of linear values, in their shape."""
     codes = np.interp(linear, _levels(), np.arange(256))
     return np.asarray(np.rint(codes), dtype=np.uint8)
 
@@ -117,7 +117,8 @@ def _opaque(rgb: Bytes8) -> Bytes8:
     return np.concatenate([rgb, np.full((*rgb.shape[:2], 1), 255, np.uint8)], axis=-1)
 
 
-def _png(rgba: Bytes8, scale: int = SCALE) -> bytes:
+def png(rgba: Bytes8, scale: int = SCALE) -> bytes:
+    """Return a picture, (H, W, 4), as PNG bytes, every pixel a square of `scale`."""
     buffer = io.BytesIO()
     enlarged = rgba.repeat(scale, axis=0).repeat(scale, axis=1)
     metadata: Any = {"Software": None}  # else the bytes change with matplotlib's version

@@ -1,5 +1,7 @@
 """Colours of yarns: written as linear RGB, as sRGB hex, or as a reflectance spectrum; used as linear sRGB.
 
+And of pictures: sRGB encoding, and how far apart an eye sees two colours.
+
 The conversions are those of colour-science, imported only when a colour is not already linear RGB. Spectra are seen by
 the CIE 1931 2° observer under D65, and colours outside the sRGB gamut are clipped to it.
 """
@@ -12,6 +14,7 @@ from functools import lru_cache
 from typing import Annotated, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, model_validator
 
 Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
@@ -104,3 +107,34 @@ def linear_rgb(colour: Rgb | str | Spectrum) -> Rgb:
         rgb = science.XYZ_to_sRGB(seen / 100, apply_cctf_encoding=False)
     red, green, blue = np.clip(rgb, 0, 1).tolist()
     return red, green, blue
+
+
+def encoded(rgb: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the sRGB encoding of linear values (IEC 61966-2-1), both from 0 to 1, in their shape."""
+    import colour as science
+
+    return np.asarray(science.models.eotf_inverse_sRGB(np.asarray(rgb, np.float64)), np.float64)
+
+
+def delta_e(rgb: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the colour difference CIEDE2000 of linear sRGB colours.
+
+    Parameters
+    ----------
+    rgb, reference : array_like (..., 3)
+        Light of a display whose white is (1, 1, 1).
+
+    Returns
+    -------
+    float64 (...)
+        By way of XYZ (Rec. 709 primaries) and L*a*b* under D65, all parametric factors 1; about 1 is just noticeable
+        [Sharma2005CIEDE2000].
+    """
+    import colour as science
+
+    white = science.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    lab, other = (
+        science.XYZ_to_Lab(science.sRGB_to_XYZ(np.asarray(values, np.float64), apply_cctf_decoding=False), white)
+        for values in (rgb, reference)
+    )
+    return np.asarray(science.delta_E(lab, other, method="CIE 2000"), np.float64)

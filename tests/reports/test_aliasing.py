@@ -96,3 +96,18 @@ def test_power_sums_to_the_windowed_variance():
     low = (found.power * rings)[found.frequency < 0.25].sum()
     assert inside < variance
     assert low + found.high == pytest.approx(variance, rel=0.01)
+
+
+def test_both_figures_fall_as_one_over_the_number_of_points():
+    """Independent draws in every frame and pixel, k averaged: variance and energy beyond the truth's fall as 1/k.
+
+    Each figure's relative error is about sqrt(2/N), N = 8 · 96 · 64 (under the window about a third of it): 5 allowed.
+    """
+    truth, random = frames(True), np.random.default_rng(6)
+    found = {k: truth + 0.3 * random.standard_normal((k, *truth.shape)).mean(axis=0) for k in (1, 4, 16)}
+    for measure, expected in ((flicker, 0.09), (excess_energy, 0.09 * (1 - np.pi / 16))):
+        values = {k: k * measure(shown, truth) * truth.mean() ** 2 for k, shown in found.items()}
+        assert values[1] == pytest.approx(expected, rel=5 * np.sqrt(2 * 3 / truth.size))
+        # The cross term with the truth's own motion counts more the smaller the noise is.
+        assert list(values.values()) == pytest.approx([expected] * 3, rel=0.15)
+        assert measure(found[1], truth) > measure(found[4], truth) > measure(found[16], truth) > 0

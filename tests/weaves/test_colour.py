@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from weaves.colour import Spectrum, linear_rgb
+from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
 from weaves.yarn import Yarn
 
 
@@ -41,3 +41,66 @@ def test_yarn_gives_both_colours_in_linear_rgb():
     yarn = Yarn(bend=10, roughness=0.2, specular=(0.5, 0.4, 0.3), diffuse="#ff0000")
     assert yarn.specular_rgb == (0.5, 0.4, 0.3)
     assert yarn.diffuse_rgb == pytest.approx((1, 0, 0))
+
+
+def test_encoding_inverts_the_srgb_curve():
+    codes = [f"#{code:02x}{code:02x}{code:02x}" for code in range(256)]
+    linear = np.array([linear_rgb(code) for code in codes])
+    assert np.allclose(encoded(linear), np.arange(256)[:, None] / 255, atol=1e-7)
+
+
+SHARMA = [
+    ((50.0, 2.6772, -79.7751), (50.0, 0.0, -82.7485), 2.0425),
+    ((50.0, 3.1571, -77.2803), (50.0, 0.0, -82.7485), 2.8615),
+    ((50.0, 2.8361, -74.0200), (50.0, 0.0, -82.7485), 3.4412),
+    ((50.0, -1.3802, -84.2814), (50.0, 0.0, -82.7485), 1.0),
+    ((50.0, -1.1848, -84.8006), (50.0, 0.0, -82.7485), 1.0),
+    ((50.0, -0.9009, -85.5211), (50.0, 0.0, -82.7485), 1.0),
+    ((50.0, 0.0, 0.0), (50.0, -1.0, 2.0), 2.3669),
+    ((50.0, -1.0, 2.0), (50.0, 0.0, 0.0), 2.3669),
+    ((50.0, 2.49, -0.001), (50.0, -2.49, 0.0009), 7.1792),
+    ((50.0, 2.49, -0.001), (50.0, -2.49, 0.0011), 7.2195),
+    ((50.0, 2.49, -0.001), (50.0, -2.49, 0.0012), 7.2195),
+    ((50.0, -0.001, 2.49), (50.0, 0.0009, -2.49), 4.8045),
+    ((50.0, -0.001, 2.49), (50.0, 0.0011, -2.49), 4.7461),
+    ((50.0, 2.5, 0.0), (50.0, 0.0, -2.5), 4.3065),
+    ((50.0, 2.5, 0.0), (73.0, 25.0, -18.0), 27.1492),
+    ((50.0, 2.5, 0.0), (61.0, -5.0, 29.0), 22.8977),
+    ((50.0, 2.5, 0.0), (56.0, -27.0, -3.0), 31.9030),
+    ((50.0, 2.5, 0.0), (58.0, 24.0, 15.0), 19.4535),
+    ((50.0, 2.5, 0.0), (50.0, 3.1736, 0.5854), 1.0),
+    ((50.0, 2.5, 0.0), (50.0, 3.2972, 0.0), 1.0),
+    ((50.0, 2.5, 0.0), (50.0, 1.8634, 0.5757), 1.0),
+    ((50.0, 2.5, 0.0), (50.0, 3.2592, 0.3350), 1.0),
+    ((60.2574, -34.0099, 36.2677), (60.4626, -34.1751, 39.4387), 1.2644),
+    ((63.0109, -31.0961, -5.8663), (62.8187, -29.7946, -4.0864), 1.2630),
+    ((61.2901, 3.7196, -5.3901), (61.4292, 2.2480, -4.9620), 1.8731),
+    ((35.0831, -44.1164, 3.7933), (35.0232, -40.0716, 1.5901), 1.8645),
+    ((22.7233, 20.0904, -46.6940), (23.0331, 14.9730, -42.5619), 2.0373),
+    ((36.4612, 47.8580, 18.3852), (36.2715, 50.5065, 21.2231), 1.4146),
+    ((90.8027, -2.0831, 1.4410), (91.1528, -1.6435, 0.0447), 1.4441),
+    ((90.9257, -0.5406, -0.9208), (88.6381, -0.8985, -0.7239), 1.5381),
+    ((6.7747, -0.2908, -2.4247), (5.8714, -0.0985, -2.2286), 0.6377),
+    ((2.0776, 0.0795, -1.1350), (0.9033, -0.0636, -0.5514), 0.9082),
+]
+"""L*a*b* pairs and CIEDE2000, table 1 of Sharma2005CIEDE2000, without its pairs 10 and 14: their hues are opposite to
+the last digit, where the formula jumps and rounding on the way through RGB decides."""
+
+
+def from_lab(lab):
+    """Return linear sRGB (also negative) of a colour under D65: the inverse of the path, written out anew."""
+    lightness, a, b = lab
+    y = (lightness + 16) / 116
+    cubes = [t**3 if t > 6 / 29 else 3 * (6 / 29) ** 2 * (t - 4 / 29) for t in (y + a / 500, y, y - b / 200)]
+    xyz = np.array([0.3127 / 0.3290, 1.0, (1 - 0.3127 - 0.3290) / 0.3290]) * cubes
+    return np.linalg.solve([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]], xyz)
+
+
+@pytest.mark.parametrize(("first", "second", "expected"), SHARMA)
+def test_published_colour_differences(first, second, expected):
+    """To the four digits that are published."""
+    assert float(delta_e(from_lab(first), from_lab(second))) == pytest.approx(expected, abs=6e-5)
+
+
+def test_colour_differences_keep_the_shape():
+    assert delta_e(np.zeros((4, 5, 3)), np.ones((4, 5, 3))).shape == (4, 5)
