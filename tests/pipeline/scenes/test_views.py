@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.scenes.gbuffer import view
 from pipeline.scenes.options import ViewOptions
+from pipeline.scenes.views import view
 
 FLAT = ViewOptions(turn=0.0)
 
