@@ -7,8 +7,8 @@ third. Yarn spacings are measured along dp_du and dp_dv as they are; how unevenl
 footprints, and shear is ignored (or refused: `largest_shear`).
 
 Footprint: a Gaussian of `pixel_sigma` pixels under J = d(u, v in yarns)/d(pixel), the AOVs duv_dx and duv_dy: its axes
-are J's left singular vectors and its standard deviations pixel_sigma times the singular values
-[Igehy1999RayDifferentials].
+are J's left singular vectors and its standard deviations pixel_sigma times the singular values. Mitsuba takes them over
+one pixel to the right and one downwards, on the tangent plane [Igehy1999RayDifferentials].
 
 Curvature along the view ray: with t the unit tangent towards the viewer, kappa = dn.t / dp.t between the two places that
 lie `_STEP` yarn spacings off along t and -t, n being the shading normal: Euler's k1 cos^2 + k2 sin^2, exact on a
@@ -23,7 +23,7 @@ none either.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -104,8 +104,7 @@ def render(
     Raises
     ------
     BadInput
-        If the camera is inside the cloth, or the cloth's uv coordinates do not vary or are sheared beyond
-        `largest_shear`.
+        If the camera is inside the cloth, or the cloth's uv coordinates are sheared beyond `largest_shear`.
     """
     options = options or SceneOptions()
     camera = loaded.camera.at(loaded.scene, frame)
@@ -142,6 +141,8 @@ def _gbuffer(
 ) -> GBuffer:
     """Return the G-buffer of one cloth, whose pixels are `mask`."""
     found = {name: plane[mask] for name, plane in aovs.items()}
+    for name in ("duv_dx", "duv_dy"):
+        found[name] = found[name] * camera.widening(found["position"])[:, None]
     places = _places(loaded, key, cloth, found, options)
     axes, sizes, _ = np.linalg.svd(places.jacobian)
     sigma = np.clip(options.pixel_sigma * sizes, _LEAST_SIGMA, options.largest_sigma)
@@ -179,7 +180,7 @@ def _places(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Floats], op
     handed = np.where(_dot(np.cross(du, dv), normal) < 0.0, -1.0, 1.0)
     yarns = np.stack([np.ones_like(handed), handed], axis=-1) * cloth.yarns
     jacobian = np.stack([found["duv_dx"], found["duv_dy"]], axis=-1) * yarns[..., None]
-    _refuse_uv(loaded, key, du, dv, jacobian, options)
+    _refuse_shear(loaded, key, du, dv, options)
 
     turn = _turn(cloth)
     x = _unit(du - _dot(du, normal)[:, None] * normal)
@@ -259,13 +260,9 @@ def _backdrop(
     return np.where(shown[..., None], *seen)
 
 
-def _refuse_uv(
-    loaded: Loaded, key: str, du: Floats, dv: Floats, jacobian: Floats, options: SceneOptions
-) -> None:
-    """Refuse cloth whose coordinates do not vary, or are sheared more than allowed."""
+def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats, options: SceneOptions) -> None:
+    """Refuse cloth whose coordinates are sheared more than allowed."""
     where = f"scene {loaded.scene.name}"
-    if len(du) and not np.abs(np.linalg.det(jacobian)).any():
-        raise BadInput(where, f"fabric_{key}", "uv that do not vary", "a shape that wears a fabric needs uv coordinates")
     cosine = np.abs(_dot(_unit(du), _unit(dv)))
     shear = math.degrees(math.asin(min(float(cosine.max(initial=0.0)), 1.0)))
     if shear > options.largest_shear:
@@ -281,7 +278,9 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
     touching = hits.distance < np.linalg.norm(hits.dp_du, axis=-1) / finest
     if touching.any() or (_dot(hits.normal, around) > 0.0).all():
         place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
-        raise BadInput(f"scene {loaded.scene.name}", "camera", place, "the camera is inside the cloth; move it out of it")
+        raise BadInput(
+            f"scene {loaded.scene.name}", "camera", place, "the camera is inside the cloth; move it out of it"
+        )
 
 
 def _off(position: Floats) -> Floats:

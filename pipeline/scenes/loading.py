@@ -60,6 +60,16 @@ class Camera:
         towards = -self.to_world[:3, 2] + 0.0 * position if self.parallel else self.to_world[:3, 3] - position
         return np.asarray(towards / np.linalg.norm(towards, axis=-1, keepdims=True))
 
+    def widening(self, position: Floats) -> Floats:
+        """Return what derivatives by the pixel at positions must be multiplied with, (N,).
+
+        Mitsuba lets the rays of a pixel's neighbours start where its own ray crosses the near plane.
+        """
+        if self.parallel:
+            return np.ones(len(position))
+        depth = (position - self.to_world[:3, 3]) @ self.to_world[:3, 2]
+        return np.asarray(depth / (depth - self.settings["near_clip"]))
+
     def sensor(self, mi: Mitsuba, size: tuple[int, int]) -> Any:
         """Return Mitsuba's sensor, with one ray through the centre of every pixel."""
         film = {"type": "hdrfilm", "width": size[0], "height": size[1], "component_format": "float32"}
@@ -123,7 +133,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         key = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if key.startswith(PREFIX):
             worn.setdefault(key.removeprefix(PREFIX), []).append(index)
-            if shape.is_mesh() and not shape.has_vertex_texcoords():
+            if shape.is_mesh() and not _has_uv(mi, shape):
                 raise BadInput(where, "shape", shape.id(), "a shape that wears a fabric needs uv coordinates")
     if not worn:
         allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
@@ -151,7 +161,9 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
 
 def _scene_of(mi: Mitsuba, parts: list[Any]) -> World:
     """Return the scene of some parts of another."""
-    return mi.load_dict({"type": "scene", **{f"part_{index}": part for index, part in enumerate(parts)}}, optimize=False)
+    return mi.load_dict(
+        {"type": "scene", **{f"part_{index}": part for index, part in enumerate(parts)}}, optimize=False
+    )
 
 
 def _world(mi: Mitsuba, scene: Scene, where: str) -> World:
@@ -167,6 +179,16 @@ def _world(mi: Mitsuba, scene: Scene, where: str) -> World:
     if not isinstance(world, mi.Scene):
         raise BadInput(where, "", type(world).__name__, 'a Mitsuba scene must have the type "scene"')
     return world
+
+
+def _has_uv(mi: Mitsuba, mesh: Any) -> bool:
+    """Say whether a mesh has uv coordinates that vary in both directions."""
+    if not mesh.has_vertex_texcoords():
+        return False
+    found = mi.traverse(mesh)
+    if "vertex_texcoords" not in found:  # Mitsuba's rectangle and cube, whose uv are known
+        return True
+    return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
 
 
 def _camera(mi: Mitsuba, world: World, where: str) -> Camera:

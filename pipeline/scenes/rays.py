@@ -43,7 +43,9 @@ def first_hits(mi: Mitsuba, world: World, origin: Floats, direction: Floats) -> 
                 found[row] = [hit.t, *hit.sh_frame.n, *hit.dp_du]
     else:
         hit = world.ray_intersect(_rays(mi, origin, direction, np.full(len(origin), np.inf)))
-        planes = [np.asarray(column, np.float64).reshape(-1, len(origin)).T for column in (hit.t, hit.sh_frame.n, hit.dp_du)]
+        planes = [
+            np.asarray(column, np.float64).reshape(-1, len(origin)).T for column in (hit.t, hit.sh_frame.n, hit.dp_du)
+        ]
         found = np.where(np.asarray(hit.is_valid())[:, None], np.concatenate(planes, axis=1), np.nan)
     return Hits(found[:, 0], found[:, 1:4], found[:, 4:])
 

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.shipped.sheet import camera, developed, sheet, sun
 
-_FOLDS = 9
+_FOLDS = 7
 _ROWS, _COLUMNS = 24, 2048
 
 
@@ -23,7 +23,7 @@ def _build(mi: Any) -> dict[str, Any]:
     turn = np.linspace(0.0, 2.0 * np.pi, _COLUMNS + 1)
     # Latitude from straight down; the waves are uneven, as folds are.
     wave = np.cos(_FOLDS * turn + 0.8 * np.sin(2.0 * turn)) * (1.0 + 0.3 * np.sin(3.0 * turn + 1.0))
-    polar, azimuth = 0.46 + 0.13 * wave, turn + 0.07 * np.sin(2.0 * _FOLDS * turn)
+    polar, azimuth = 0.55 + 0.12 * wave, turn + 0.07 * np.sin(2.0 * _FOLDS * turn)
     curve = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), -np.cos(polar)], axis=-1)
     angle, along = developed(curve)
     normal = np.cross(along, -curve)
@@ -35,14 +35,14 @@ def _build(mi: Any) -> dict[str, Any]:
         "cloth": sheet(mi, "wool_gabardine", points, np.broadcast_to(normal, points.shape), uv),
         "sun": sun(mi, [-0.75, -0.6, 0.45], 3.0),
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": [0.12, 0.13, 0.15]}},
-        "camera": camera(mi, [0, -3.6, -0.75], [0, 0, -1.0], 22, (256, 192)),
+        "camera": camera(mi, [0, -3.6, -0.55], [0, 0, -0.88], 24, (256, 192)),
     }
 
 
 DRAPE = Scene(
     name="drape",
     source=_build,
-    cloths={"wool_gabardine": Cloth(yarns=(60.0, 60.0))},
+    cloths={"wool_gabardine": Cloth(yarns=(80.0, 80.0))},
     frames=24,
     step=(0.003, 0.001, 0.0),
 )

@@ -59,7 +59,8 @@ TABLE = Scene(
         "mat": Cloth(fabric="basket", yarns=(0.72 / (2 * _SPACING), 0.52 / (2 * _SPACING))),
         "runner": Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
         "napkin": Cloth(
-            fabric="denim", yarns=(2.0 * math.pi * _ROLL["radius"] / _SPACING, math.dist(_ROLL["p0"], _ROLL["p1"]) / _SPACING)
+            fabric="denim",
+            yarns=(2.0 * math.pi * _ROLL["radius"] / _SPACING, math.dist(_ROLL["p0"], _ROLL["p1"]) / _SPACING),
         ),
     },
     frames=24,

@@ -1,0 +1,63 @@
+"""Places and questions: two lights on the same places, one of them behind."""
+
+import numpy as np
+import pytest
+
+from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.shade import compose, shade
+from weaves.fabric import load_fabric
+
+UP, SIDE, DOWN = [0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, -0.8]
+
+
+@pytest.fixture
+def gbuffer():
+    """Three pixels of cloth in a picture of 2 by 3, the last unlit; one light from the side, one from behind."""
+    mask = np.array([[True, False, True], [False, True, False]])
+    column = np.arange(3.0)
+    return GBuffer(
+        mask,
+        np.flatnonzero(mask),
+        column + 7.0,
+        column - 9.0,
+        column + 1.0,
+        column + 0.5,
+        column / 10,
+        column / 20,
+        np.array([UP, SIDE, UP]),
+        np.array([0, 1, 0]),
+        np.array([SIDE, UP, DOWN]),
+        np.array([[1.0, 2.0, 3.0], [1.0, 1.0, 1.0], [4.0, 4.0, 4.0]]),
+    )
+
+
+def test_questions_repeat_their_places(gbuffer):
+    queries = gbuffer.queries((4, 4))
+    assert queries.u.tolist() == [3.0, 0.0, 3.0] and queries.v.tolist() == [3.0, 0.0, 3.0]
+    assert queries.sigma_minor.tolist() == [0.5, 1.5, 0.5]
+    assert queries.curvature == pytest.approx([0, 0.05, 0])
+    assert queries.wo == pytest.approx(np.array([UP, SIDE, UP]))
+    assert queries.wi == pytest.approx(np.array([SIDE, UP, DOWN]))
+    assert gbuffer.transmitted.tolist() == [False, False, True]
+    assert gbuffer.lit.tolist() == [[True, False, True], [False, False, False]]
+    looks = gbuffer.looks((4, 4))
+    assert looks.u.tolist() == [3.0, 0.0, 1.0] and (looks.wi == looks.wo).all()
+
+
+def test_lights_add_up_over_what_is_seen_through(gbuffer):
+    rgb = np.array([[0.1, 0.1, 0.1], [0.2, 0.4, 0.6], [0.01, 0.02, 0.03]])
+    background = np.arange(18.0).reshape(2, 3, 3)
+    picture = compose(gbuffer, rgb, background, transparency=[0.0, 0.5, 0.25], coverage=[1.0, 0.5, 1.0])
+    assert picture[0, 0] == pytest.approx([0.1 + 0.04, 0.2 + 0.08, 0.3 + 0.12])
+    assert picture[0, 2] == pytest.approx(0.5 * rgb[1] + 0.75 * background[0, 2])
+    assert picture[1, 1] == pytest.approx(0.25 * background[1, 1])
+    assert picture[~gbuffer.mask] == pytest.approx(background[~gbuffer.mask])
+
+
+def test_each_question_takes_its_own_sides_colours(gbuffer):
+    voile = load_fabric("voile")
+    components = np.ones((3, 4))
+    mixed = shade(voile, components, gbuffer.transmitted)
+    assert mixed[:2] == pytest.approx(shade(voile, components)[:2])
+    assert mixed[2] == pytest.approx(shade(voile, components, transmitted=True)[2])
+    assert not np.allclose(mixed[0], mixed[2])
