@@ -8,7 +8,7 @@ it, times their solid angle: irradiances sum to that of the whole environment.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,6 @@ from scipy.spatial import KDTree
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.rays import radiance
 from weaves.errors import BadInput
-
-if TYPE_CHECKING:
-    Mitsuba = World = Any
 
 Floats = npt.NDArray[np.float64]
 
@@ -54,7 +51,7 @@ def fibonacci(count: int) -> Floats:
     return np.stack([across * np.cos(_GOLDEN * k), across * np.sin(_GOLDEN * k), z], axis=-1)
 
 
-def lights_of(mi: Mitsuba, world: World, where: str, options: SceneOptions) -> list[Light]:
+def lights_of(mi: Any, world: Any, where: str, options: SceneOptions) -> list[Light]:
     """Return the lights of a scene; BadInput for one that is neither directional, point nor environment."""
     lights: list[Light] = []
     for emitter in world.emitters():
@@ -70,23 +67,20 @@ def lights_of(mi: Mitsuba, world: World, where: str, options: SceneOptions) -> l
     return lights
 
 
-def _delta(mi: Mitsuba, emitter: Any, distant: bool) -> Light:
-    """Ask a light without extent from the origin, which says where it is and what it brings there."""
+def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
+    """Ask a light without extent where it is from the origin, and a point light how strong it is at distance 1."""
     import drjit
 
-    origin = drjit.zeros(mi.SurfaceInteraction3f)
-    sample, weight = emitter.sample_direction(origin, mi.Point2f(0.5, 0.5))
-    power = _vector(weight)
+    seen_from = drjit.zeros(mi.SurfaceInteraction3f)
+    sample, power = emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))
     if distant:
-        return Light(True, _vector(sample.d), power)
-    if not power.any():  # the light is at the origin itself
-        origin.p = mi.Point3f(1.0, 0.0, 0.0)
-        sample, weight = emitter.sample_direction(origin, mi.Point2f(0.5, 0.5))
-        power = _vector(weight)
-    return Light(False, _vector(sample.p), power * float(_vector(sample.dist)[0]) ** 2)
+        return Light(True, _vector(sample.d), _vector(power))
+    place = _vector(sample.p)
+    seen_from.p = mi.Point3f(*(place + [1.0, 0.0, 0.0]))
+    return Light(False, place, _vector(emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))[1]))
 
 
-def _quadrature(mi: Mitsuba, environment: Any, options: SceneOptions) -> list[Light]:
+def _quadrature(mi: Any, environment: Any, options: SceneOptions) -> list[Light]:
     towards = fibonacci(options.environment_directions)
     fine = fibonacci(options.environment_directions * options.environment_samples)
     _, nearest = KDTree(towards).query(fine)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +16,6 @@ from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.variant import mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric
-
-if TYPE_CHECKING:
-    Mitsuba = World = Any
 
 Floats = npt.NDArray[np.float64]
 
@@ -70,7 +67,7 @@ class Camera:
         depth = (position - self.to_world[:3, 3]) @ self.to_world[:3, 2]
         return np.asarray(depth / (depth - self.settings["near_clip"]))
 
-    def sensor(self, mi: Mitsuba, size: tuple[int, int]) -> Any:
+    def sensor(self, mi: Any, size: tuple[int, int]) -> Any:
         """Return Mitsuba's sensor, with one ray through the centre of every pixel."""
         film = {"type": "hdrfilm", "width": size[0], "height": size[1], "component_format": "float32"}
         return mi.load_dict(
@@ -90,8 +87,8 @@ class Loaded:
 
     Attributes
     ----------
-    scene : Scene
-        What was loaded.
+    scene, options : Scene, SceneOptions
+        What was loaded, and how it becomes queries.
     mi, world, dressed, behind : Any
         The module mitsuba, its scene, the scene's cloth alone, and the scene without its cloth.
     cloths : dict
@@ -105,10 +102,11 @@ class Loaded:
     """
 
     scene: Scene
-    mi: Mitsuba
-    world: World
-    dressed: World
-    behind: World
+    options: SceneOptions
+    mi: Any
+    world: Any
+    dressed: Any
+    behind: Any
     cloths: dict[str, tuple[Cloth, Fabric]]
     worn: dict[str, list[int]]
     lights: list[Light]
@@ -148,6 +146,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
     rest = [*(shape for shape in shapes if shape not in dressed), *world.emitters()]
     return Loaded(
         scene,
+        options,
         mi,
         world,
         _scene_of(mi, dressed),
@@ -159,14 +158,14 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
     )
 
 
-def _scene_of(mi: Mitsuba, parts: list[Any]) -> World:
+def _scene_of(mi: Any, parts: list[Any]) -> Any:
     """Return the scene of some parts of another."""
     return mi.load_dict(
         {"type": "scene", **{f"part_{index}": part for index, part in enumerate(parts)}}, optimize=False
     )
 
 
-def _world(mi: Mitsuba, scene: Scene, where: str) -> World:
+def _world(mi: Any, scene: Scene, where: str) -> Any:
     """Let Mitsuba load a scene, without merging shapes or BSDFs that look alike to it."""
     try:
         if isinstance(scene.source, Path):
@@ -181,7 +180,7 @@ def _world(mi: Mitsuba, scene: Scene, where: str) -> World:
     return world
 
 
-def _has_uv(mi: Mitsuba, mesh: Any) -> bool:
+def _has_uv(mi: Any, mesh: Any) -> bool:
     """Say whether a mesh has uv coordinates that vary in both directions."""
     if not mesh.has_vertex_texcoords():
         return False
@@ -191,7 +190,7 @@ def _has_uv(mi: Mitsuba, mesh: Any) -> bool:
     return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
 
 
-def _camera(mi: Mitsuba, world: World, where: str) -> Camera:
+def _camera(mi: Any, world: Any, where: str) -> Camera:
     if not world.sensors():
         raise BadInput(where, "sensor", "none", "a scene needs a camera: perspective or orthographic")
     sensor = world.sensors()[0]
@@ -199,7 +198,7 @@ def _camera(mi: Mitsuba, world: World, where: str) -> Camera:
     if kind not in ("PerspectiveCamera", "OrthographicCamera"):
         raise BadInput(where, "sensor", kind, "the camera must be perspective or orthographic")
     found, parallel = mi.traverse(sensor), kind == "OrthographicCamera"
-    settings = {name: _number(found[name]) for name in ("near_clip", "far_clip")}
+    settings: dict[str, Any] = {name: _number(found[name]) for name in ("near_clip", "far_clip")}
     if not parallel:
         settings |= {"fov": _number(found["x_fov"]), "fov_axis": "x"}
         offsets = ("principal_point_offset_x", "principal_point_offset_y")

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    Mitsuba = World = Any
 
 Floats = npt.NDArray[np.float64]
 
@@ -24,7 +21,7 @@ class Hits(NamedTuple):
     """Change of position with u, (N, 3)."""
 
 
-def blocked(mi: Mitsuba, world: World, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
+def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
     """Say which of N rays hit anything nearer than `distance` (inf: anything)."""
     if mi.variant().startswith("scalar"):
         rays = zip(origin.tolist(), direction.tolist(), distance.tolist(), strict=True)
@@ -33,7 +30,7 @@ def blocked(mi: Mitsuba, world: World, origin: Floats, direction: Floats, distan
     return np.asarray(world.ray_test(_rays(mi, origin, direction, distance)))
 
 
-def first_hits(mi: Mitsuba, world: World, origin: Floats, direction: Floats) -> Hits:
+def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> Hits:
     """Return where N rays hit first."""
     if mi.variant().startswith("scalar"):
         found = np.full((len(origin), 7), np.nan)
@@ -50,7 +47,7 @@ def first_hits(mi: Mitsuba, world: World, origin: Floats, direction: Floats) -> 
     return Hits(found[:, 0], found[:, 1:4], found[:, 4:])
 
 
-def radiance(mi: Mitsuba, environment: Any, direction: Floats) -> Floats:
+def radiance(mi: Any, environment: Any, direction: Floats) -> Floats:
     """Return an environment light's linear RGB radiance from N directions, (N, 3)."""
     if mi.variant().startswith("scalar"):
         hit = mi.SurfaceInteraction3f()
@@ -66,6 +63,6 @@ def radiance(mi: Mitsuba, environment: Any, direction: Floats) -> Floats:
     return np.broadcast_to(np.asarray(environment.eval(hit), np.float64).T, (len(direction), 3))
 
 
-def _rays(mi: Mitsuba, origin: Floats, direction: Floats, distance: Floats) -> Any:
+def _rays(mi: Any, origin: Floats, direction: Floats, distance: Floats) -> Any:
     o, d = (vector.T.astype(np.float32) for vector in (origin, direction))
     return mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), mi.Float(distance.astype(np.float32)), 0.0, [])

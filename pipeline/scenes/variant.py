@@ -9,10 +9,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
-
-if TYPE_CHECKING:
-    Mitsuba = Any
+from typing import Any, Literal
 
 _TRIAL = """
 import drjit
@@ -39,7 +36,7 @@ def llvm_works() -> bool:
     return trial.returncode == 0
 
 
-def mitsuba(variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto") -> Mitsuba:
+def mitsuba(variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto") -> Any:
     """Return the module Mitsuba with the variant set; Mitsuba knows one at a time, for the whole process."""
     import mitsuba as mi
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    Mitsuba = Any
-
 Floats = npt.NDArray[np.float64]
 
 
-def sheet(mi: Mitsuba, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
+def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
     """Return the mesh of a grid of points, two triangles a cell.
 
     Parameters
@@ -66,7 +63,7 @@ def wears(cloth: str) -> dict[str, Any]:
     return {"type": "diffuse", "id": f"fabric_{cloth}"}
 
 
-def camera(mi: Mitsuba, place: list[float], target: list[float], fov: float, size: tuple[int, int]) -> dict[str, Any]:
+def camera(mi: Any, place: list[float], target: list[float], fov: float, size: tuple[int, int]) -> dict[str, Any]:
     """Return a pinhole camera with z upwards."""
     return {
         "type": "perspective",
@@ -77,6 +74,6 @@ def camera(mi: Mitsuba, place: list[float], target: list[float], fov: float, siz
     }
 
 
-def sun(mi: Mitsuba, towards: list[float], irradiance: float) -> dict[str, Any]:
+def sun(mi: Any, towards: list[float], irradiance: float) -> dict[str, Any]:
     """Return a directional light from the direction `towards`."""
     return {"type": "directional", "direction": [-x for x in towards], "irradiance": irradiance}

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.shipped.sheet import camera, developed, sheet, wears
 
-_ROLL = {"p0": [0.05, -0.5, 0.075], "p1": [0.62, -0.28, 0.075], "radius": 0.07}
+_NEAR, _FAR, _RADIUS = (0.05, -0.5, 0.075), (0.62, -0.28, 0.075), 0.07
 
 
 def _build(mi: Any) -> dict[str, Any]:
@@ -22,9 +22,15 @@ def _build(mi: Any) -> dict[str, Any]:
         "top": {"type": "rectangle", "to_world": move().scale([1.3, 1.0, 1]), "cloth": wears("table_cloth")},
         "mat": {"type": "rectangle", "to_world": mat, "cloth": wears("mat")},
         "runner": _runner(mi),
-        "napkin": {"type": "cylinder", **_ROLL, "cloth": wears("napkin")},
+        "napkin": {
+            "type": "cylinder",
+            "p0": list(_NEAR),
+            "p1": list(_FAR),
+            "radius": _RADIUS,
+            "cloth": wears("napkin"),
+        },
         "board": {"type": "rectangle", "to_world": move().translate([0, 0, -0.01]).scale([1.3, 1.0, 1])},
-        "core": {"type": "disk", "to_world": _end(mi)},
+        "core": {"type": "disk", "to_world": _end(mi), "paper": {"type": "twosided", "a": {"type": "diffuse"}}},
         "lamp": {"type": "point", "position": [-0.7, 0.5, 1.5], "intensity": lamp},
         "room": {"type": "constant", "radiance": {"type": "rgb", "value": [0.05, 0.05, 0.06]}},
         "camera": camera(mi, [0.1, -2.0, 1.25], [0.02, -0.05, 0.0], 37, (256, 192)),
@@ -33,8 +39,8 @@ def _build(mi: Any) -> dict[str, Any]:
 
 def _end(mi: Any) -> Any:
     """Return where the roll's near end is, as a disk's transform."""
-    outwards = 2.0 * np.array(_ROLL["p0"]) - _ROLL["p1"]
-    return mi.ScalarTransform4f().look_at(_ROLL["p0"], outwards.tolist(), [0, 0, 1]).scale(_ROLL["radius"])
+    outwards = 2.0 * np.array(_NEAR) - _FAR
+    return mi.ScalarTransform4f().look_at(list(_NEAR), outwards.tolist(), [0, 0, 1]).scale(_RADIUS)
 
 
 def _runner(mi: Any) -> Any:
@@ -60,7 +66,7 @@ TABLE = Scene(
         "runner": Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
         "napkin": Cloth(
             fabric="denim",
-            yarns=(2.0 * math.pi * _ROLL["radius"] / _SPACING, math.dist(_ROLL["p0"], _ROLL["p1"]) / _SPACING),
+            yarns=(2.0 * math.pi * _RADIUS / _SPACING, math.dist(_NEAR, _FAR) / _SPACING),
         ),
     },
     frames=24,

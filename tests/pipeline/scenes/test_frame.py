@@ -30,7 +30,7 @@ def shot(parts, eye=(0.0, -3.0, 2.0), target=(0.0, 0.0, 0.0), camera=None, cloth
         return {"type": "scene", "camera": {**(camera(mi) if camera else sensor), "film": film}, **parts(mi)}
 
     scene = Scene(name="test", source=build, cloths={"denim": cloth or Cloth()}, step=(0.1, 0.0, 0.0))
-    return render(load(scene, options), frame, options=options).gbuffers["denim"]
+    return render(load(scene, options), frame).gbuffers["denim"]
 
 
 def floor(mi):
@@ -130,7 +130,7 @@ def test_a_cylinders_curvature_is_eulers(turn, askew):
 
 def test_a_mesh_sphere_has_the_curvature_of_its_radius():
     """Interpolated normals of a 320 by 320 mesh: 1 % allowed. The conformal spacing is 4 / (4 + u^2 + v^2) / 24."""
-    gbuffer = render(load(SPHERE, SCALAR), size=SIZE, options=SCALAR).gbuffers["silk_charmeuse"]
+    gbuffer = render(load(SPHERE, SCALAR), size=SIZE).gbuffers["silk_charmeuse"]
     inner = gbuffer.wo[:, 2] > 0.1
     square = (np.square(gbuffer.u) + np.square(gbuffer.v)) / 24**2
     np.testing.assert_allclose(gbuffer.curvature[inner], 4 / (4 + square[inner]) / 24, rtol=0.01)
@@ -220,7 +220,7 @@ def test_frames_move_the_camera_to_the_right():
 @pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 def test_variants_agree():
     one, other = (
-        render(load(SPHERE, o), size=SIZE, options=o).gbuffers["silk_charmeuse"]
+        render(load(SPHERE, o), size=SIZE).gbuffers["silk_charmeuse"]
         for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
     )
     assert (one.pixel == other.pixel).all()

@@ -62,7 +62,7 @@ def test_every_fault_is_one_sentence(body, tmp_path):
 
 def test_an_xml_scene_is_worn_and_lit(tmp_path):
     loaded = load(load_scene(written(tmp_path, BALL + SUN + CAMERA)), OPTIONS)
-    gbuffer = render(loaded, options=OPTIONS).gbuffers["denim"]
+    gbuffer = render(loaded).gbuffers["denim"]
     assert gbuffer.mask.shape == (12, 16)
     assert 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
     assert loaded.cloths["denim"][1].name == "denim"
@@ -94,9 +94,9 @@ def test_a_camera_inside_the_cloth_is_refused(x, inside, tmp_path):
     path = written(tmp_path, BALL + SUN + CAMERA.replace("0,0,4", f"{x},0.01,0").replace("0,0,0", "-9,0,0"))
     loaded = load(load_scene(path), OPTIONS)
     if inside:
-        assert "inside the cloth" in refused(lambda: render(loaded, options=OPTIONS))
+        assert "inside the cloth" in refused(lambda: render(loaded))
     else:
-        assert len(render(loaded, options=OPTIONS).gbuffers["denim"].pixel)
+        assert len(render(loaded).gbuffers["denim"].pixel)
 
 
 def test_shear_is_refused_where_it_is_asked_to_be(tmp_path):
@@ -104,9 +104,9 @@ def test_shear_is_refused_where_it_is_asked_to_be(tmp_path):
     path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
     (tmp_path / "bare.obj").write_text(body)
     loaded = load(load_scene(path), OPTIONS)
-    assert len(render(loaded, options=OPTIONS).gbuffers["denim"].pixel)
+    assert len(render(loaded).gbuffers["denim"].pixel)
     strict = OPTIONS.model_copy(update={"largest_shear": 10.0})
-    sentence = refused(lambda: render(loaded, options=strict))
+    sentence = refused(lambda: render(load(load_scene(path), strict)))
     assert f"sheared by {np.degrees(np.arctan(0.5)):.1f} degrees" in sentence
 
 

@@ -18,7 +18,7 @@ FULL = 4  # the films are so many times as wide
 def shown(request):
     loaded = load(SHIPPED[request.param], OPTIONS)
     assert loaded.camera.size == (FULL * WIDTH, FULL * HEIGHT)
-    return loaded, *(render(loaded, frame, (WIDTH, HEIGHT), OPTIONS) for frame in (0.0, 1.0, 23.0))
+    return loaded, *(render(loaded, frame, (WIDTH, HEIGHT)) for frame in (0.0, 1.0, 23.0))
 
 
 def test_every_fabric_is_seen_and_lit_in_legal_queries(shown):
@@ -63,7 +63,7 @@ def test_only_the_curtain_is_lit_from_behind_by_the_sun(shown):
 
 def test_yarns_are_not_stretched_in_sheets(shown):
     """Seen head-on a footprint is round: its axes differ by the cosine of the view at most."""
-    loaded, first, *_ = shown
+    _, first, *_ = shown
     for gbuffer in first.gbuffers.values():
         facing = np.abs(gbuffer.wo[:, 2]) > 0.9
         ratio = gbuffer.sigma_minor[facing] / gbuffer.sigma[facing]
