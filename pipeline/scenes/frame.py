@@ -40,7 +40,7 @@ _AOVS: Final = {
     "shape_index": 1,
 }
 """What Mitsuba is asked for, and how many channels each has."""
-_OFF = 1e-4  # how far beside a surface a ray starts, as a share of the place's distance from the origin, plus 1
+_OFF = 2e-5  # how far beside a surface a ray starts, as a share of the place's distance from the origin, plus 1
 _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
@@ -54,11 +54,7 @@ class Frame(NamedTuple):
     """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
 
 
-def render(
-    loaded: Loaded,
-    frame: float = 0.0,
-    size: tuple[int, int] | None = None,
-) -> Frame:
+def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None) -> Frame:
     """Return what every pixel of a frame shows.
 
     Parameters
@@ -117,7 +113,7 @@ def _gbuffer(
     axes, sizes, _ = np.linalg.svd(places.jacobian)
     sigma = np.clip(options.pixel_sigma * sizes, _LEAST_SIGMA, options.largest_sigma)
     viewer = camera.to_viewer(places.position)
-    side = np.where(np.einsum("ni,ni->n", places.outward, viewer) < 0.0, -1.0, 1.0)
+    side = np.where(dot(places.outward, viewer) < 0.0, -1.0, 1.0)
     wo = tilted(np.einsum("nij,nj->ni", places.frame, viewer), side, options.largest_angle)
     curvature = np.zeros(len(wo))
     front = side > 0.0
@@ -180,9 +176,7 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
     touching = hits.distance < np.linalg.norm(hits.dp_du, axis=-1) / finest
     if touching.any() or (dot(hits.normal, around) > 0.0).all():
         place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
-        raise BadInput(
-            f"scene {loaded.scene.name}", "camera", place, "the camera is inside the cloth; move it out of it"
-        )
+        raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
 
 
 def _off(position: Floats) -> Floats:

@@ -76,7 +76,7 @@ def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
     if distant:
         return Light(True, _vector(sample.d), _vector(power))
     place = _vector(sample.p)
-    seen_from.p = mi.Point3f(*(place + [1.0, 0.0, 0.0]))
+    seen_from.p = mi.Point3f(place[0] + 1.0, place[1], place[2])
     return Light(False, place, _vector(emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))[1]))
 
 

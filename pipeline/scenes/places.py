@@ -27,6 +27,7 @@ from weaves.errors import BadInput
 Floats = npt.NDArray[np.float64]
 
 _STEP = 0.1  # in yarn spacings
+_FLAT = 1e-4  # 1/yarn spacings; less, which is what rounding makes of a plane, drops a thousandth over four spacings
 
 
 class Places(NamedTuple):
@@ -94,12 +95,13 @@ def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
         start = places.position + step * (sign * tangent + normal)
         hits = first_hits(loaded.mi, loaded.dressed, start, -normal)
         # What is missed, or lies on another surface, stays where it is.
-        near = (hits.distance < 3.0 * step[:, 0])[:, None]
+        near = ((hits.distance < 3.0 * step[:, 0]) & (dot(hits.normal, normal) > 0.0))[:, None]
         moves.append(np.where(near, sign * step * tangent, 0.0))
         turns.append(np.where(near, hits.normal, normal))
     moved = dot(moves[0] - moves[1], tangent)
     bend = dot(turns[0] - turns[1], tangent) / np.where(moved > 0.0, moved, 1.0)
-    return np.asarray(np.clip(bend * spacing, 0.0, STEEPEST_CURVATURE))
+    kappa = np.where(bend * spacing > _FLAT, bend * spacing, 0.0)
+    return np.asarray(np.minimum(kappa, STEEPEST_CURVATURE))
 
 
 def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:

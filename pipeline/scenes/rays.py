@@ -23,7 +23,7 @@ class Hits(NamedTuple):
 
 def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
     """Say which of N rays hit anything nearer than `distance` (inf: anything)."""
-    if mi.variant().startswith("scalar"):
+    if mi.variant().startswith("scalar") or not len(origin):
         rays = zip(origin.tolist(), direction.tolist(), distance.tolist(), strict=True)
         hits = (world.ray_test(mi.Ray3f(o, d, t, 0.0, [])) for o, d, t in rays)
         return np.fromiter(hits, np.bool_, len(origin))
@@ -32,7 +32,7 @@ def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Fl
 
 def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> Hits:
     """Return where N rays hit first."""
-    if mi.variant().startswith("scalar"):
+    if mi.variant().startswith("scalar") or not len(origin):
         found = np.full((len(origin), 7), np.nan)
         for row, (o, d) in enumerate(zip(origin.tolist(), direction.tolist(), strict=True)):
             hit = world.ray_intersect(mi.Ray3f(o, d))

@@ -16,7 +16,7 @@ def _build(mi: Any) -> dict[str, Any]:
     return {
         "type": "scene",
         "ground": {"type": "rectangle", "to_world": ground, "cloth": wears("denim")},
-        "below": {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -0.05]) @ ground},
+        "below": {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]) @ ground},
         "sun": sun(mi, [0.5, 0.55, 0.7], 3.0),
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": [0.10, 0.12, 0.16]}},
         "camera": camera(mi, [0, 0, 1.6], [0.0, 5.0, 0.35], 50, (256, 192)),

@@ -9,7 +9,7 @@ from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.shipped.sheet import camera, sun, wears
 
 _RADIUS, _LENGTH = 0.5, 4.0
-_SPACING = 0.025
+_AROUND = 128  # yarns: whole repeats, so that there is no seam
 
 
 def _build(mi: Any) -> dict[str, Any]:
@@ -27,8 +27,8 @@ def _build(mi: Any) -> dict[str, Any]:
 ROLL = Scene(
     name="roll",
     source=_build,
-    cloths={"cotton_twill": Cloth(yarns=(2.0 * math.pi * _RADIUS / _SPACING, _LENGTH / _SPACING))},
+    cloths={"cotton_twill": Cloth(yarns=(_AROUND, _AROUND * _LENGTH / (2.0 * math.pi * _RADIUS)))},
     frames=24,
     step=(0.001, 0.0008, 0.0),
 )
-"""Cotton twill, twenty yarn spacings to the radius."""
+"""Cotton twill, some twenty yarn spacings to the radius."""

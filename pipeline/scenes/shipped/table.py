@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.shipped.sheet import camera, developed, sheet, wears
 
+_SPACING = 0.012
 _NEAR, _FAR, _RADIUS = (0.05, -0.5, 0.075), (0.62, -0.28, 0.075), 0.07
 
 
@@ -55,8 +56,6 @@ def _runner(mi: Any) -> Any:
     return sheet(mi, "runner", points, np.broadcast_to(normal, points.shape), uv)
 
 
-_SPACING = 0.012
-
 TABLE = Scene(
     name="table",
     source=_build,
@@ -64,10 +63,7 @@ TABLE = Scene(
         "table_cloth": Cloth(fabric="polyester_lining", yarns=(2.6 / _SPACING, 2.0 / _SPACING)),
         "mat": Cloth(fabric="basket", yarns=(0.72 / (2 * _SPACING), 0.52 / (2 * _SPACING))),
         "runner": Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
-        "napkin": Cloth(
-            fabric="denim",
-            yarns=(2.0 * math.pi * _RADIUS / _SPACING, math.dist(_NEAR, _FAR) / _SPACING),
-        ),
+        "napkin": Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     },
     frames=24,
     step=(0.0015, 0.001, 0.0),

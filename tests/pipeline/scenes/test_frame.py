@@ -125,6 +125,9 @@ def test_a_cylinders_curvature_is_eulers(turn, askew):
     assert sure.sum() > 400
     if askew == 0.0:
         assert expected[sure] == pytest.approx(spacing / radius, rel=1e-4)
+    # Less than 1e-4 counts as flat.
+    assert gbuffer.curvature[sure & (expected < 0.9e-4)] == pytest.approx(0.0)
+    sure &= expected > 1.1e-4
     np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * spacing / radius)
 
 
