@@ -18,11 +18,13 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.scenes.aovs import aovs_of
+from pipeline.scenes.backdrop import backdrop
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, Loaded
 from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted
-from pipeline.scenes.rays import blocked, first_hits
+from pipeline.scenes.rays import blocked, first_hits, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
 
@@ -40,7 +42,6 @@ _AOVS: Final = {
     "shape_index": 1,
 }
 """What Mitsuba is asked for, and how many channels each has."""
-_OFF = 2e-5  # how far beside a surface a ray starts, as a share of the place's distance from the origin, plus 1
 _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
@@ -74,24 +75,14 @@ def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = No
     camera = loaded.camera.at(loaded.scene, frame)
     size = size or camera.size
     _refuse_inside(loaded, camera)
-    aovs = _aovs(loaded, camera, size)
+    aovs = aovs_of(loaded.mi, loaded.world, camera.sensor(loaded.mi, size), _AOVS)
     gbuffers = {}
     shown = np.zeros((size[1], size[0]), np.bool_)
     for key, (cloth, _) in loaded.cloths.items():
         mask = np.isin(aovs["shape_index"][..., 0], np.array(loaded.worn[key]) + 1)
         gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
         shown |= mask
-    return Frame(gbuffers, _backdrop(loaded, camera, size, shown))
-
-
-def _aovs(loaded: Loaded, camera: Camera, size: tuple[int, int]) -> dict[str, Floats]:
-    """Render the AOVs of one ray a pixel, each (H, W, channels)."""
-    mi = loaded.mi
-    asked = ",".join(f"{name}:{name}" for name in _AOVS)
-    integrator = mi.load_dict({"type": "aov", "aovs": asked})
-    planes = np.asarray(mi.render(loaded.world, sensor=camera.sensor(mi, size), integrator=integrator, spp=1))
-    ends = np.cumsum(list(_AOVS.values()))[:-1]
-    return dict(zip(_AOVS, np.split(planes.astype(np.float64), ends, axis=-1), strict=True))
+    return Frame(gbuffers, backdrop(loaded, camera, size, shown))
 
 
 def _gbuffer(
@@ -139,32 +130,20 @@ def _gbuffer(
 
 def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
     """Return which places each light in sight reaches, from where, and with which irradiance."""
-    off = _off(places.position)
+    beside = off(places.position)
     index, towards, power = [], [], []
     for light in loaded.lights:
         direction, distance, irradiance = light.reach(places.position)
         wi = np.einsum("nij,nj->ni", places.frame, direction)
         facing = dot(places.outward, direction)
         asked = np.flatnonzero((wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6))
-        start = places.position + (off * np.sign(facing))[:, None] * places.outward
+        start = places.position + (beside * np.sign(facing))[:, None] * places.outward
         hidden = blocked(loaded.mi, loaded.world, start[asked], direction[asked], distance[asked] * (1.0 - 1e-4))
         free = asked[~hidden]
         index.append(free)
         towards.append(wi[free])
         power.append(irradiance[free])
     return np.concatenate(index), np.concatenate(towards), np.concatenate(power)
-
-
-def _backdrop(loaded: Loaded, camera: Camera, size: tuple[int, int], shown: npt.NDArray[np.bool_]) -> Floats:
-    """Render what is no cloth: with the cloth's shadows beside it, without the cloth behind it."""
-    mi = loaded.mi
-    integrator = mi.load_dict({"type": "direct", "emitter_samples": loaded.options.backdrop_samples, "bsdf_samples": 0})
-    sensor = camera.sensor(mi, size)
-    seen = [
-        np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3]
-        for world in (loaded.behind, loaded.world)
-    ]
-    return np.where(shown[..., None], *seen)
 
 
 def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
@@ -177,7 +156,3 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
     if touching.any() or (dot(hits.normal, around) > 0.0).all():
         place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
         raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
-
-
-def _off(position: Floats) -> Floats:
-    return np.asarray(_OFF * (1.0 + np.abs(position).max(axis=-1, initial=0.0)))

@@ -71,7 +71,5 @@ class SceneOptions(BaseModel):
     environment_samples: int = Field(default=64, ge=1, le=1024)
     """Places of the environment that each of these directions stands for: their mean radiance is the direction's, so
     that the whole light is kept whatever its detail."""
-    backdrop_samples: int = Field(default=16, ge=1, le=1024)
-    """Samples of the lights on what is no cloth, which Mitsuba's own `direct` integrator renders."""
     variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto"
     """Mitsuba's variant. `auto`: the LLVM one where a suitable LLVM is found, which changes last digits only."""

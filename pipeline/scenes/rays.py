@@ -10,6 +10,9 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 
+_OFF = 2e-5  # float32 knows a position to 6e-8 of its size
+
+
 class Hits(NamedTuple):
     """Where N rays hit first; NaN where they miss."""
 
@@ -61,6 +64,11 @@ def radiance(mi: Any, environment: Any, direction: Floats) -> Floats:
     hit = drjit.zeros(mi.SurfaceInteraction3f, len(direction))
     hit.wi = mi.Vector3f(*(-direction.T.astype(np.float32)))
     return np.broadcast_to(np.asarray(environment.eval(hit), np.float64).T, (len(direction), 3))
+
+
+def off(position: Floats) -> Floats:
+    """Return how far beside each place of a surface a ray should start, (N,)."""
+    return np.asarray(_OFF * (1.0 + np.abs(position).max(axis=-1, initial=0.0)))
 
 
 def _rays(mi: Any, origin: Floats, direction: Floats, distance: Floats) -> Any:
