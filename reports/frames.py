@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.scenes.gbuffer import GBuffer, view
+from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.shade import colours
+from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
 from reports.aliasing import excess_energy, flicker, spectrum, temporal_variance
 from reports.exr import read_exr, write_exr

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.scenes.gbuffer import GBuffer, view
+from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import Scene
 from pipeline.scenes.shade import colours, compose, shade
+from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
 from reports.exr import read_exr, write_exr
 from reports.metrics import colour_noise, squared_error
@@ -94,4 +95,4 @@ def _write(
     channels["A"] = gbuffer.mask.astype(np.float32)
     if noise is not None:
         channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
-    write_exr(path, channels, {**about, "irradiance": gbuffer.irradiance})
+    write_exr(path, channels, {**about, "irradiance": float(gbuffer.irradiance.max(initial=0.0))})

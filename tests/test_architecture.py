@@ -44,9 +44,8 @@ HOMES = {
     "cyclopts": ["jobs"],
     "rich": ["jobs"],
     "trimesh": ["jobs"],
-    # Only tests render with another renderer.
-    "mitsuba": [],
-    "drjit": [],
+    "mitsuba": ["pipeline.scenes"],
+    "drjit": ["pipeline.scenes"],
 }
 
 MODULES = {

@@ -1,236 +1,96 @@
-"""Views of cloth as queries: which patch every pixel shows, from where, and under which light.
+"""What one fabric's pixels show, as queries: the G-buffer.
 
-Two analytic views. `sphere`: the fabric's plane wrapped around a ball by the inverse stereographic projection from
-the far pole. It is conformal, so yarns cross at right angles everywhere and a patch is a scaled copy of the flat
-fabric: the patch BSDF holds without shear. `plane`: a plane running to the horizon, from resolved yarns in front to
-many repeats a pixel. The camera is a pinhole, the light directional.
-
-A pixel is a Gaussian of standard deviation `pixel_sigma` pixels. Its image on the tangent plane is the ellipse of the
-matrix J = d(u, v)/d(pixel), found by intersecting neighbouring rays with the tangent plane [Igehy1999RayDifferentials].
-The papers' footprint is round, so sigma = pixel_sigma sqrt|det J| (`geometric_mean`), or pixel_sigma times the larger
-singular value (`major`). Local frame of the directions: x along the weft (dp/du), y along the warp (dp/dv), z = normal.
+A pixel that shows the fabric is a *place*: a footprint on the cloth and a direction to the viewer, in the local frame
+x along the weft, y along the warp, z = normal. A place under one light is a *question*; its answer f_P, which already
+contains the incident cosine (pipeline.truth.frames), times the light's irradiance is added to the pixel. So N places
+under several lights are M questions, and one light that reaches every place gives M = N.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.scenes.options import Scene, ViewOptions
 from pipeline.truth.query import Queries
 
 Floats = npt.NDArray[np.float64]
 
-_SPHERE_DISTANCE = 4.0  # of the camera from the centre, in radii
-_SPHERE_FILL = 0.94  # share of the picture's shorter side that the sphere takes
-
 
 @dataclass(frozen=True)
 class GBuffer:
-    """What the pixels of a view show; N pixels are hit and lit, in row order.
+    """N places of one fabric in a picture of H by W pixels, and M questions about them.
 
     Attributes
     ----------
     mask : bool (H, W)
-        Pixels that show cloth.
-    lit : bool (H, W)
-        Those whose light is above the local horizon; the others are black.
+        Pixels that show the fabric; places are among them.
+    pixel : int64 (N,)
+        Where each place is: row * W + column.
     u, v : float64 (N,)
         Centre of the footprint, in yarn spacings, not reduced.
-    sigma : float64 (N,)
-        Standard deviation of the footprint, in yarn spacings.
-    wi, wo : float64 (N, 3)
-        Unit vectors to the light and to the viewer, in the local frame.
-    irradiance : float
-        Of the light, on a surface facing it.
+    sigma, sigma_minor : float64 (N,)
+        Standard deviations of the footprint along its two axes, in yarn spacings.
+    angle : float64 (N,)
+        Angle from x to the first axis, radians.
+    curvature : float64 (N,)
+        Of the cloth along the view ray, 1/yarn spacings, 0 to 1.
+    wo : float64 (N, 3)
+        Unit vectors to the viewer, in the local frame.
+    place : int64 (M,)
+        Which place each question is about.
+    wi : float64 (M, 3)
+        Unit vectors to the light, in the place's local frame.
+    irradiance : float64 (M, 3)
+        Linear RGB irradiance that the light would bring to a surface facing it there.
     """
 
     mask: npt.NDArray[np.bool_]
-    lit: npt.NDArray[np.bool_]
+    pixel: npt.NDArray[np.int64]
     u: Floats
     v: Floats
     sigma: Floats
-    wi: Floats
+    sigma_minor: Floats
+    angle: Floats
+    curvature: Floats
     wo: Floats
-    irradiance: float
+    place: npt.NDArray[np.int64]
+    wi: Floats
+    irradiance: Floats
+
+    @property
+    def lit(self) -> npt.NDArray[np.bool_]:
+        """Pixels that any question is about, (H, W)."""
+        lit = np.zeros(self.mask.size, np.bool_)
+        lit[self.pixel[self.place]] = True
+        return lit.reshape(self.mask.shape)
+
+    @property
+    def transmitted(self) -> npt.NDArray[np.bool_]:
+        """Questions whose light and viewer are on different sides of the cloth, (M,)."""
+        return cast(npt.NDArray[np.bool_], self.wi[:, 2] * self.wo[self.place, 2] < 0.0)
 
     def queries(self, repeat: tuple[int, int]) -> Queries:
-        """Return the N queries in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
-        return Queries.round(
-            u=_reduce(self.u, repeat[0]),
-            v=_reduce(self.v, repeat[1]),
-            sigma=self.sigma.astype(np.float32),
-            wi=self.wi.astype(np.float32),
-            wo=self.wo.astype(np.float32),
+        """Return the M questions in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
+        return self.looks(repeat).take(self.place)._replace(wi=self.wi.astype(np.float32))
+
+    def looks(self, repeat: tuple[int, int]) -> Queries:
+        """Return one query a place, lit from the viewer: for transparency and opacity, which no light changes."""
+        wo = self.wo.astype(np.float32)
+        rest = (self.sigma_minor, self.angle, self.curvature)
+        return Queries(
+            _reduce(self.u, repeat[0]),
+            _reduce(self.v, repeat[1]),
+            self.sigma.astype(np.float32),
+            wo,
+            wo,
+            *(column.astype(np.float32) for column in rest),
         )
-
-
-class _Surface(NamedTuple):
-    """Where the rays of a view meet its surface; M rays."""
-
-    hit: npt.NDArray[np.bool_]
-    """Rays that do, (H, W); M of them."""
-    distance: Floats
-    """Ray parameter of the hits, in lengths of the unnormalised ray, (M,)."""
-    uv: Floats
-    """Coordinates in yarn spacings, (M, 2)."""
-    frame: Floats
-    """Rows: unit vectors along the weft, along the warp, and the normal, (M, 3, 3)."""
-    spacing: Floats
-    """Length of a yarn spacing in the world, (M,)."""
-
-
-def view(scene: Scene, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:
-    """Return what every pixel of a view shows.
-
-    Parameters
-    ----------
-    scene : str
-        ``sphere`` or ``plane``.
-    width, height : int
-        Size of the picture in pixels.
-    frame : float
-        Number of the frame: the cloth slides over the surface by ``frame * options.step`` pixels.
-    options : ViewOptions, optional
-        Camera, light and scale.
-    """
-    options = options or ViewOptions()
-    return _SCENES[scene](width, height, frame * options.step, options)
-
-
-def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
-    # Camera on +z looking at the unit sphere around the origin; rays (x, y, -1).
-    outline = math.tan(math.asin(1.0 / _SPHERE_DISTANCE))
-    focal = 0.5 * _SPHERE_FILL * min(width, height) / outline
-    rays = _rays(width, height, focal)
-    rays[..., 2] = -1.0
-    b = -_SPHERE_DISTANCE * rays[..., 2]
-    a = np.einsum("hwi,hwi->hw", rays, rays)
-    discriminant = b * b - a * (_SPHERE_DISTANCE**2 - 1.0)
-    hit = discriminant > 0.0
-    distance = (b[hit] - np.sqrt(discriminant[hit])) / a[hit]
-    normal = distance[:, None] * rays[hit] + (0.0, 0.0, _SPHERE_DISTANCE)
-
-    # Stereographic coordinates X, Y from the far pole (0, 0, -1): dp/dX, dp/dY are orthogonal, of length `scale`.
-    x, y = (2.0 * normal[:, i] / (1.0 + normal[:, 2]) for i in (0, 1))
-    scale = 0.5 * (1.0 + normal[:, 2])
-    one = np.ones_like(x)
-    along_x = np.stack([one, np.zeros_like(x), -0.5 * x], -1) - (0.5 * x)[:, None] * normal
-    along_y = np.stack([np.zeros_like(x), one, -0.5 * y], -1) - (0.5 * y)[:, None] * normal
-    spacing = options.sphere_pixels_per_yarn * (_SPHERE_DISTANCE - 1.0) / focal
-    uv, weft, warp = _turned(np.stack([x, y], -1) / spacing, along_x, along_y, options.turn)
-    surface = _Surface(hit, distance, uv, np.stack([_unit(weft), _unit(warp), normal], axis=1), spacing * scale)
-    light = _direction(options.sphere_light)
-    return _gbuffer(surface, rays, focal, light, shift / options.sphere_pixels_per_yarn, options)
-
-
-def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
-    # Camera above the plane z = 0 looking towards +y, pitched so that the horizon lies at `horizon` from the top.
-    focal = 0.5 * width / math.tan(math.radians(0.5 * options.field_of_view))
-    pitch = math.atan((0.5 - options.horizon) * height / focal)
-    screen = _rays(width, height, focal)
-    rays = np.stack(
-        [
-            screen[..., 0],
-            math.cos(pitch) + screen[..., 1] * math.sin(pitch),
-            -math.sin(pitch) + screen[..., 1] * math.cos(pitch),
-        ],
-        axis=-1,
-    )
-    # The height of the camera, in yarn spacings, makes a spacing as wide as asked in the bottom row.
-    bottom = -rays[-1, 0, 2]
-    camera = bottom * focal / options.plane_pixels_per_yarn
-    # It ends with the last row that is nowhere seen more grazingly than asked.
-    steepness = -rays[..., 2] / np.linalg.norm(rays, axis=-1)
-    in_sight = (steepness >= math.cos(math.radians(options.largest_angle))).all(axis=1)
-    hit = np.broadcast_to(in_sight[:, None], steepness.shape)
-    distance = camera / -rays[hit][:, 2]
-    position = distance[:, None] * rays[hit]
-    ones = np.ones(len(distance))
-    east, north, up = (np.outer(ones, axis) for axis in np.eye(3))
-    uv, weft, warp = _turned(position[:, :2], east, north, options.turn)
-    surface = _Surface(hit, distance, uv, np.stack([weft, warp, up], axis=1), ones)
-    light = _direction(options.plane_light)
-    return _gbuffer(surface, rays, focal, light, shift / options.plane_pixels_per_yarn, options)
-
-
-def _gbuffer(
-    surface: _Surface, rays: Floats, focal: float, light: Floats, slide: float, options: ViewOptions
-) -> GBuffer:
-    """Bring directions and footprints into the local frames; `slide` in yarn spacings."""
-    wo = -_unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
-    wi = surface.frame @ light
-    seen = wo[:, 2] >= math.cos(math.radians(options.largest_angle))
-    above = seen & (wi[:, 2] > 0.0)
-    mask, lit = np.zeros_like(surface.hit), np.zeros_like(surface.hit)
-    mask[surface.hit], lit[surface.hit] = seen, above
-
-    # The cloth slides along `heading`: the same pixel then shows a patch further back.
-    heading = math.radians(options.heading)
-    uv = surface.uv - slide * np.array([math.cos(heading), math.sin(heading)])
-    sigma = _footprint(surface, rays, focal, options)
-    return GBuffer(mask, lit, uv[above, 0], uv[above, 1], sigma[above], wi[above], wo[above], options.irradiance)
-
-
-def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptions) -> Floats:
-    """Return the round footprint of every hit pixel, in yarn spacings.
-
-    With the hit p = o + t d, moving the ray by e keeps p on the tangent plane when dp = t (e - d (n.e)/(n.d)).
-    """
-    step_right, step_up = (rays[0, 1] - rays[0, 0]), (rays[0, 0] - rays[1, 0])
-    ray = rays[surface.hit]
-    normal = surface.frame[:, 2]
-    columns = []
-    for step in (step_right, step_up):
-        slope = (normal @ step) / np.einsum("mi,mi->m", normal, ray)
-        moved = surface.distance[:, None] * (step - ray * slope[:, None])
-        columns.append(np.einsum("mij,mj->mi", surface.frame[:, :2], moved) / surface.spacing[:, None])
-    jacobian = np.stack(columns, axis=-1)
-    determinant = np.abs(np.linalg.det(jacobian))
-    if options.footprint == "geometric_mean":
-        axis = np.sqrt(determinant)
-    else:
-        # Larger singular value of a 2 x 2 matrix: s1^2 + s2^2 = |J|^2, s1 s2 = |det J|.
-        square = np.einsum("mij,mij->m", jacobian, jacobian)
-        axis = 0.5 * (np.sqrt(square + 2.0 * determinant) + np.sqrt(np.maximum(square - 2.0 * determinant, 0.0)))
-    return np.asarray(np.minimum(options.pixel_sigma * axis, options.largest_sigma))
-
-
-def _rays(width: int, height: int, focal: float) -> Floats:
-    """Return screen coordinates of the pixel centres over the focal length, x right and y up, (H, W, 3); z is 0."""
-    x = (np.arange(width) + 0.5 - 0.5 * width) / focal
-    y = (0.5 * height - np.arange(height) - 0.5) / focal
-    rays = np.zeros((height, width, 3))
-    rays[..., 0], rays[..., 1] = x[None, :], y[:, None]
-    return rays
-
-
-def _turned(position: Floats, along_x: Floats, along_y: Floats, turn: float) -> tuple[Floats, Floats, Floats]:
-    """Turn coordinates and axes counter-clockwise by `turn` degrees."""
-    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-    uv = position @ np.array([[cosine, -sine], [sine, cosine]])
-    return uv, cosine * along_x + sine * along_y, cosine * along_y - sine * along_x
-
-
-def _direction(angles: tuple[float, float]) -> Floats:
-    """Return the unit vector at (angle from z, azimuth from x) in degrees."""
-    polar, azimuth = (math.radians(angle) for angle in angles)
-    return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def _reduce(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:
     """Reduce modulo the repeat in float64; what float32 rounds up to the period becomes 0."""
     reduced = np.mod(coordinate, period).astype(np.float32)
     return np.where(reduced >= period, np.float32(0), reduced).astype(np.float32)
-
-
-_SCENES: Final[dict[Scene, Callable[[int, int, float, ViewOptions], GBuffer]]] = {"sphere": _sphere, "plane": _plane}

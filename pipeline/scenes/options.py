@@ -46,3 +46,30 @@ class ViewOptions(BaseModel):
     """How far the surface moves from frame to frame, in pixels (centre of the sphere, bottom row of the plane)."""
     heading: float = Field(default=37.0, ge=-180, le=180)
     """Direction of that motion, as an angle from the weft, in degrees."""
+
+
+class SceneOptions(BaseModel):
+    """How Mitsuba scenes become queries."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    pixel_sigma: float = Field(default=0.5, gt=0, le=4)
+    """Standard deviation of the pixel's Gaussian, in pixels."""
+    largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
+    """Both axes of a footprint are cut here, in yarn spacings."""
+    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
+    """Views more grazing than this, in degrees to the shading normal, are tilted up to it, so that no silhouette has
+    holes; so are those that an interpolated normal would show the wrong side of the cloth."""
+    largest_shear: float = Field(default=90.0, gt=0, le=90)
+    """A scene is refused if u and v cross anywhere in sight further from a right angle than this, in degrees. What is
+    left of shear is ignored: yarns are taken to cross at right angles, the weft along dp_du. 90: nothing is refused."""
+    curvature: Literal["at_point", "none"] = "at_point"
+    """Curvature of the cloth along the view ray: from the shading normal's derivative `at_point`, concave places being
+    flat; or `none`, for a benchmark of flat materials."""
+    environment_directions: int = Field(default=64, ge=4, le=16384)
+    """Directions of the quadrature that stands for an environment light: a Fibonacci lattice of equal solid angles."""
+    environment_samples: int = Field(default=64, ge=1, le=1024)
+    """Places of the environment that each of these directions stands for: their mean radiance is the direction's, so
+    that the whole light is kept whatever its detail."""
+    variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto"
+    """Mitsuba's variant. `auto`: the LLVM one where a suitable LLVM is found, which changes last digits only."""

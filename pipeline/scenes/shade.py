@@ -1,7 +1,7 @@
 """From components to pictures: colour is applied last, so editing it costs nothing.
 
 f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft already contains the incident cosine
-(pipeline.truth.frames): under a directional light of irradiance E a pixel's radiance is E f_P.
+(pipeline.truth.frames): under a light of irradiance E a pixel's radiance is E f_P.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64
     return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
 
 
-def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: bool = False) -> npt.NDArray[np.float64]:
+def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: npt.ArrayLike = False) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3).
 
     Parameters
@@ -32,25 +32,48 @@ def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: bool = False) 
         Whose colours are applied.
     components : array_like (N, 4)
         S_warp, S_weft, C_warp, C_weft with unit colour.
-    transmitted : bool
+    transmitted : bool or bool (N,)
         Whether light and viewer are on different sides of the cloth.
     """
-    return np.asarray(np.asarray(components, dtype=np.float64) @ colours(fabric, transmitted))
+    unit = np.asarray(components, dtype=np.float64)
+    reflected, through = unit @ colours(fabric), unit @ colours(fabric, transmitted=True)
+    return np.where(np.asarray(transmitted)[..., None], through, reflected)
 
 
-def compose(gbuffer: GBuffer, rgb: npt.ArrayLike, background: float = 0.0) -> npt.NDArray[np.float32]:
-    """Return the picture of a view in linear RGB, (H, W, 3).
+def compose(
+    gbuffer: GBuffer,
+    rgb: npt.ArrayLike,
+    background: npt.ArrayLike = 0.0,
+    transparency: npt.ArrayLike = 0.0,
+    coverage: npt.ArrayLike = 1.0,
+) -> npt.NDArray[np.float32]:
+    """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
+
+    A place shows coverage L + (1 - coverage + coverage transparency) background, L the sum of irradiance times f_P
+    over its lights.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        The view.
-    rgb : array_like (N, 3)
-        Patch BSDF of its N lit pixels.
-    background : float
-        Value of the pixels that show no cloth.
+        What the fabric's pixels show.
+    rgb : array_like (M, 3)
+        Patch BSDF of its M questions.
+    background : array_like
+        What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
+    transparency : array_like
+        Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
+    coverage : array_like
+        Share of each place that the curved fabric hides (`pipeline.truth.curved.opacity`), for cloth without gaps: a
+        number or (N,).
     """
-    picture = np.full((*gbuffer.mask.shape, 3), background, dtype=np.float32)
+    light = np.zeros((len(gbuffer.pixel), 3))
+    np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))
+    picture = np.empty((*gbuffer.mask.shape, 3))
+    picture[:] = background
+    flat, hidden = picture.reshape(-1, 3), np.asarray(coverage)
+    seen = np.broadcast_to(1.0 - hidden + hidden * np.asarray(transparency), len(light))[:, None]
+    behind = flat[gbuffer.pixel] * seen
+    # Pixels of the fabric that no place speaks for are black.
     picture[gbuffer.mask] = 0.0
-    picture[gbuffer.lit] = gbuffer.irradiance * np.asarray(rgb)
-    return picture
+    flat[gbuffer.pixel] = np.broadcast_to(hidden, len(light))[:, None] * light + behind
+    return picture.astype(np.float32)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.scenes.gbuffer import view
+from pipeline.scenes.views import view
 from reports.exr import read_exr
 from reports.pictures import ERROR, RGB, render_method, render_truth
 from weaves.fabric import load_fabric

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.scenes.gbuffer import view
 from pipeline.scenes.options import ViewOptions
 from pipeline.scenes.shade import colours, compose, shade
+from pipeline.scenes.views import view
 from weaves.fabric import load_fabric
 
 

@@ -1,0 +1,60 @@
+"""What is no cloth: other shapes, matte in their albedo, and the environment where a pixel's ray leaves the scene.
+
+Radiance of a shape = albedo / pi times the sum over the lights in sight of irradiance times cosine, both sides alike:
+the lights and shadows of the cloth itself, without noise. Light that shapes or cloth throw on each other is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.aovs import aovs_of
+from pipeline.scenes.loading import Camera, Loaded
+from pipeline.scenes.places import dot, unit
+from pipeline.scenes.rays import blocked, off
+
+Floats = npt.NDArray[np.float64]
+
+_AOVS = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
+
+
+def backdrop(loaded: Loaded, camera: Camera, size: tuple[int, int], cloth: npt.NDArray[np.bool_]) -> Floats:
+    """Return the linear RGB of a frame without its cloth, (H, W, 3).
+
+    Parameters
+    ----------
+    cloth : bool (H, W)
+        Pixels that show cloth: there the scene behind it is seen, without its shadows.
+    """
+    picture = _seen(loaded, loaded.world, camera, size, ~cloth)
+    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, size, cloth), picture)
+
+
+def _seen(loaded: Loaded, world: Any, camera: Camera, size: tuple[int, int], wanted: npt.NDArray[np.bool_]) -> Floats:
+    """Return the radiance of the wanted pixels; what else there is, is the environment."""
+    mi = loaded.mi
+    integrator = mi.load_dict({"type": "direct"})
+    sensor = camera.sensor(mi, size)
+    # Where a ray leaves the scene, Mitsuba returns the environment as it is.
+    picture = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3].copy()
+    aovs = aovs_of(mi, world, sensor, _AOVS)
+    mask = wanted & (aovs["shape_index"][..., 0] > 0)
+    position, geometric, normal, albedo = (
+        aovs[name][mask] for name in ("position", "geo_normal", "sh_normal", "albedo")
+    )
+    viewer = camera.to_viewer(position)
+    geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
+    total = np.zeros_like(position)
+    for light in loaded.lights:
+        direction, distance, irradiance = light.reach(position)
+        cosine = np.maximum(dot(normal, direction), 0.0)
+        asked = np.flatnonzero((cosine > 0.0) & (dot(geometric, direction) > 0.0))
+        start = position[asked] + off(position[asked])[:, None] * geometric[asked]
+        free = asked[~blocked(mi, world, start, direction[asked], distance[asked] * (1.0 - 1e-4))]
+        total[free] += irradiance[free] * cosine[free, None]
+    picture[mask] = albedo * total / math.pi
+    return picture

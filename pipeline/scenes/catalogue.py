@@ -1,0 +1,50 @@
+"""Scenes by name: those that come with the package, a Mitsuba XML file, or a TOML file that describes one.
+
+name = "sofa"
+source = "sofa.xml"          # beside the TOML file
+frames = 24
+step = [0.001, 0.0, 0.0]     # of the camera, from frame to frame
+
+[cloths.denim]               # what shapes with the BSDF id fabric_denim wear
+fabric = "denim"             # a preset, or the path of a fabric's TOML
+yarns = [400.0, 300.0]       # yarn spacings in one unit of u and of v
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pipeline.scenes.scene import Scene
+from pipeline.scenes.shipped import SHIPPED
+from weaves.errors import BadInput, nearest
+from weaves.validation import read_toml, validated
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Find a scene.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a scene that comes with the package, or path of an XML or TOML file. An XML file's fabrics are presets
+        with the default number of yarns, and its camera stands still.
+
+    Raises
+    ------
+    BadInput
+        If there is none, or the TOML file does not describe one.
+    """
+    if str(name_or_path) in SHIPPED:
+        return SHIPPED[str(name_or_path)]
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        table = read_toml(path)
+        if isinstance(table.get("source"), str):
+            table["source"] = path.parent / table["source"]
+        return validated(Scene, table, str(path))
+    if path.suffix == ".xml":
+        name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60]
+        return Scene(name=name, source=path)
+    allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "
+    raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED))

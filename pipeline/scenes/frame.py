@@ -1,0 +1,158 @@
+"""One frame of a Mitsuba scene as G-buffers, one for each cloth, by Mitsuba's own AOV integrator.
+
+Every pixel takes one ray through its centre and a box filter, so that nothing is averaged over an edge.
+
+Footprint: a Gaussian of `pixel_sigma` pixels under J = d(u, v in yarns)/d(pixel), the AOVs duv_dx and duv_dy: its axes
+are J's left singular vectors and its standard deviations pixel_sigma times the singular values. Mitsuba takes them over
+one pixel to the right and one downwards, on the tangent plane [Igehy1999RayDifferentials].
+
+Light: a light in sight of the place, along a straight ray, is a question; one that another surface hides is none. Cloth
+blocks such a ray as if it were opaque. A light on one side of the surface and on the other of its shading normal is
+none either.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.aovs import aovs_of
+from pipeline.scenes.backdrop import backdrop
+from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.lights import fibonacci
+from pipeline.scenes.loading import Camera, Loaded
+from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted
+from pipeline.scenes.rays import blocked, first_hits, off
+from pipeline.scenes.scene import Cloth
+from weaves.errors import BadInput
+
+Floats = npt.NDArray[np.float64]
+
+_AOVS: Final = {
+    "position": 3,
+    "uv": 2,
+    "geo_normal": 3,
+    "sh_normal": 3,
+    "dp_du": 3,
+    "dp_dv": 3,
+    "duv_dx": 2,
+    "duv_dy": 2,
+    "shape_index": 1,
+}
+"""What Mitsuba is asked for, and how many channels each has."""
+_LEAST_SIGMA = 1e-6
+_LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
+
+
+class Frame(NamedTuple):
+    """A frame: what it shows of every cloth, and what is no cloth."""
+
+    gbuffers: dict[str, GBuffer]
+    """By the cloth's key; a cloth out of sight has no places."""
+    backdrop: Floats
+    """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
+
+
+def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None) -> Frame:
+    """Return what every pixel of a frame shows.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scene.
+    frame : float
+        Which one; 0 is the first.
+    size : (int, int), optional
+        Width and height in pixels; the film's unless given.
+
+    Raises
+    ------
+    BadInput
+        If the camera is inside the cloth, or the cloth's uv coordinates are sheared beyond `largest_shear`.
+    """
+    camera = loaded.camera.at(loaded.scene, frame)
+    size = size or camera.size
+    _refuse_inside(loaded, camera)
+    aovs = aovs_of(loaded.mi, loaded.world, camera.sensor(loaded.mi, size), _AOVS)
+    gbuffers = {}
+    shown = np.zeros((size[1], size[0]), np.bool_)
+    for key, (cloth, _) in loaded.cloths.items():
+        mask = np.isin(aovs["shape_index"][..., 0], np.array(loaded.worn[key]) + 1)
+        gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
+        shown |= mask
+    return Frame(gbuffers, backdrop(loaded, camera, size, shown))
+
+
+def _gbuffer(
+    loaded: Loaded,
+    key: str,
+    cloth: Cloth,
+    camera: Camera,
+    mask: npt.NDArray[np.bool_],
+    aovs: dict[str, Floats],
+) -> GBuffer:
+    """Return the G-buffer of one cloth, whose pixels are `mask`."""
+    options = loaded.options
+    # At a pole of Mitsuba's sphere, say, there are no derivatives: such a pixel is cloth, but no place.
+    pixel = np.flatnonzero(mask & np.all([np.isfinite(plane).all(axis=-1) for plane in aovs.values()], axis=0))
+    found = {name: plane.reshape(-1, plane.shape[-1])[pixel] for name, plane in aovs.items()}
+    for name in ("duv_dx", "duv_dy"):
+        found[name] = found[name] * camera.widening(found["position"])[:, None]
+    places = places_of(loaded, key, cloth, found)
+    axes, sizes, _ = np.linalg.svd(places.jacobian)
+    sigma = np.clip(options.pixel_sigma * sizes, _LEAST_SIGMA, options.largest_sigma)
+    viewer = camera.to_viewer(places.position)
+    side = np.where(dot(places.outward, viewer) < 0.0, -1.0, 1.0)
+    wo = tilted(np.einsum("nij,nj->ni", places.frame, viewer), side, options.largest_angle)
+    curvature = np.zeros(len(wo))
+    front = side > 0.0
+    if options.curvature == "at_point" and front.any():
+        seen = Places(*(column[front] for column in places))
+        curvature[front] = curvature_of(loaded, seen, wo[front])
+    place, wi, irradiance = _lit(loaded, places)
+    return GBuffer(
+        mask,
+        pixel,
+        places.uv[:, 0],
+        places.uv[:, 1],
+        sigma[:, 0],
+        sigma[:, 1],
+        np.arctan2(axes[:, 1, 0], axes[:, 0, 0]),
+        curvature,
+        wo,
+        place,
+        wi,
+        irradiance,
+    )
+
+
+def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+    """Return which places each light in sight reaches, from where, and with which irradiance."""
+    beside = off(places.position)
+    index, towards, power = [], [], []
+    for light in loaded.lights:
+        direction, distance, irradiance = light.reach(places.position)
+        wi = np.einsum("nij,nj->ni", places.frame, direction)
+        facing = dot(places.outward, direction)
+        asked = np.flatnonzero((wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6))
+        start = places.position + (beside * np.sign(facing))[:, None] * places.outward
+        hidden = blocked(loaded.mi, loaded.world, start[asked], direction[asked], distance[asked] * (1.0 - 1e-4))
+        free = asked[~hidden]
+        index.append(free)
+        towards.append(wi[free])
+        power.append(irradiance[free])
+    return np.concatenate(index), np.concatenate(towards), np.concatenate(power)
+
+
+def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
+    """Refuse a camera within a yarn spacing of cloth, and one that sees the back of cloth wherever it looks."""
+    around = fibonacci(_LOOKS)
+    origin = np.broadcast_to(camera.to_world[:3, 3], around.shape)
+    hits = first_hits(loaded.mi, loaded.dressed, origin, around)
+    finest = max(max(cloth.yarns) for cloth, _ in loaded.cloths.values())
+    touching = hits.distance < np.linalg.norm(hits.dp_du, axis=-1) / finest
+    if touching.any() or (dot(hits.normal, around) > 0.0).all():
+        place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
+        raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")

@@ -1,0 +1,93 @@
+"""Lights of a Mitsuba scene: directional and point lights as they are, environments by a quadrature.
+
+An environment becomes `environment_directions` distant lights on a Fibonacci lattice, which parts the sphere into equal
+solid angles. Each carries the mean radiance of the `environment_samples` places of a finer lattice that lie nearest to
+it, times their solid angle: irradiances sum to that of the whole environment.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import KDTree
+
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.rays import radiance
+from weaves.errors import BadInput
+
+Floats = npt.NDArray[np.float64]
+
+_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+
+
+class Light(NamedTuple):
+    """A light without extent."""
+
+    distant: bool
+    """Whether it shines from one direction everywhere."""
+    place: Floats
+    """Unit vector to it if distant, else its position, (3,)."""
+    power: Floats
+    """Linear RGB irradiance on a surface that faces it, (3,); of a point light, at distance 1."""
+
+    def reach(self, position: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return unit vectors to the light (N, 3), distances (N,), irradiances on facing surfaces (N, 3)."""
+        if self.distant:
+            ones = np.ones((len(position), 1))
+            return ones * self.place, np.full(len(position), np.inf), ones * self.power
+        towards = self.place - position
+        distance = np.linalg.norm(towards, axis=-1)
+        return towards / distance[:, None], distance, self.power / np.square(distance)[:, None]
+
+
+def fibonacci(count: int) -> Floats:
+    """Return `count` unit vectors that part the sphere into equal solid angles, (count, 3)."""
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(_GOLDEN * k), across * np.sin(_GOLDEN * k), z], axis=-1)
+
+
+def lights_of(mi: Any, world: Any, where: str, options: SceneOptions) -> list[Light]:
+    """Return the lights of a scene; BadInput for one that is neither directional, point nor environment."""
+    lights: list[Light] = []
+    for emitter in world.emitters():
+        kind = emitter.class_name()
+        if emitter.is_environment():
+            lights += _quadrature(mi, emitter, options)
+        elif kind in ("DirectionalEmitter", "PointLight"):
+            lights.append(_delta(mi, emitter, distant=kind == "DirectionalEmitter"))
+        else:
+            raise BadInput(where, "emitter", kind, "lights must be directional, point, constant or envmap")
+    if not lights:
+        raise BadInput(where, "emitter", "none", "a scene needs a light: directional, point, constant or envmap")
+    return lights
+
+
+def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
+    """Ask a light without extent where it is from the origin, and a point light how strong it is at distance 1."""
+    import drjit
+
+    seen_from = drjit.zeros(mi.SurfaceInteraction3f)
+    sample, power = emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))
+    if distant:
+        return Light(True, _vector(sample.d), _vector(power))
+    place = _vector(sample.p)
+    seen_from.p = mi.Point3f(place[0] + 1.0, place[1], place[2])
+    return Light(False, place, _vector(emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))[1]))
+
+
+def _quadrature(mi: Any, environment: Any, options: SceneOptions) -> list[Light]:
+    towards = fibonacci(options.environment_directions)
+    fine = fibonacci(options.environment_directions * options.environment_samples)
+    _, nearest = KDTree(towards).query(fine)
+    power = np.zeros_like(towards)
+    np.add.at(power, nearest, radiance(mi, environment, fine) * (4.0 * math.pi / len(fine)))
+    return [Light(True, d, p) for d, p in zip(towards, power, strict=True) if p.any()]
+
+
+def _vector(value: Any) -> Floats:
+    return np.asarray(value, np.float64).reshape(-1)

@@ -1,0 +1,216 @@
+"""A scene brought into Mitsuba: its shapes, what they wear, its lights and its camera; every fault as one sentence."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.lights import Light, lights_of
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.variant import mitsuba
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric, load_fabric
+
+Floats = npt.NDArray[np.float64]
+
+PREFIX: Final = "fabric_"
+"""How the id of a BSDF that stands for a cloth begins."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole, or parallel rays; it looks along the third column of `to_world`.
+
+    Attributes
+    ----------
+    to_world : float64 (4, 4)
+        From the camera's axes, left, up and forward, to the world.
+    parallel : bool
+        Whether its rays are.
+    settings : dict
+        The rest, as Mitsuba reads it.
+    size : tuple of int
+        Width and height of its film in pixels.
+    """
+
+    to_world: Floats
+    parallel: bool
+    settings: dict[str, Any]
+    size: tuple[int, int]
+
+    def at(self, scene: Scene, frame: float) -> Camera:
+        """Return the camera of a frame."""
+        right, up, forward = (frame * length for length in scene.step)
+        moved = self.to_world.copy()
+        axes = moved[:3, :3] / np.linalg.norm(moved[:3, :3], axis=0)
+        moved[:3, 3] += axes @ [-right, up, forward]
+        return Camera(moved, self.parallel, self.settings, self.size)
+
+    def to_viewer(self, position: Floats) -> Floats:
+        """Return the unit vectors from positions to the viewer, (N, 3)."""
+        towards = -self.to_world[:3, 2] + 0.0 * position if self.parallel else self.to_world[:3, 3] - position
+        return np.asarray(towards / np.linalg.norm(towards, axis=-1, keepdims=True))
+
+    def widening(self, position: Floats) -> Floats:
+        """Return what derivatives by the pixel at positions must be multiplied with, (N,).
+
+        Mitsuba lets the rays of a pixel's neighbours start where its own ray crosses the near plane.
+        """
+        if self.parallel:
+            return np.ones(len(position))
+        depth = (position - self.to_world[:3, 3]) @ self.to_world[:3, 2]
+        return np.asarray(depth / (depth - self.settings["near_clip"]))
+
+    def sensor(self, mi: Any, size: tuple[int, int]) -> Any:
+        """Return Mitsuba's sensor, with one ray through the centre of every pixel."""
+        film = {"type": "hdrfilm", "width": size[0], "height": size[1], "component_format": "float32"}
+        return mi.load_dict(
+            {
+                "type": "orthographic" if self.parallel else "perspective",
+                **self.settings,
+                "to_world": mi.ScalarTransform4f(self.to_world),
+                "film": {**film, "rfilter": {"type": "box"}},
+                "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A scene in Mitsuba.
+
+    Attributes
+    ----------
+    scene, options : Scene, SceneOptions
+        What was loaded, and how it becomes queries.
+    mi, world, dressed, behind : Any
+        The module mitsuba, its scene, the scene's cloth alone, and the scene without its cloth.
+    cloths : dict
+        What each key of a cloth stands for, and its fabric.
+    worn : dict
+        For every key the indices of the shapes that wear it, in the order of `world.shapes()`.
+    lights : list of Light
+        What shines.
+    camera : Camera
+        That of frame 0.
+    """
+
+    scene: Scene
+    options: SceneOptions
+    mi: Any
+    world: Any
+    dressed: Any
+    behind: Any
+    cloths: dict[str, tuple[Cloth, Fabric]]
+    worn: dict[str, list[int]]
+    lights: list[Light]
+    camera: Camera
+
+
+def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
+    """Load a scene.
+
+    Raises
+    ------
+    BadInput
+        If it is no Mitsuba scene, lacks a file, wears no fabric or an unknown one, has cloth without uv coordinates, a
+        light or camera of another kind, or no light or camera.
+    """
+    options = options or SceneOptions()
+    mi, where = mitsuba(options.variant), _where(scene)
+    world = _world(mi, scene, where)
+    shapes = world.shapes()
+    worn: dict[str, list[int]] = {}
+    for index, shape in enumerate(shapes):
+        key = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
+        if key.startswith(PREFIX):
+            worn.setdefault(key.removeprefix(PREFIX), []).append(index)
+            if shape.is_mesh() and not _has_uv(mi, shape):
+                raise BadInput(where, "shape", shape.id(), "a shape that wears a fabric needs uv coordinates")
+    if not worn:
+        allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
+        raise BadInput(where, "", "no fabric", allowed)
+    for key in scene.cloths:
+        if key not in worn:
+            raise BadInput(where, f"cloths.{key}", key, f"no shape has the bsdf {PREFIX + key!r}; {nearest(key, worn)}")
+    described = {key: scene.cloths.get(key, Cloth()) for key in worn}
+    cloths = {key: (cloth, load_fabric(cloth.fabric or key)) for key, cloth in described.items()}
+    dressed = [shapes[index] for indices in worn.values() for index in indices]
+    lights = lights_of(mi, world, where, options)
+    rest = [*(shape for shape in shapes if shape not in dressed), *world.emitters()]
+    return Loaded(
+        scene,
+        options,
+        mi,
+        world,
+        _scene_of(mi, dressed),
+        _scene_of(mi, rest),
+        cloths,
+        worn,
+        lights,
+        _camera(mi, world, where),
+    )
+
+
+def _scene_of(mi: Any, parts: list[Any]) -> Any:
+    """Return the scene of some parts of another."""
+    return mi.load_dict(
+        {"type": "scene", **{f"part_{index}": part for index, part in enumerate(parts)}}, optimize=False
+    )
+
+
+def _world(mi: Any, scene: Scene, where: str) -> Any:
+    """Let Mitsuba load a scene, without merging shapes or BSDFs that look alike to it."""
+    try:
+        if isinstance(scene.source, Path):
+            world = mi.load_file(str(scene.source), optimize=False)
+        else:
+            world = mi.load_dict(scene.source(mi), optimize=False)
+    except (RuntimeError, TypeError, OSError) as error:
+        said = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error))
+        raise BadInput(where, "", " ".join(said.split()), "a Mitsuba 3 scene that loads is needed") from error
+    if not isinstance(world, mi.Scene):
+        raise BadInput(where, "", type(world).__name__, 'a Mitsuba scene must have the type "scene"')
+    return world
+
+
+def _has_uv(mi: Any, mesh: Any) -> bool:
+    """Say whether a mesh has uv coordinates that vary in both directions."""
+    if not mesh.has_vertex_texcoords():
+        return False
+    found = mi.traverse(mesh)
+    if "vertex_texcoords" not in found:  # Mitsuba's rectangle and cube, whose uv are known
+        return True
+    return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
+
+
+def _camera(mi: Any, world: Any, where: str) -> Camera:
+    if not world.sensors():
+        raise BadInput(where, "sensor", "none", "a scene needs a camera: perspective or orthographic")
+    sensor = world.sensors()[0]
+    kind = sensor.class_name()
+    if kind not in ("PerspectiveCamera", "OrthographicCamera"):
+        raise BadInput(where, "sensor", kind, "the camera must be perspective or orthographic")
+    found, parallel = mi.traverse(sensor), kind == "OrthographicCamera"
+    settings: dict[str, Any] = {name: _number(found[name]) for name in ("near_clip", "far_clip")}
+    if not parallel:
+        settings |= {"fov": _number(found["x_fov"]), "fov_axis": "x"}
+        offsets = ("principal_point_offset_x", "principal_point_offset_y")
+        settings |= {name: _number(found[name]) for name in offsets}
+    to_world = np.asarray(found["to_world"].matrix, np.float64).reshape(4, 4, -1)[..., 0]
+    width, height = (int(length) for length in sensor.film().size())
+    return Camera(to_world, parallel, settings, (width, height))
+
+
+def _number(value: Any) -> float:
+    return float(np.asarray(value).reshape(-1)[0])
+
+
+def _where(scene: Scene) -> str:
+    return str(scene.source) if isinstance(scene.source, Path) else f"scene {scene.name}"

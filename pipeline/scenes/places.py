@@ -1,0 +1,125 @@
+"""Places of a cloth in the world: its own frame, scale and turn, and how it curves.
+
+Local frame: z is the shading normal, x the direction of dp_du in the tangent plane, turned by the cloth's `turn`, y the
+third. Yarn spacings are measured along dp_du and dp_dv as they are; how unevenly the uv stretch the cloth shows in its
+footprints, and shear is ignored (or refused: `largest_shear`).
+
+Curvature along the view ray: with t the unit tangent towards the viewer, kappa = dn.t / dp.t between the two places
+that lie `_STEP` yarn spacings off along t and -t, n being the shading normal: Euler's k1 cos^2 + k2 sin^2, exact on a
+cylinder. Mitsuba's own derivative of the normal is by uv on its analytic shapes and by barycentric coordinates on its
+meshes, so it is not used. It is 0 in concave places and for a viewer behind the cloth.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.loading import Loaded
+from pipeline.scenes.rays import first_hits
+from pipeline.scenes.scene import Cloth
+from pipeline.truth.query import STEEPEST_CURVATURE
+from weaves.errors import BadInput
+
+Floats = npt.NDArray[np.float64]
+
+_STEP = 0.1  # in yarn spacings
+_FLAT = 1e-4  # 1/yarn spacings; less, which is what rounding makes of a plane, drops a thousandth over four spacings
+
+
+class Places(NamedTuple):
+    """N places of one cloth in the world, the cloth's own scale and turn applied."""
+
+    position: Floats
+    outward: Floats
+    """Geometric normal on the shading normal's side, (N, 3)."""
+    frame: Floats
+    """Rows x, y, z, (N, 3, 3)."""
+    uv: Floats
+    """In yarn spacings, (N, 2)."""
+    jacobian: Floats
+    """d(uv)/d(pixel), (N, 2, 2)."""
+    tangents: Floats
+    """Columns: the world's length along u and along v of one yarn spacing, (N, 3, 2)."""
+
+
+def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Floats]) -> Places:
+    """Bring the AOVs of a cloth's pixels into its scale and turn."""
+    normal = unit(found["sh_normal"])
+    outward = found["geo_normal"] * np.where(dot(found["geo_normal"], normal) < 0.0, -1.0, 1.0)[:, None]
+    du, dv = found["dp_du"], found["dp_dv"]
+    # Left-handed coordinates count v backwards.
+    handed = np.where(dot(np.cross(du, dv), normal) < 0.0, -1.0, 1.0)
+    yarns = np.stack([np.ones_like(handed), handed], axis=-1) * cloth.yarns
+    jacobian = np.stack([found["duv_dx"], found["duv_dy"]], axis=-1) * yarns[..., None]
+    _refuse_shear(loaded, key, du, dv)
+
+    turn = _turn(cloth)
+    x = unit(du - dot(du, normal)[:, None] * normal)
+    y = np.cross(normal, x)
+    across = np.einsum("ij,njk->nik", turn, np.stack([x, y], axis=1))
+    frame = np.concatenate([across, normal[:, None]], axis=1)
+    tangents = np.stack([du, dv], axis=-1) / cloth.yarns
+    return Places(found["position"], outward, frame, (found["uv"] * yarns) @ turn.T, turn @ jacobian, tangents)
+
+
+def _turn(cloth: Cloth) -> Floats:
+    """Return the matrix from u, v in yarns to the coordinates along weft and warp."""
+    cosine, sine = math.cos(math.radians(cloth.turn)), math.sin(math.radians(cloth.turn))
+    return np.array([[cosine, sine], [-sine, cosine]])
+
+
+def tilted(wo: Floats, side: Floats, largest_angle: float) -> Floats:
+    """Lift directions that are more grazing than allowed, or on the wrong side, up to the limit."""
+    least = math.cos(math.radians(largest_angle))
+    grazing = side * wo[:, 2] < least
+    flat = wo[grazing, :2] / np.linalg.norm(wo[grazing, :2], axis=-1, keepdims=True)
+    lifted = wo.copy()
+    lifted[grazing, :2], lifted[grazing, 2] = math.sqrt(1.0 - least**2) * flat, least * side[grazing]
+    return lifted
+
+
+def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
+    """Return the curvature along the view ray in 1/yarn spacings."""
+    # A viewer on the normal looks along x.
+    flat = np.where(np.linalg.norm(wo[:, :2], axis=-1, keepdims=True) > 1e-6, wo[:, :2], [1.0, 0.0])
+    tangent = unit(np.einsum("ni,nij->nj", flat, places.frame[:, :2]))
+    yarns = np.linalg.norm(np.einsum("nij,nj->ni", np.linalg.pinv(places.tangents), tangent), axis=-1)
+    spacing = 1.0 / np.maximum(yarns, 1e-12)
+    step, normal = _STEP * spacing[:, None], places.frame[:, 2]
+    moves, turns = [], []
+    for sign in (1.0, -1.0):
+        start = places.position + step * (sign * tangent + normal)
+        hits = first_hits(loaded.mi, loaded.dressed, start, -normal)
+        # What is missed, or lies on another surface, stays where it is.
+        near = ((hits.distance < 3.0 * step[:, 0]) & (dot(hits.normal, normal) > 0.0))[:, None]
+        moves.append(np.where(near, sign * step * tangent, 0.0))
+        turns.append(np.where(near, hits.normal, normal))
+    moved = dot(moves[0] - moves[1], tangent)
+    bend = dot(turns[0] - turns[1], tangent) / np.where(moved > 0.0, moved, 1.0)
+    kappa = np.where(bend * spacing > _FLAT, bend * spacing, 0.0)
+    return np.asarray(np.minimum(kappa, STEEPEST_CURVATURE))
+
+
+def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:
+    """Refuse cloth whose coordinates are sheared more than allowed."""
+    where = f"scene {loaded.scene.name}"
+    cosine = np.abs(dot(unit(du), unit(dv)))
+    shear = math.degrees(math.asin(min(float(cosine.max(initial=0.0)), 1.0)))
+    if shear > loaded.options.largest_shear:
+        raise BadInput(
+            where, f"fabric_{key}", f"sheared by {shear:.1f} degrees", f"at most {loaded.options.largest_shear:g}"
+        )
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Return the dot products of N pairs of vectors, (N,)."""
+    return np.asarray(np.einsum("ni,ni->n", a, b))
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return the unit vectors along N vectors, (N, 3); 0 for 0."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

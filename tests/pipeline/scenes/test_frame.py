@@ -1,0 +1,234 @@
+"""G-buffers of Mitsuba scenes against closed forms: plane, cylinder, spheres, shadows and lights."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.scenes.curvature import euler_curvature
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.shipped.sphere import SPHERE
+from pipeline.scenes.variant import llvm_works
+from pipeline.truth.query import faults
+
+SCALAR = SceneOptions(variant="scalar_rgb", environment_directions=64)
+SIZE = (64, 48)
+WEARS = {"type": "diffuse", "id": "fabric_denim"}
+SUN = {"type": "directional", "direction": [0.3, 0.2, -1.0]}
+
+
+def shot(parts, eye=(0.0, -3.0, 2.0), target=(0.0, 0.0, 0.0), camera=None, cloth=None, frame=0.0, options=SCALAR):
+    """Return the G-buffer of the cloth `denim` in a scene of some parts, given as a function of mitsuba."""
+
+    def build(mi):
+        look = mi.ScalarTransform4f().look_at(list(eye), list(target), [0, 0, 1])
+        sensor = {"type": "perspective", "fov": 40, "fov_axis": "x", "to_world": look}
+        film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1]}
+        return {"type": "scene", "camera": {**(camera(mi) if camera else sensor), "film": film}, **parts(mi)}
+
+    scene = Scene(name="test", source=build, cloths={"denim": cloth or Cloth()}, step=(0.1, 0.0, 0.0))
+    return render(load(scene, options), frame).gbuffers["denim"]
+
+
+def floor(mi):
+    """Return a floor 8 wide and 4 deep around the origin, lit by the sun."""
+    return {"floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([4, 2, 1]), "b": WEARS}, "s": SUN}
+
+
+def rays(x, y, eye=(0.0, -3.0, 2.0)):
+    """Return the directions of the test camera's rays at positions in pixels, y downwards, by its definition."""
+    forward = -np.array(eye) / np.linalg.norm(eye)
+    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
+    up = np.cross(right, forward)
+    half = math.tan(math.radians(20))
+    across, down = (x / SIZE[0] - 0.5) * 2 * half, (y - SIZE[1] / 2) / SIZE[0] * 2 * half
+    return forward + across[..., None] * right - down[..., None] * up
+
+
+def on_floor(x, y):
+    """Return where the rays meet z = 0."""
+    eye, ray = np.array([0.0, -3.0, 2.0]), rays(x, y)
+    return eye + ray * (-eye[2] / ray[..., 2])[..., None]
+
+
+def pixels(gbuffer):
+    row, column = np.divmod(gbuffer.pixel, gbuffer.mask.shape[1])
+    return column + 0.5, row + 0.5
+
+
+def test_a_plane_agrees_with_its_rays():
+    """Positions, directions and footprints of a floor, the ellipse by differences of the closed form.
+
+    Mitsuba reckons in single precision: 1e-5 of the floor's size for positions, 1e-3 for its differences over a pixel
+    to the right and one downwards; in this small picture the far edge's derivative differs from those by 7 %.
+    """
+    turn, yarns = 30.0, (80.0, 60.0)
+    gbuffer = shot(floor, cloth=Cloth(yarns=yarns, turn=turn))
+    x, y = pixels(gbuffer)
+    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    matrix = np.array([[cosine, sine], [-sine, cosine]]) @ np.diag([yarns[0] / 8, yarns[1] / 4])
+
+    def uv(x, y):
+        return (on_floor(x, y)[..., :2] + [4, 2]) @ matrix.T
+
+    assert len(gbuffer.pixel) > 1500
+    np.testing.assert_allclose(np.stack([gbuffer.u, gbuffer.v], -1), uv(x, y), atol=1e-5 * 80)
+    wo = np.array([0.0, -3.0, 2.0]) - on_floor(x, y)
+    wo /= np.linalg.norm(wo, axis=-1, keepdims=True)
+    frame = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    np.testing.assert_allclose(gbuffer.wo, wo @ frame.T, atol=1e-5)
+    sun = -np.array(SUN["direction"]) / np.linalg.norm(SUN["direction"])
+    np.testing.assert_allclose(gbuffer.wi, np.tile(frame @ sun, (len(x), 1)), atol=1e-5)
+    assert gbuffer.irradiance == pytest.approx(1.0)
+    assert (gbuffer.curvature == 0).all()
+
+    # The covariance of the ellipse is pixel_sigma^2 J J^T, whatever its axes are called.
+    axes = np.stack([np.cos(gbuffer.angle), np.sin(gbuffer.angle)], axis=-1)
+    across = np.stack([-axes[:, 1], axes[:, 0]], axis=-1)
+    found = sum(
+        (s**2)[:, None, None] * a[:, :, None] * a[:, None, :]
+        for s, a in ((gbuffer.sigma, axes), (gbuffer.sigma_minor, across))
+    )
+    centre, h = uv(x, y), 1e-3
+    step = np.stack([uv(x + 1, y) - centre, uv(x, y + 1) - centre], axis=-1)
+    slope = np.stack([uv(x + h, y) - uv(x - h, y), uv(x, y + h) - uv(x, y - h)], axis=-1) / (2 * h)
+    for jacobian, allowed in ((step, 1e-3), (slope, 0.07)):
+        expected = 0.25 * jacobian @ np.swapaxes(jacobian, 1, 2)
+        size = np.abs(expected).max(axis=(1, 2))
+        assert (np.abs(found - expected).max(axis=(1, 2)) / size).max() < allowed
+    assert (gbuffer.sigma >= gbuffer.sigma_minor).all()
+
+
+@pytest.mark.parametrize(("turn", "askew"), [(0.0, 0.0), (0.0, 0.8), (35.0, 0.8), (0.0, 12.0)])
+def test_a_cylinders_curvature_is_eulers(turn, askew):
+    """Spacing over radius straight across, 0 along the axis, Euler's in between; parallel rays from askew."""
+    radius, spacing = 0.7, 0.05
+    towards = np.array([askew, -1.0, 0.6]) / np.linalg.norm([askew, -1.0, 0.6])
+
+    def camera(mi):
+        look = mi.ScalarTransform4f().look_at((3 * towards).tolist(), [0, 0, 0], [0, 0, 1])
+        return {"type": "orthographic", "to_world": look}
+
+    def parts(mi):
+        tube = {"type": "cylinder", "p0": [-2, 0, 0], "p1": [2, 0, 0], "radius": radius}
+        return {"tube": {**tube, "b": WEARS}, "s": SUN}
+
+    cloth = Cloth(yarns=(2 * math.pi * radius / spacing, 4 / spacing), turn=turn)
+    gbuffer = shot(parts, camera=camera, cloth=cloth)
+    # In the local frame the circumference runs along u, which the turn takes to (cos, -sin).
+    along = np.arctan2(gbuffer.wo[:, 1], gbuffer.wo[:, 0]) + math.radians(turn)
+    sure = (gbuffer.wo[:, 2] > 0.04) & (gbuffer.wo[:, 2] < 0.999)
+    expected = euler_curvature(np.float64(spacing / radius), np.float64(0), along)
+    assert sure.sum() > 400
+    if askew == 0.0:
+        assert expected[sure] == pytest.approx(spacing / radius, rel=1e-4)
+    # Less than 1e-4 counts as flat.
+    assert gbuffer.curvature[sure & (expected < 0.9e-4)] == pytest.approx(0.0)
+    sure &= expected > 1.1e-4
+    np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * spacing / radius)
+
+
+def test_a_mesh_sphere_has_the_curvature_of_its_radius():
+    """Interpolated normals of a 320 by 320 mesh: 1 % allowed. The conformal spacing is 4 / (4 + u^2 + v^2) / 24."""
+    gbuffer = render(load(SPHERE, SCALAR), size=SIZE).gbuffers["silk_charmeuse"]
+    inner = gbuffer.wo[:, 2] > 0.1
+    square = (np.square(gbuffer.u) + np.square(gbuffer.v)) / 24**2
+    np.testing.assert_allclose(gbuffer.curvature[inner], 4 / (4 + square[inner]) / 24, rtol=0.01)
+
+
+def test_a_hollow_is_flat_and_so_is_the_back():
+    def parts(mi):
+        return {
+            "dome": {"type": "cylinder", "p0": [-1, 0, 0], "p1": [1, 0, 0], "flip_normals": True, "b": WEARS},
+            "s": SUN,
+        }
+
+    gbuffer = shot(parts, eye=(-0.01, -4, 1.5), cloth=Cloth(yarns=(300, 300)))
+    assert set(np.sign(gbuffer.wo[:, 2])) == {-1.0, 1.0} or (gbuffer.wo[:, 2] < 0).all()
+    assert (gbuffer.curvature == 0).all()
+
+
+def test_left_handed_coordinates_show_the_front_and_no_mirror_image():
+    """Mitsuba's sphere counts v from the pole downwards, so v is counted backwards: u to the right, v upwards."""
+
+    def parts(mi):
+        return {"ball": {"type": "sphere", "b": WEARS}, "s": SUN}
+
+    gbuffer = shot(parts, eye=(0, -4, 0), cloth=Cloth(yarns=(200, 100)))
+    assert (gbuffer.wo[:, 2] > 0).all()
+    plane = np.full((2, SIZE[1], SIZE[0]), np.nan)
+    plane[:, gbuffer.mask] = gbuffer.u, gbuffer.v
+    centre = plane[:, 22:27, 30:35]
+    assert (np.diff(centre[0], axis=1) > 0).all() and (np.diff(centre[1], axis=0) < 0).all()
+    assert np.linalg.norm(gbuffer.wi, axis=1) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_blocker_throws_its_shadow():
+    """A square of side 1 at height 1/2 under a slanting sun hides the square of floor behind it, to the pixel."""
+
+    def parts(mi):
+        board = mi.ScalarTransform4f().translate([0.2, 0.3, 0.5]).scale(0.5)
+        return {**floor(mi), "board": {"type": "rectangle", "to_world": board}}
+
+    gbuffer = shot(parts)
+    x, y = pixels(gbuffer)
+    place = on_floor(x, y)[:, :2]
+    # A ray from the floor to the sun crosses z = 1/2 here.
+    crossing = place + 0.5 * -np.array(SUN["direction"][:2])
+    distance = np.abs(crossing - [0.2, 0.3]).max(axis=1) - 0.5
+    lit = np.zeros(len(place), bool)
+    lit[gbuffer.place] = True
+    clear = np.abs(distance) > 1e-3
+    assert (lit[clear] == (distance > 0)[clear]).all()
+    assert 50 < (~lit).sum() < len(lit) / 2
+
+
+def test_point_lights_fall_off_with_the_square():
+    def parts(mi):
+        lamp = {"type": "point", "position": [0.5, 0, 2], "intensity": {"type": "rgb", "value": [1, 2, 3]}}
+        return {**floor(mi), "s": lamp}
+
+    gbuffer = shot(parts)
+    x, y = pixels(gbuffer)
+    towards = np.array([0.5, 0, 2]) - on_floor(x, y)[gbuffer.place]
+    square = np.square(towards).sum(axis=1)
+    np.testing.assert_allclose(gbuffer.irradiance, np.outer(1 / square, [1, 2, 3]), rtol=1e-4)
+    np.testing.assert_allclose(gbuffer.wi, towards / np.sqrt(square)[:, None], atol=1e-5)
+
+
+def test_an_even_sky_lights_both_sides_of_a_sheet_with_pi():
+    """Irradiance of a hemisphere of radiance 1 is pi; the lattice of 64 directions is allowed 2 %."""
+    gbuffer = shot(lambda mi: {**floor(mi), "s": {"type": "constant", "radiance": 1.0}})
+    cosine = gbuffer.wi[:, 2:] * gbuffer.irradiance
+    for side in (1, -1):
+        total = np.zeros(len(gbuffer.pixel))
+        chosen = side * gbuffer.wi[:, 2] > 0
+        np.add.at(total, gbuffer.place[chosen], np.abs(cosine[chosen, 0]))
+        assert total == pytest.approx(math.pi, rel=0.02)
+    assert (gbuffer.transmitted == (gbuffer.wi[:, 2] < 0)).all()
+    assert not faults(gbuffer.queries((4, 4)))
+
+
+def test_frames_move_the_camera_to_the_right():
+    """A camera 0.4 further right sees a place of the floor that lies 0.4 further along x."""
+    still, moved = shot(floor), shot(floor, frame=4.0)
+    shared = np.intersect1d(still.pixel, moved.pixel)
+    u = [gbuffer.u[np.searchsorted(gbuffer.pixel, shared)] for gbuffer in (still, moved)]
+    assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
+
+
+@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+def test_variants_agree():
+    one, other = (
+        render(load(SPHERE, o), size=SIZE).gbuffers["silk_charmeuse"]
+        for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
+    )
+    assert (one.pixel == other.pixel).all()
+    for name in ("u", "v", "sigma", "sigma_minor", "wo", "curvature"):
+        a, b = getattr(one, name), getattr(other, name)
+        # Places on the edge of two triangles may fall to either.
+        assert np.isclose(a, b, rtol=1e-3, atol=1e-4).mean() > 0.99, name
+    assert abs(len(one.place) - len(other.place)) < 0.002 * len(one.place)

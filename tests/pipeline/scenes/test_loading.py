@@ -1,0 +1,116 @@
+"""What is wrong with a scene is said in one sentence."""
+
+import numpy as np
+import pytest
+
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.scene import Cloth, Scene
+from weaves.errors import BadInput
+
+OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, environment_samples=1)
+CAMERA = """<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/>
+</transform><film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film></sensor>
+"""
+SUN = '<emitter type="directional"><vector name="direction" x="0" y="0" z="-1"/></emitter>'
+BALL = '<shape type="sphere"><bsdf type="diffuse" id="fabric_denim"/></shape>'
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+MAP = '<texture type="bitmap" name="reflectance"><string name="filename" value="lost.png"/></texture>'
+
+BROKEN = {
+    "<scene": "Error parsing",
+    BALL + CAMERA: "a scene needs a light",
+    BALL + SUN: "a scene needs a camera",
+    BALL + SUN + '<sensor type="thinlens"><float name="aperture_radius" value="0.1"/></sensor>': "must be perspective",
+    '<shape type="sphere"/>' + SUN + CAMERA: 'an id such as "fabric_denim"',
+    BALL.replace("denim", "denin") + SUN + CAMERA: "did you mean 'denim'?",
+    BALL.replace("sphere", "spher") + SUN + CAMERA: '"spher" not found',
+    BALL + SUN + CAMERA + '<emitter type="spot"/>': "lights must be directional, point, constant or envmap",
+    BALL.replace("/></shape>", f">{MAP}</bsdf></shape>") + SUN + CAMERA: "lost.png",
+    '<shape type="ply"><string name="filename" value="lost.ply"/></shape>' + BALL + SUN + CAMERA: "lost.ply",
+    '<shape type="obj"><string name="filename" value="bare.obj"/><bsdf type="diffuse" id="fabric_denim"/></shape>'
+    + SUN
+    + CAMERA: "needs uv coordinates",
+}
+
+
+def written(folder, body):
+    (folder / "bare.obj").write_text(TRIANGLE)
+    path = folder / "scene.xml"
+    path.write_text(f'<scene version="3.0.0">{body}</scene>')
+    return path
+
+
+def refused(call):
+    """Return the one sentence of a refusal."""
+    with pytest.raises(BadInput) as caught:
+        call()
+    sentence = str(caught.value)
+    assert "\n" not in sentence and len(sentence) < 400
+    return sentence
+
+
+@pytest.mark.parametrize("body", BROKEN, ids=range(len(BROKEN)))
+def test_every_fault_is_one_sentence(body, tmp_path):
+    sentence = refused(lambda: load(load_scene(written(tmp_path, body)), OPTIONS))
+    assert BROKEN[body] in sentence
+    assert "scene.xml" in sentence or "denin" in sentence
+    assert ".cpp" not in sentence
+
+
+def test_an_xml_scene_is_worn_and_lit(tmp_path):
+    loaded = load(load_scene(written(tmp_path, BALL + SUN + CAMERA)), OPTIONS)
+    gbuffer = render(loaded).gbuffers["denim"]
+    assert gbuffer.mask.shape == (12, 16)
+    assert 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
+    assert loaded.cloths["denim"][1].name == "denim"
+
+
+def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
+    written(tmp_path, BALL.replace("denim", "trousers") + SUN + CAMERA)
+    path = tmp_path / "scene.toml"
+    path.write_text('name = "a"\nsource = "scene.xml"\nframes = 30\n[cloths.trousers]\nfabric = "denim"\nturn = 5.0\n')
+    scene = load_scene(path)
+    assert (scene.frames, scene.cloths["trousers"].turn) == (30, 5.0)
+    assert load(scene, OPTIONS).cloths["trousers"][1].name == "denim"
+    path.write_text(path.read_text().replace("turn", "trun"))
+    assert "trun" in refused(lambda: load_scene(path))
+
+
+def test_unknown_scenes_and_cloths_are_named(tmp_path):
+    assert "did you mean 'table'?" in refused(lambda: load_scene("tabel"))
+    assert "no such file" in refused(lambda: load_scene(tmp_path / "no.toml"))
+    assert "does not exist" in refused(lambda: load(load_scene(tmp_path / "no.xml"), OPTIONS))
+    path = written(tmp_path, BALL + SUN + CAMERA)
+    scene = Scene(name="a", source=path, cloths={"denim": Cloth(), "voile": Cloth()})
+    assert "cloths.voile" in refused(lambda: load(scene, OPTIONS))
+
+
+@pytest.mark.parametrize(("x", "inside"), [(0.0, True), (0.999, True), (1.001, True), (1.3, False)])
+def test_a_camera_inside_the_cloth_is_refused(x, inside, tmp_path):
+    """Within the ball, or within a yarn spacing (2 pi / 100 of the radius) of it."""
+    path = written(tmp_path, BALL + SUN + CAMERA.replace("0,0,4", f"{x},0.01,0").replace("0,0,0", "-9,0,0"))
+    loaded = load(load_scene(path), OPTIONS)
+    if inside:
+        assert "inside the cloth" in refused(lambda: render(loaded))
+    else:
+        assert len(render(loaded).gbuffers["denim"].pixel)
+
+
+def test_shear_is_refused_where_it_is_asked_to_be(tmp_path):
+    body = TRIANGLE.replace("f 1 2 3", "vt 0 0\nvt 1 0.5\nvt 0 1\nf 1/1 2/2 3/3")
+    path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
+    (tmp_path / "bare.obj").write_text(body)
+    loaded = load(load_scene(path), OPTIONS)
+    assert len(render(loaded).gbuffers["denim"].pixel)
+    strict = OPTIONS.model_copy(update={"largest_shear": 10.0})
+    sentence = refused(lambda: render(load(load_scene(path), strict)))
+    assert f"sheared by {np.degrees(np.arctan(0.5)):.1f} degrees" in sentence
+
+
+def test_uv_that_do_not_vary_are_refused(tmp_path):
+    path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
+    (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1"))
+    assert "needs uv coordinates" in refused(lambda: load(load_scene(path), OPTIONS))

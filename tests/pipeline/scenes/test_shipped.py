@@ -1,0 +1,78 @@
+"""The scenes that come with the package: what they show, and that their frames move by less than a pixel."""
+
+import numpy as np
+import pytest
+
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.shipped import SHIPPED
+from pipeline.truth.query import faults
+
+OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, largest_sigma=1e6)
+WIDTH, HEIGHT = 64, 48
+FULL = 4  # the films are so many times as wide
+
+
+@pytest.fixture(scope="module", params=SHIPPED)
+def shown(request):
+    loaded = load(SHIPPED[request.param], OPTIONS)
+    assert loaded.camera.size == (FULL * WIDTH, FULL * HEIGHT)
+    return loaded, *(render(loaded, frame, (WIDTH, HEIGHT)) for frame in (0.0, 1.0, 23.0))
+
+
+def test_every_fabric_is_seen_and_lit_in_legal_queries(shown):
+    loaded, *frames = shown
+    for frame in frames:
+        for key, (_, fabric) in loaded.cloths.items():
+            gbuffer = frame.gbuffers[key]
+            assert len(gbuffer.pixel) > 20 and gbuffer.lit.sum() > 0.5 * len(gbuffer.pixel)
+            assert not faults(gbuffer.queries(fabric.weave.repeat))
+            assert not faults(gbuffer.looks(fabric.weave.repeat))
+            assert (gbuffer.irradiance >= 0).all() and np.isfinite(gbuffer.irradiance).all()
+        assert np.isfinite(frame.backdrop).all() and (frame.backdrop >= 0).all()
+
+
+def test_frames_move_by_less_than_a_pixel(shown):
+    """A pixel's new place, measured in the ellipse of its old footprint, in pixels of the full picture.
+
+    |J^-1 d| is the length of d along the ellipse's axes over its standard deviations, times pixel_sigma. The median
+    bounds the motion; pixels that pass an edge see another fold.
+    """
+    loaded, first, second, _ = shown
+    assert loaded.scene.frames >= 24
+    for key in loaded.cloths:
+        old, new = first.gbuffers[key], second.gbuffers[key]
+        shared, a, b = np.intersect1d(old.pixel, new.pixel, return_indices=True)
+        d = np.stack([new.u[b] - old.u[a], new.v[b] - old.v[a]], axis=-1)
+        cosine, sine = np.cos(old.angle[a]), np.sin(old.angle[a])
+        along, across = d[:, 0] * cosine + d[:, 1] * sine, d[:, 1] * cosine - d[:, 0] * sine
+        moved = FULL * OPTIONS.pixel_sigma * np.hypot(along / old.sigma[a], across / old.sigma_minor[a])
+        assert len(shared) > 0.8 * len(old.pixel)
+        assert 0.05 < np.median(moved) < 1.0
+        assert np.quantile(moved, 0.9) < 1.0
+
+
+def test_only_the_curtain_is_lit_from_behind_by_the_sun(shown):
+    loaded, first, *_ = shown
+    sun = max(light.power.max() for light in loaded.lights)
+    for gbuffer in first.gbuffers.values():
+        strong = gbuffer.transmitted & (gbuffer.irradiance.max(axis=1) > 0.9 * sun)
+        assert (strong.sum() > 0.3 * len(gbuffer.pixel)) == (loaded.scene.name == "curtain")
+
+
+def test_yarns_are_not_stretched_in_sheets(shown):
+    """Seen head-on a footprint is round: its axes differ by the cosine of the view at most."""
+    _, first, *_ = shown
+    for gbuffer in first.gbuffers.values():
+        facing = np.abs(gbuffer.wo[:, 2]) > 0.9
+        ratio = gbuffer.sigma_minor[facing] / gbuffer.sigma[facing]
+        assert (ratio > 0.85).all()
+
+
+def test_the_roll_and_the_sphere_are_curved_and_the_plane_is_not(shown):
+    loaded, first, *_ = shown
+    for key, gbuffer in first.gbuffers.items():
+        largest = {"plane": 0.0, "roll": 2 * np.pi / 128, "sphere": 1 / 24}.get(loaded.scene.name)
+        if largest is not None:
+            assert gbuffer.curvature.max() == pytest.approx(largest, rel=0.02, abs=1e-6), key

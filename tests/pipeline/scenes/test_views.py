@@ -1,0 +1,158 @@
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.scenes.options import ViewOptions
+from pipeline.scenes.views import view
+
+FLAT = ViewOptions(turn=0.0)
+
+
+def spread(gbuffer, column):
+    """Lay a column over the picture, NaN where nothing is lit."""
+    picture = np.full((*gbuffer.lit.shape, *column.shape[1:]), np.nan)
+    picture[gbuffer.lit] = column
+    return picture
+
+
+@pytest.mark.parametrize("scene", ["sphere", "plane"])
+def test_directions_are_unit_and_in_front(scene):
+    gbuffer = view(scene, 64, 48)
+    for directions in (gbuffer.wi, gbuffer.wo):
+        assert np.linalg.norm(directions, axis=1) == pytest.approx(1.0, abs=1e-12)
+        assert (directions[:, 2] > 0).all()
+    assert (gbuffer.wo[:, 2] >= math.cos(math.radians(ViewOptions().largest_angle))).all()
+    assert (gbuffer.sigma > 0).all()
+    assert not (gbuffer.lit & ~gbuffer.mask).any()
+
+
+def test_sphere_has_the_asked_scale_at_its_centre():
+    """At the centre surface and picture are parallel: neighbouring pixels are 1/6 yarn apart, sigma = 1/12."""
+    gbuffer = view("sphere", 129, 129, options=FLAT)
+    u, v, sigma = (spread(gbuffer, column) for column in (gbuffer.u, gbuffer.v, gbuffer.sigma))
+    assert u[64, 65] - u[64, 63] == pytest.approx(2 / 6, rel=1e-3)
+    assert v[63, 64] - v[65, 64] == pytest.approx(2 / 6, rel=1e-3)  # rows count downwards, v upwards
+    assert sigma[64, 64] == pytest.approx(0.5 / 6, rel=1e-3)
+
+
+def test_sphere_light_and_view_at_the_centre():
+    """There the local frame is the camera's: wo = z, wi = the light; swapping them is seen."""
+    gbuffer = view("sphere", 65, 65, options=FLAT)
+    wi, wo = spread(gbuffer, gbuffer.wi)[32, 32], spread(gbuffer, gbuffer.wo)[32, 32]
+    polar, azimuth = np.radians(FLAT.sphere_light)
+    expected = [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
+    assert wo == pytest.approx([0, 0, 1], abs=1e-12)
+    assert wi == pytest.approx(expected, abs=1e-12)
+
+
+def test_turn_rotates_light_and_coordinates_together():
+    """With the weft turned by 90 degrees, x of the local frame points up: (x, y) reads (y, -x) of before."""
+    straight = view("sphere", 65, 65, options=FLAT)
+    turned = view("sphere", 65, 65, options=ViewOptions(turn=90.0))
+    assert turned.wi == pytest.approx(np.stack([straight.wi[:, 1], -straight.wi[:, 0], straight.wi[:, 2]], 1))
+    assert turned.u == pytest.approx(straight.v)
+    assert turned.v == pytest.approx(-straight.u)
+    assert turned.sigma == pytest.approx(straight.sigma)
+
+
+@pytest.mark.parametrize("scene", ["sphere", "plane"])
+@pytest.mark.parametrize("footprint", ["geometric_mean", "major"])
+def test_footprint_is_the_finite_difference_of_the_coordinates(scene, footprint):
+    """Oracle: J from central differences of u, v between neighbouring pixels, singular values by numpy.
+
+    Differences over two pixels bend away from the derivative by the square of the pixel: 3 % allowed at this size.
+    """
+    gbuffer = view(scene, 160, 120, options=ViewOptions(footprint=footprint, largest_sigma=1e6))
+    uv, sigma = spread(gbuffer, np.stack([gbuffer.u, gbuffer.v], -1)), spread(gbuffer, gbuffer.sigma)
+    right = 0.5 * (uv[1:-1, 2:] - uv[1:-1, :-2])
+    down = 0.5 * (uv[2:, 1:-1] - uv[:-2, 1:-1])
+    jacobian = np.stack([right, down], axis=-1)
+    inner = np.isfinite(jacobian).all(axis=(2, 3))
+    inner &= spread(gbuffer, gbuffer.wo[:, 2])[1:-1, 1:-1] > 0.35
+    singular = np.linalg.svd(jacobian[inner], compute_uv=False)
+    expected = singular[:, 0] if footprint == "major" else np.sqrt(singular.prod(axis=1))
+    assert inner.sum() > 3000
+    assert sigma[1:-1, 1:-1][inner] == pytest.approx(0.5 * expected, rel=0.03)
+
+
+def test_sphere_is_conformal():
+    """A patch is a scaled copy of the flat cloth: without foreshortening both singular values of d(uv)/dp are equal.
+
+    Seen through the geometry alone: |du| and |dv| of equal steps on the surface, and their right angle.
+    """
+    gbuffer = view("sphere", 200, 200, options=ViewOptions(turn=17.0))
+    uv, wo = spread(gbuffer, np.stack([gbuffer.u, gbuffer.v], -1)), spread(gbuffer, gbuffer.wo)
+    right = 0.5 * (uv[1:-1, 2:] - uv[1:-1, :-2])
+    down = 0.5 * (uv[2:, 1:-1] - uv[:-2, 1:-1])
+    jacobian = np.stack([right, down], axis=-1)
+    inner = np.isfinite(jacobian).all(axis=(2, 3))
+    cosine = wo[1:-1, 1:-1, 2]
+    inner &= cosine > 0.3
+    singular = np.linalg.svd(jacobian[inner], compute_uv=False)
+    # Of a conformal map only the projection is left: the axes of a pixel differ by the cosine of the view.
+    assert singular[:, 1] / singular[:, 0] == pytest.approx(cosine[inner], rel=0.04)
+
+
+def test_plane_goes_from_resolved_yarns_to_many_repeats():
+    options = ViewOptions(turn=0.0, horizon=0.1, largest_sigma=1e6, largest_angle=89.9)
+    gbuffer = view("plane", 320, 224, options=options)
+    u, sigma = spread(gbuffer, gbuffer.u), spread(gbuffer, gbuffer.sigma)
+    assert u[-1, 1:] - u[-1, :-1] == pytest.approx(1 / 6)
+    assert sigma[-1].max() < 0.2
+    top = np.flatnonzero(gbuffer.lit.any(axis=1))[0]
+    assert abs(top - 0.1 * 224) <= 1
+    assert np.nanmin(sigma[top]) > 100
+    assert view("plane", 320, 224, options=ViewOptions(largest_sigma=4.0)).sigma.max() == 4.0
+
+
+def test_plane_camera_sees_along_the_ray():
+    """Oracle: the angle of a pixel's view below the horizontal is pitch plus its angle in the picture."""
+    gbuffer = view("plane", 101, 81, options=ViewOptions(turn=0.0, horizon=0.1))
+    wo = spread(gbuffer, gbuffer.wo)
+    focal = 50.5 / math.tan(math.radians(25.0))
+    pitch = math.atan(0.4 * 81 / focal)
+    for row in (30, 40, 80):
+        below = pitch + math.atan((row + 0.5 - 40.5) / focal)
+        assert wo[row, 50] == pytest.approx([0, -math.cos(below), math.sin(below)], abs=1e-12)
+
+
+def test_plane_ends_with_a_whole_row():
+    gbuffer = view("plane", 96, 72, options=ViewOptions(largest_angle=80.0))
+    assert (gbuffer.mask.any(axis=1) == gbuffer.mask.all(axis=1)).all()
+    assert gbuffer.wo[:, 2].min() >= math.cos(math.radians(80.0))
+
+
+@pytest.mark.parametrize("scene", ["sphere", "plane"])
+def test_frames_slide_the_cloth_by_less_than_a_pixel(scene):
+    still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
+    slide = 2 * FLAT.step / 6
+    heading = math.radians(FLAT.heading)
+    assert FLAT.step < 1
+    assert still.u - moved.u == pytest.approx(np.full(still.u.shape, slide * math.cos(heading)))
+    assert still.v - moved.v == pytest.approx(np.full(still.v.shape, slide * math.sin(heading)))
+    assert (still.lit == moved.lit).all()
+    assert (still.wi == moved.wi).all()
+
+
+def test_queries_are_reduced_in_float64_first():
+    """Near the horizon, 1e5 yarns away, float32 would have lost the position within the repeat."""
+    gbuffer = view("plane", 640, 480, options=ViewOptions(plane_pixels_per_yarn=0.01, largest_angle=89.9))
+    assert np.abs(gbuffer.v).max() > 1e5
+    queries = gbuffer.queries((3, 8))
+    assert queries.u.dtype == queries.wi.dtype == np.float32
+    assert ((queries.u >= 0) & (queries.u < 3)).all()
+    assert ((queries.v >= 0) & (queries.v < 8)).all()
+    difference = np.abs(queries.v - np.mod(gbuffer.v, 8))
+    assert np.minimum(difference, 8 - difference).max() < 1e-6
+
+
+def test_what_rounds_up_to_the_repeat_becomes_its_start():
+    gbuffer = view("sphere", 16, 16)
+    edge = gbuffer.__class__(**{**gbuffer.__dict__, "u": np.full_like(gbuffer.u, -1e-12)})
+    assert (edge.queries((4, 4)).u == 0).all()
+
+
+def test_unlit_pixels_are_cloth_without_queries():
+    gbuffer = view("sphere", 64, 64, options=ViewOptions(sphere_light=(80.0, 0.0)))
+    assert gbuffer.lit.sum() == len(gbuffer.u) < gbuffer.mask.sum()
