@@ -1,1 +1,1 @@
-"""Views of cloth as queries, and queries as pictures."""
+"""Views of cloth and Mitsuba scenes as queries, and queries as pictures."""

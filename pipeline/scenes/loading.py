@@ -15,7 +15,7 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.variant import mitsuba
 from weaves.errors import BadInput, nearest
-from weaves.fabric import Fabric, load_fabric
+from weaves.fabric import Fabric, load_fabric, preset_names
 
 Floats = npt.NDArray[np.float64]
 
@@ -132,7 +132,9 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         if key.startswith(PREFIX):
             worn.setdefault(key.removeprefix(PREFIX), []).append(index)
             if shape.is_mesh() and not _has_uv(mi, shape):
-                raise BadInput(where, "shape", shape.id(), "a shape that wears a fabric needs uv coordinates")
+                raise BadInput(
+                    where, "shape", shape.id() or shape.class_name(), "a shape that wears a fabric needs uv coordinates"
+                )
     if not worn:
         allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
         raise BadInput(where, "", "no fabric", allowed)
@@ -140,7 +142,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         if key not in worn:
             raise BadInput(where, f"cloths.{key}", key, f"no shape has the bsdf {PREFIX + key!r}; {nearest(key, worn)}")
     described = {key: scene.cloths.get(key, Cloth()) for key in worn}
-    cloths = {key: (cloth, load_fabric(cloth.fabric or key)) for key, cloth in described.items()}
+    cloths = {key: (cloth, _fabric(where, key, cloth)) for key, cloth in described.items()}
     dressed = [shapes[index] for indices in worn.values() for index in indices]
     lights = lights_of(mi, world, where, options)
     rest = [*(shape for shape in shapes if shape not in dressed), *world.emitters()]
@@ -156,6 +158,13 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         lights,
         _camera(mi, world, where),
     )
+
+
+def _fabric(where: str, key: str, cloth: Cloth) -> Fabric:
+    if not cloth.fabric and key not in (known := preset_names()):
+        allowed = f"a bsdf's id must name a preset or a cloth of the scene; {nearest(key, known)}"
+        raise BadInput(where, "bsdf", PREFIX + key, allowed)
+    return load_fabric(cloth.fabric or key)
 
 
 def _scene_of(mi: Any, parts: list[Any]) -> Any:

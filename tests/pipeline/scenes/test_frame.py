@@ -146,8 +146,9 @@ def test_a_hollow_is_flat_and_so_is_the_back():
             "s": SUN,
         }
 
-    gbuffer = shot(parts, eye=(-0.01, -4, 1.5), cloth=Cloth(yarns=(300, 300)))
-    assert set(np.sign(gbuffer.wo[:, 2])) == {-1.0, 1.0} or (gbuffer.wo[:, 2] < 0).all()
+    gbuffer = shot(parts, eye=(-4, -1.5, 1.5), cloth=Cloth(yarns=(300, 300)))
+    # Through the open end the inside is seen, which is the front; from outside, the back.
+    assert (gbuffer.wo[:, 2] > 0).sum() > 100 and (gbuffer.wo[:, 2] < 0).sum() > 100
     assert (gbuffer.curvature == 0).all()
 
 
