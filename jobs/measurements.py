@@ -103,7 +103,7 @@ def _subject(recipe: Recipe, fabric: Fabric, role: str, parts: Sequence[Shard]) 
         )
 
     pictures: dict[str, Task] = {}
-    for scene in bench.scenes:
+    for scene in bench.views:
         width, height = size = bench.size(scene)
         asked: dict[str, Any] = {
             "scene": scene,
@@ -165,11 +165,11 @@ def _method_task(
     pictures = {
         setting: {
             scene: "records/" + "-".join(filter(None, (stem, setting.replace(" = ", ""), scene))) + ".exr"
-            for scene in bench.scenes
+            for scene in bench.views
         }
         for setting in shown
     }
-    pixels = sum(width * height for width, height in map(bench.size, bench.scenes))
+    pixels = sum(width * height for width, height in map(bench.size, bench.views))
     queries = bench.frames * bench.frame_size[0] * bench.frame_size[1] + recipe.dataset.rows.test + pixels
     return Task(
         "bench",

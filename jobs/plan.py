@@ -57,7 +57,7 @@ def _report_task(
     pictures = []
     for task in benches:
         make, fabric = task.setting["make"], task.setting.get("fabric", "")
-        if make in recipe.bench.scenes:
+        if make in recipe.bench.views:
             truth = {"fabric": fabric["name"], "scene": make, "method": "truth", "setting": ""}
             pictures.append(truth | {"path": task.products[0]})
         for setting, scenes in task.setting.get("pictures", {}).items():

@@ -13,6 +13,7 @@ import pandas as pd
 from reports.accuracy import Accuracy
 from reports.bias import Bias
 from reports.effort import Effort
+from reports.memory import UNSURE
 from reports.record import TRUTH, Record
 from reports.sampling import SETTINGS, Saving
 from reports.stability import Finding
@@ -187,7 +188,7 @@ def timing_rows(timing: pd.DataFrame) -> list[Row]:
                     significant(row.most_threads_ns),
                     significant(row.most_threads_frame_ms),
                     significant(row.prepare_ms),
-                    size(row.memory),
+                    size(row.memory) if not row.memory < UNSURE else "below " + size(UNSURE),
                     NONE if row.method == TRUTH else size(row.bytes_stored),
                 ],
             }

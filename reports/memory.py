@@ -1,8 +1,9 @@
 """The memory a call needs while it runs, whoever allocates it: NumPy, torch and compiled kernels alike.
 
 Linux keeps the largest resident size of a process and lets it be reset. Freed memory is handed back to the system
-first, or the call would fill it again unseen; what it then adds to the resident size at its largest is the answer, to a
-page. Memory of a GPU is not part of it.
+first, or the call would fill it again unseen; what it then adds to the resident size at its largest is the answer. Of a
+process that has lived long not every page comes back, and what Python touches anew counts as well: numbers below
+`UNSURE` say no more than that they are small. Memory of a GPU is not part of it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,10 @@ import ctypes
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
+from typing import Final
+
+UNSURE: Final = 4 * 2**20
+"""Bytes by which an answer may be wrong."""
 
 _RESET_LARGEST = "5"  # see proc(5), clear_refs
 

@@ -10,7 +10,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from pipeline.scenes.options import Scene, ViewOptions
+from pipeline.models.options.base import RoundFootprint
+from pipeline.scenes.options import SceneOptions, View, ViewOptions
 from pipeline.truth.options import TruthOptions
 
 VERSION: Final = 2
@@ -99,13 +100,38 @@ class DisplayOptions(BaseModel):
     """Factor on linear values before they are shown."""
 
 
+class SceneBenchOptions(BaseModel):
+    """Scenes that every method renders (`reports.scene_frames`), and how true their truth is."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    names: tuple[str, ...] = ()
+    """Scenes of the package, or paths of scenes as `pipeline.scenes.catalogue` reads them."""
+    size: tuple[Side, Side] = (96, 72)
+    """Width and height of a frame, in pixels."""
+    frames: int = Field(default=6, ge=3, le=1024)
+    """Frames of the camera's way, from the first on, for aliasing; pictures are compared at the first."""
+    options: SceneOptions = SceneOptions(environment_directions=8)
+    """How scenes become queries."""
+    truth: TruthOptions = TruthOptions(relative_error=0.03, min_count=128, max_count=512)
+    """How true the first frame is."""
+    frame_truth: TruthOptions = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+    """How true the other frames are."""
+    footprint: RoundFootprint = "geometric_mean"
+    """What stands for an ellipse where a method knows round footprints only."""
+    image: ImageOptions = ImageOptions()
+    """How pictures are compared."""
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Of the truth's points and of the points of random methods."""
+
+
 class BenchOptions(BaseModel):
     """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    scenes: Annotated[tuple[Scene, ...], Field(min_length=1, max_length=2)] = ("sphere", "plane")
-    """Views that every fabric is shown in."""
+    views: Annotated[tuple[View, ...], Field(min_length=1, max_length=2)] = ("sphere", "plane")
+    """Views that every fabric is shown in by itself."""
     sphere_size: tuple[Side, Side] = (192, 192)
     """Width and height of the sphere's picture, in pixels."""
     plane_size: tuple[Side, Side] = (240, 160)
@@ -119,6 +145,8 @@ class BenchOptions(BaseModel):
     """The same for the frames of the truth."""
     picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
+    scenes: SceneBenchOptions = SceneBenchOptions()
+    """Scenes with cameras, lights and cloths of their own."""
     edge: EdgeOptions = EdgeOptions()
     """The silhouette, measured where the data set's queries are of curved cloth."""
     rows: int = Field(default=16_384, ge=64)
@@ -142,6 +170,6 @@ class BenchOptions(BaseModel):
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth of the pictures and of the random points of the baseline."""
 
-    def size(self, scene: Scene) -> tuple[int, int]:
+    def size(self, scene: View) -> tuple[int, int]:
         """Return width and height of a scene's picture, in pixels."""
         return self.sphere_size if scene == "sphere" else self.plane_size

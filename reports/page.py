@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
 from pipeline.models.options import CLASSES
-from pipeline.scenes.options import Scene
+from pipeline.scenes.options import View
 from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
@@ -35,7 +35,7 @@ class PictureFile:
     """A picture that was rendered."""
 
     fabric: str
-    scene: Scene
+    scene: View
     method: str
     """``truth`` for the reference."""
     setting: str
@@ -296,7 +296,7 @@ def _strips(page: PageInput, pictures: pd.DataFrame) -> list[_Strip]:
         cell = {"stem": _stem(file), "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": cells.scientific(value)})
     order = {fabric.name: index for index, (fabric, _) in enumerate(page.fabrics)}
-    return sorted(strips.values(), key=lambda strip: (order[strip.fabric], page.options.scenes.index(strip.scene)))
+    return sorted(strips.values(), key=lambda strip: (order[strip.fabric], page.options.views.index(strip.scene)))
 
 
 def _stem(file: PictureFile) -> str:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.gbuffer import GBuffer
-from pipeline.scenes.options import Scene
+from pipeline.scenes.options import View
 from pipeline.scenes.shade import colours, compose, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
@@ -33,7 +33,7 @@ ERROR: Final = ("error.R", "error.G", "error.B")
 """Channels of its standard error."""
 
 
-def render_truth(fabric: Fabric, scene: Scene, options: BenchOptions, path: Path) -> None:
+def render_truth(fabric: Fabric, scene: View, options: BenchOptions, path: Path) -> None:
     """Write the truth's picture of a scene to `path`."""
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
@@ -47,7 +47,7 @@ def render_method(
     method: Method,
     fabric: Fabric,
     role: Role,
-    scene: Scene,
+    scene: View,
     options: BenchOptions,
     truth: Path,
     path: Path,

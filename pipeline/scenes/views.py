@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.scenes.gbuffer import GBuffer
-from pipeline.scenes.options import Scene, ViewOptions
+from pipeline.scenes.options import View, ViewOptions
 
 Floats = npt.NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class _Surface(NamedTuple):
     """Length of a yarn spacing in the world, (M,)."""
 
 
-def view(scene: Scene, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:
+def view(scene: View, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:
     """Return what every pixel of a view shows.
 
     Parameters
@@ -201,4 +201,4 @@ def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-_SCENES: Final[dict[Scene, Callable[[int, int, float, ViewOptions], GBuffer]]] = {"sphere": _sphere, "plane": _plane}
+_SCENES: Final[dict[View, Callable[[int, int, float, ViewOptions], GBuffer]]] = {"sphere": _sphere, "plane": _plane}

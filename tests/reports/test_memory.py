@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 
-from reports.memory import peak_memory
+from reports.memory import UNSURE, peak_memory
 
 MB = 2**20
 
@@ -11,9 +11,9 @@ needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tel
 
 
 @needs_linux
-@pytest.mark.parametrize("size", [4, 32])
+@pytest.mark.parametrize("size", [16, 64])
 def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(size):
-    """Three arrays of which two live together: twice the size of one, within a tenth and what Python itself takes."""
+    """Three arrays of which two live together: twice the size of one, within a tenth and what is stated as unsure."""
 
     def call():
         one = np.ones(size * MB, np.uint8)
@@ -21,7 +21,7 @@ def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(siz
         del one
         return other.sum() + np.ones(size * MB // 2, np.uint8).sum()
 
-    assert peak_memory(call) == pytest.approx(2 * size * MB, rel=0.1, abs=MB)
+    assert peak_memory(call) == pytest.approx(2 * size * MB, rel=0.1, abs=UNSURE)
 
 
 @needs_linux

@@ -15,7 +15,7 @@ def test_sizes_belong_to_their_scenes():
 
 @pytest.mark.parametrize(
     "change",
-    [{"timing_repeats": 19}, {"frames": 2}, {"scenes": ()}, {"scenes": ("sofa",)}, {"sphere_size": (0, 8)}, {"x": 1}],
+    [{"timing_repeats": 19}, {"frames": 2}, {"views": ()}, {"views": ("sofa",)}, {"sphere_size": (0, 8)}, {"x": 1}],
 )
 def test_what_cannot_be_measured_is_refused(change):
     with pytest.raises(ValidationError):

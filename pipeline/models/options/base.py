@@ -22,6 +22,10 @@ Weight = Annotated[float, Field(ge=0, le=1e4)]
 """A factor of one term of a loss."""
 
 
+RoundFootprint = Literal["geometric_mean", "major"]
+"""Round footprint that stands for an ellipse: of the same area, or of its major axis."""
+
+
 class Options(BaseModel):
     """What every model says of itself; each has a field ``model``, its file's name, and a field ``name``, its own."""
 
