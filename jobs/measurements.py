@@ -13,6 +13,7 @@ from typing import Any
 
 from jobs.dataset import SECONDS_A_POINT, Shard, fingerprint_of, folder_of, points_a_row
 from jobs.recipe import ModelRecipe, Recipe
+from jobs.scenes import scene_tasks
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.version import VERSION as TRUTH_VERSION
@@ -80,6 +81,8 @@ def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Ma
     for model in recipe.models:
         if model.options.blends:
             yield _latents_task(recipe, model, trained[model.options.name][""])
+    for name in recipe.bench.scenes.names:
+        yield from scene_tasks(recipe, name, trained)
     yield _timing_task(recipe, subjects, parts, trained)
 
 
@@ -274,7 +277,7 @@ def _asked(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str
     return {
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "bench": recipe.bench.model_dump(mode="json", exclude={*_TIMED, "edge"}),
+        "bench": recipe.bench.model_dump(mode="json", exclude={*_TIMED, "edge", "scenes"}),
         "fabric": _look(subject.fabric),
         "role": subject.role,
         "truth": fingerprint(subject.needs),

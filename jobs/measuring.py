@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from jobs.task import Task
 from pipeline.models.bounded import counterpart
+from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
 from pipeline.models.registry import load_methods
@@ -25,6 +26,8 @@ from reports.options import BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
+from reports.scene_bench import measure_scene, time_scene, write_truth
+from reports.scene_frames import read_shot, shoot
 from reports.silhouette import measure_silhouette, render_edge
 from reports.timing import thread_counts
 from weaves.fabric import Fabric
@@ -108,6 +111,31 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
 
 
+def shot(task: Task, out: Path, progress: Progress) -> None:
+    """Work out a scene's frames with the truth's answers."""
+    options = _options(task).scenes
+    frames = out / task.products[0]
+    shoot(task.setting["scene"], options, frames)
+    write_truth(read_shot(frames), out / task.products[1])
+
+
+def scene(task: Task, out: Path, progress: Progress) -> None:
+    """Measure a method on a scene."""
+    setting, options = task.setting, _options(task)
+    pictures = {name: out / path for name, path in setting["pictures_of"].items()}
+    provenance = Provenance(model=" ".join(task.spec["models"]))
+    methods = _fallbacks(setting, options, out)
+    records = measure_scene(methods, read_shot(out / setting["frames"]), options, pictures, provenance)
+    write_records(out / task.products[0], records, this_machine(1))
+
+
+def frame_time(task: Task, out: Path, progress: Progress) -> None:
+    """Time a frame of a scene by all methods."""
+    options, frames = _options(task), read_shot(out / task.setting["frames"])
+    methods = [one for entry in task.setting["methods"] for one in _fallbacks(entry, options, out)]
+    write_records(out / task.products[0], time_scene(methods, frames, options), this_machine(1))
+
+
 def page(task: Task, out: Path, progress: Progress) -> None:
     """Write the page of a recipe."""
     setting = task.setting
@@ -135,6 +163,13 @@ def page(task: Task, out: Path, progress: Progress) -> None:
 
 def _options(task: Task) -> BenchOptions:
     return BenchOptions.model_validate(task.setting["options"])
+
+
+def _fallbacks(entry: Mapping[str, Any], options: BenchOptions, out: Path) -> list[Fallback]:
+    """Load the methods of a model so that they answer any query."""
+    kinds = TypeAdapter[Any](ModelOptions).validate_python(entry["model"]).kinds
+    methods = _methods(entry["model"], entry["models"], out)
+    return [Fallback(one, kinds, options.scenes.footprint) for one in methods]
 
 
 def _methods(options: Mapping[str, Any], folders: list[str], out: Path, bounds: bool = False) -> list[Method]:

@@ -60,6 +60,8 @@ def _report_task(
         if make in recipe.bench.views:
             truth = {"fabric": fabric["name"], "scene": make, "method": "truth", "setting": ""}
             pictures.append(truth | {"path": task.products[0]})
+        if make in ("shot", "scene"):
+            pictures += _of_scene(task)
         for setting, scenes in task.setting.get("pictures", {}).items():
             method = {"fabric": fabric, "method": task.setting["model"]["name"], "setting": setting}
             pictures += [method | {"scene": scene, "path": path} for scene, path in scenes.items()]
@@ -90,6 +92,22 @@ def _report_task(
             "pictures": pictures,
         },
     )
+
+
+def _of_scene(task: Task) -> list[dict[str, str]]:
+    """Return the pictures of a task on a scene."""
+    if task.setting["make"] == "shot":
+        return [
+            {
+                "fabric": "",
+                "scene": task.spec["scene"]["name"],
+                "method": "truth",
+                "setting": "",
+                "path": task.products[1],
+            }
+        ]
+    method = {"fabric": "", "scene": task.setting["scene"], "method": task.setting["model"]["name"]}
+    return [method | {"setting": setting, "path": path} for setting, path in task.setting["pictures_of"].items()]
 
 
 def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:

@@ -61,6 +61,9 @@ def _bench(task: Task, out: Path, progress: Progress) -> None:
         "timing": measuring.timing,
         "frames": measuring.frames,
         "edge": measuring.edge,
+        "shot": measuring.shot,
+        "scene": measuring.scene,
+        "frame time": measuring.frame_time,
     }.get(task.setting["make"], measuring.picture)(task, out, progress)
 
 

@@ -108,6 +108,37 @@ def equal_time_rows(table: pd.DataFrame) -> dict[str, Row]:
     return result
 
 
+SCENE: Final = (
+    "MSE",
+    "× lower",
+    "PSNR",
+    "SSIM",
+    "FLIP",
+    "HDR-FLIP",
+    "ΔE",
+    "flicker",
+    "excess energy",
+    "not its own",
+    "ms a frame",
+)
+"""Columns of `scene_rows` after the method."""
+
+
+def scene_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
+    """Return for each scene the rows of its table, in groups; times on the front are marked."""
+    result: dict[str, list[Row]] = {}
+    for scene, group in table.groupby("scene", sort=False) if len(table) else ():
+        lines = []
+        for row in rows(group):
+            cells: list[Any] = [scientific(row.mse), times(row.ratio), fixed_to(row.psnr, 1)]
+            cells += [fixed(value) for value in (row.ssim, row.flip_ldr, row.flip_hdr)]
+            cells += [fixed_to(row.delta_e, 2), signed(row.flicker), signed(row.excess_energy)]
+            cells += [percent(row.fallback_share, 0), {"text": fixed_to(row.frame_time, 1), "best": bool(row.front)}]
+            lines.append(_line(row.method, row.setting) | {"cells": cells})
+        result[str(scene)] = groups(lines)
+    return result
+
+
 def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str, Any]:
     """Return the rows of the aliasing table in groups, and the variance that the motion itself brings."""
     motion = [record.value for record in records if record.metric == "motion"]
@@ -412,6 +443,11 @@ def percent(value: float, digits: int = 1) -> str:
 def grouped(value: float) -> str:
     """Return ``1,696``."""
     return NONE if _missing(value) else f"{value:,.0f}"
+
+
+def fixed_to(value: float, digits: int) -> str:
+    """Return ``31.4``."""
+    return NONE if _missing(value) else f"{value:,.{digits}f}"
 
 
 def fixed(value: float) -> str:

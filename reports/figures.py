@@ -7,7 +7,7 @@ fabrics seen in training, open ones unseen.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -124,28 +124,58 @@ def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
     table : DataFrame
         From `equal_time.size_table`.
     """
-    sizes, measures = [size for size in SIZES if size in set(table["size"])], ("colour", "specular")
+    table = table.rename(columns={"ns": "time", "size": "panel"})
+    panels = {size: f"sigma {size}" for size in SIZES if size in set(table["panel"])}
+    measures = {name: f"relative RMSE, {name}" for name in ("colour", "specular")}
+    return _against_time(scheme, table, panels, measures, "time of a query, ns", lambda value: f"{100 * value:.3g} %")
+
+
+def scenes(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw MSE, HDR-FLIP and flicker of every method against the time of a frame, a column a scene.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `summary.scene_table`.
+    """
+    table = table.rename(columns={"frame_time": "time", "scene": "panel"})
+    panels = {name: name for name in dict.fromkeys(table["panel"])}
+    measures = {"mse": "MSE", "flip_hdr": "HDR-FLIP", "flicker": "flicker"}
+    return _against_time(scheme, table, panels, measures, "time of a frame, ms", lambda value: f"{value:.3g}")
+
+
+def _against_time(
+    scheme: Scheme,
+    table: pd.DataFrame,
+    panels: Mapping[str, str],
+    measures: Mapping[str, str],
+    axis: str,
+    worded: Callable[[float], str],
+) -> Figure:
+    """Draw measures (a line each) against `time` in panels (a column each), all logarithmic; knobs are one curve."""
     colours = scheme.colours(table["method"])
-    height = 5.6 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
-    figure, flat = new_figure(max(2.3 * len(sizes), _NARROWEST), height, len(sizes), sharey=True, lines=len(measures))
-    panels = np.asarray(flat).reshape(len(measures), len(sizes))
-    for measure, line in zip(measures, panels, strict=True):
-        for axes, size in zip(line, sizes, strict=True):
-            found = table[(table["size"] == size) & (table[measure] > 0)]
+    height = 0.6 + 2.4 * len(measures) + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
+    width = max(2.3 * len(panels), _NARROWEST)
+    figure, flat = new_figure(width, height, len(panels), sharey=True, lines=len(measures))
+    grid = np.asarray(flat).reshape(len(measures), len(panels))
+    for (measure, label), line in zip(measures.items(), grid, strict=True):
+        for axes, (panel, title) in zip(line, panels.items(), strict=True):
+            # What is nothing, or less than the truth has, cannot be drawn.
+            found = table[(table["panel"] == panel) & (table[measure] > 0) & table["time"].notna()]
             for method, knobs in found.groupby("method", sort=False):
-                knobs = knobs.sort_values("ns")
+                knobs = knobs.sort_values("time")
                 axes.plot(
-                    knobs["ns"], knobs[measure], color=colours[str(method)], marker=scheme.marker(str(method)),
+                    knobs["time"], knobs[measure], color=colours[str(method)], marker=scheme.marker(str(method)),
                     markersize=4.5, linewidth=1.1,
                 )  # fmt: skip
-            axes.set(xscale="log", yscale="log", title=f"sigma {size}" if measure == measures[0] else "")
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
+            axes.set(xscale="log", yscale="log", title=title if line is grid[0] else "")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
             axes.yaxis.set_minor_locator(NullLocator())
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
-        line[0].set_ylabel(f"relative RMSE, {measure}")
-    panels[-1, len(sizes) // 2].set_xlabel("time of a query, ns")
+        line[0].set_ylabel(label)
+    grid[-1, len(panels) // 2].set_xlabel(axis)
     handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
     return figure

@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-UNSURE: Final = 4 * 2**20
+UNSURE: Final = 4_000_000
 """Bytes by which an answer may be wrong."""
 
 _RESET_LARGEST = "5"  # see proc(5), clear_refs

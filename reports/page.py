@@ -16,7 +16,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
 from pipeline.models.options import CLASSES
-from pipeline.scenes.options import View
 from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
@@ -35,7 +34,9 @@ class PictureFile:
     """A picture that was rendered."""
 
     fabric: str
-    scene: View
+    """Empty for a scene, which has cloths of its own."""
+    scene: str
+    """View of the fabric, or name of the scene."""
     method: str
     """``truth`` for the reference."""
     setting: str
@@ -121,6 +122,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "silhouettes": silhouette_table(page.records),
     }
     tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"])
+    tables["scenes"] = summary.scene_table(page.records)
     tables["by_size"] = size_table(page.records)
     tables["equal_time"] = equal_time_table(tables["by_size"])
     between = summary.path_table(page.records)
@@ -188,6 +190,8 @@ def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
         plots["error-against-time"] = (figures.error_against_time, tables["tradeoff"])
     if len(tables["by_size"]):
         plots["error-by-size"] = (figures.error_by_size, tables["by_size"])
+    if len(tables["scenes"]):
+        plots["scenes"] = (figures.scenes, tables["scenes"])
     if len(aliasing):
         plots["aliasing"] = (figures.aliasing, aliasing)
     if curves:
@@ -210,7 +214,7 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
     for fabric, _ in page.fabrics:
         for kind, draw in (("drawdown", tiles.drawdown), ("height", tiles.height), ("normals", tiles.normals)):
             yield f"{fabric.name}-{kind}.png", draw(fabric)
-    spheres = [exr for (_, scene), exr in truths.items() if scene == "sphere"]
+    spheres = [exr for (fabric, scene), exr in truths.items() if fabric and scene == "sphere"]
     if spheres:
         yield "overview.png", tiles.overview(spheres, columns=-(-len(spheres) // 2))
 
@@ -229,6 +233,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
     fabrics = [cells.fabric_card(fabric, role) for fabric, role in page.fabrics]
     measured = _of_the_truth(page.records)
     shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
+    strips = _strips(page, tables["pictures"], tables["scenes"])
     return environment.get_template("page.html.j2").render(
         page=page,
         headlines=_headlines(errors, timing, untrained),
@@ -263,7 +268,10 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         asked=cells.percent(effort.RELATIVE_ERROR),
         columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT, "sampler": cells.SAMPLERS},
         titles={name: cells.plain(name) for name in cells.accuracy_rows(measured["truth_accuracy"])},
-        strips=_strips(page, tables["pictures"]),
+        strips=[strip for strip in strips if strip.fabric],
+        scenes=cells.scene_rows(tables["scenes"]),
+        scene_columns=cells.SCENE,
+        scene_strips={strip.scene: strip for strip in strips if not strip.fabric},
         fabrics=fabrics,
         shown=shown,
         plots=plots,
@@ -285,20 +293,25 @@ def _headlines(errors: pd.DataFrame, timing: pd.DataFrame, untrained: set[str]) 
     return result
 
 
-def _strips(page: PageInput, pictures: pd.DataFrame) -> list[_Strip]:
-    """Return the views, each with the truth first."""
+def _strips(page: PageInput, pictures: pd.DataFrame, scenes: pd.DataFrame) -> list[_Strip]:
+    """Return the views of the fabrics, then the scenes, each with the truth first."""
     mse = {(row.fabric, row.scene, row.method, row.setting): row.mse for row in summary.rows(pictures)}
+    mse |= {("", row.scene, row.method, row.setting): row.mse for row in summary.rows(scenes)}
     strips: dict[tuple[str, str], _Strip] = {}
-    roles = {fabric.name: role for fabric, role in page.fabrics}
+    roles: dict[str, str] = {fabric.name: role for fabric, role in page.fabrics}
     for file in sorted(page.pictures, key=lambda file: file.method != TRUTH):
-        strip = strips.setdefault((file.fabric, file.scene), _Strip(file.fabric, roles[file.fabric], file.scene))
+        strip = strips.setdefault(
+            (file.fabric, file.scene), _Strip(file.fabric, roles.get(file.fabric, ""), file.scene)
+        )
         value = mse.get((file.fabric, file.scene, file.method, file.setting))
         cell = {"stem": _stem(file), "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": cells.scientific(value)})
     order = {fabric.name: index for index, (fabric, _) in enumerate(page.fabrics)}
-    return sorted(strips.values(), key=lambda strip: (order[strip.fabric], page.options.views.index(strip.scene)))
+    views = {str(name): index for index, name in enumerate((*page.options.views, *page.options.scenes.names))}
+    place = len(order)
+    return sorted(strips.values(), key=lambda s: (order.get(s.fabric, place), views.get(s.scene, len(views))))
 
 
 def _stem(file: PictureFile) -> str:
-    words = [file.fabric, file.scene, file.method, *file.setting.replace("=", "").split()]
+    words = [file.fabric or "scene", file.scene, file.method, *file.setting.replace("=", "").split()]
     return "-".join(words)

@@ -113,10 +113,12 @@ Metric = Literal[
     "flip_hdr_floor",
     "delta_e_floor",
     "fovvideovdp",
+    "frame_time",
+    "fallback_share",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
-`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error` and
-`fovvideovdp`."""
+`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error`,
+`fovvideovdp` and `scene_bench`."""
 
 
 class Provenance(BaseModel):
@@ -149,8 +151,8 @@ class Record(BaseModel):
     """Name of the fabric; empty where several are meant together."""
     role: Role | Literal[""] = ""
     """Whether general models saw the fabric in training."""
-    scene: Literal["queries", "sphere", "plane", ""] = ""
-    """`queries`: held-out queries; otherwise the view."""
+    scene: str = ""
+    """`queries`: held-out queries; otherwise the view of a fabric, or, where no fabric is named, the scene."""
     metric: Metric = "mse"
     """What was measured."""
     value: float = 0.0

@@ -13,8 +13,9 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from reports.front import front
 from reports.metrics import ratio
-from reports.record import TRUTH, Record, to_table
+from reports.record import TRUTH, Metric, Record, to_table
 
 BASELINE: Final = ("point_sampled", "k = 2")
 """Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
@@ -90,6 +91,45 @@ def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
     groups = wide.groupby([*_KEYS, "role"], sort=False)
     table = groups.agg(fabrics=("fabric", "size"), flicker=("flicker", "mean"), excess_energy=("excess_energy", "mean"))
     return table.reset_index()
+
+
+SCENE_METRICS: Final[tuple[Metric, ...]] = (
+    "mse",
+    "mse_relative",
+    "psnr",
+    "ssim",
+    "flip_ldr",
+    "flip_hdr",
+    "delta_e",
+    "flip_hdr_floor",
+    "flicker",
+    "excess_energy",
+    "fallback_share",
+    "frame_time",
+)
+"""What is measured of every method on a scene."""
+
+
+def scene_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the benchmark's scenes, one row a scene, method and setting.
+
+    Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms); ratio (MSE of 2 points over the method's);
+    front (nothing beats it on both MSE and time in its scene).
+    """
+    table = to_table(records)
+    table = table[(table["fabric"] == "") & (table["scene"] != "") & table["metric"].isin(SCENE_METRICS)]
+    keys = ["scene", *_KEYS]
+    if table.empty:
+        return pd.DataFrame(columns=[*keys, *SCENE_METRICS, "ratio", "front"])
+    order = table[keys].drop_duplicates()
+    wide = table.pivot(index=keys, columns="metric", values="value").reindex(columns=list(SCENE_METRICS)).reset_index()
+    wide = order.merge(wide, on=keys)
+    base = wide[of_baseline(wide)].set_index("scene")["mse"]
+    wide["ratio"] = wide["scene"].map(base) / wide["mse"]
+    wide["front"] = False
+    for _, group in wide.groupby("scene"):
+        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], group["mse"], strict=True)))
+    return wide.rename_axis(columns=None)
 
 
 def energy_table(records: Sequence[Record]) -> pd.DataFrame:

@@ -1,45 +1,18 @@
-"""Error against time: which methods nothing beats on both, and the cheapest within an error.
-
-A point (time, error) is beaten by another that is nowhere worse and somewhere better. Those that nothing beats are the
-front; equal points do not beat each other. What was not measured takes no part.
-"""
+"""Error against time: which methods nothing beats on both, and the cheapest within an error."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any, Final
 
 import pandas as pd
 
+from reports.front import front
 from reports.record import TRUTH
 
 LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 """Errors that the page names the cheapest method for."""
 
 COLUMNS: Final = ("role", "method", "setting", "fabrics", "ns", "error", "bytes_stored", "front")
-
-
-def front(points: Sequence[tuple[float, float]]) -> list[bool]:
-    """Say which points are on the front.
-
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        Time and error; less is better. Points with NaN or infinity are not on the front and beat nothing.
-
-    Returns
-    -------
-    list of bool
-    """
-    on = [False] * len(points)
-    measured = sorted((point, index) for index, point in enumerate(points) if all(map(math.isfinite, point)))
-    last, lowest = (math.nan, math.nan), math.inf
-    # From the fastest on: whatever is not better than all faster ones is beaten by one of them, or equals it.
-    for point, index in measured:
-        if point[1] < lowest or point == last:
-            on[index], last, lowest = True, point, point[1]
-    return on
 
 
 def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame) -> pd.DataFrame:

@@ -1,0 +1,125 @@
+"""What a method makes of a scene: its picture's errors, what aliases on the camera's way, the time of a frame.
+
+Errors are those of the first frame (`reports.image_error`), over the pixels of lit cloth. Flicker and excess energy are
+those of `reports.aliasing` over all frames: flicker where cloth is lit in every one of them, the spectrum of whole
+frames, whose background is the truth's. Every method is asked as `pipeline.models.fallback` says; how many questions
+were not its own stands beside its numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.models.fallback import Fallback
+from reports.aliasing import excess_energy, flicker
+from reports.exr import write_exr
+from reports.image_error import image_errors, noise_floor
+from reports.options import BenchOptions
+from reports.pictures import ERROR, RGB
+from reports.record import TRUTH, Provenance, Record
+from reports.scene_frames import Shot
+from reports.timing import Contender, affordable, time_side_by_side
+from weaves.colour import LUMINANCE
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+LONGEST: Final = 0.01
+"""Seconds of a timed call."""
+
+Floats = npt.NDArray[np.float64]
+
+
+def write_truth(shot: Shot, path: Path) -> None:
+    """Write the truth's first frame and its standard error as an OpenEXR."""
+    _write(path, shot.pictures()[0], {"scene": shot.name, "method": TRUTH}, shot.noise()[0])
+
+
+def measure_scene(
+    methods: Sequence[Fallback],
+    shot: Shot,
+    options: BenchOptions,
+    pictures: Mapping[str, Path],
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure the settings of a method on a scene.
+
+    Parameters
+    ----------
+    methods : sequence of Fallback
+        One a setting; those that do not cover every cloth are left out.
+    shot : Shot
+        The scene's frames.
+    options : BenchOptions
+        How pictures are compared, and the seed of random methods.
+    pictures : mapping
+        Where the first frame of which setting is written, as an OpenEXR.
+    """
+    truth, noise, lit = shot.pictures(), shot.noise(), shot.lit
+    image = options.scenes.image
+    floor = noise_floor(truth[0], noise[0], lit[0], image)
+    light, still = [np.asarray(values @ np.array(LUMINANCE)) for values in (truth, noise)], lit.all(axis=0)
+    records = []
+    for method in (one for one in methods if shot.covered_by(one)):
+        shown = shot.pictures(shot.answers(method, options.scenes.seed))
+        if method.setting in pictures:
+            about = {"scene": shot.name, "method": method.name, "setting": method.setting}
+            _write(pictures[method.setting], shown[0], about)
+        subject = _subject(method, shot, provenance)
+        records += image_errors(shown[0], truth[0], noise[0], lit[0], image, floor).records(subject)
+        own = np.asarray(shown @ np.array(LUMINANCE))
+        strange = [method.strange(cloth.queries) for cloth in shot.cloths]
+        frames = len(truth)
+        records += [
+            subject.of("flicker", flicker(own[:, still], light[0][:, still], 0.0, light[1][:, still]), frames),
+            subject.of("excess_energy", excess_energy(own, light[0], 0.0, light[1]), frames),
+            subject.of("fallback_share", float(np.concatenate(strange).mean()), sum(map(len, strange))),
+        ]
+    return records
+
+
+def time_scene(
+    methods: Sequence[Fallback], shot: Shot, options: BenchOptions, provenance: Provenance | None = None
+) -> list[Record]:
+    """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
+
+    As many of its questions are asked as one call can answer in `LONGEST`; the time of all of them is in proportion.
+    """
+    first = shot.first()
+    able = [method for method in methods if first.covered_by(method)]
+    mixed = np.random.default_rng(options.scenes.seed)
+    contenders, count = [], sum(len(cloth.frame) for cloth in first.cloths)
+    # In a random order, so that the first ones are a fair sample of the frame.
+    asked = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]
+    for method in able:
+        for fabric, _ in asked:
+            method.prepare(fabric)
+        contenders.append(affordable(Contender(method.predict, asked), LONGEST))
+    records = []
+    timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
+    for method, timing in zip(able, timings, strict=True):
+        low, median, high = (1e-6 * count * ns for ns in timing.quartiles)
+        samples = tuple(1e-6 * count * ns for ns in timing.samples)
+        subject = _subject(method, shot, provenance)
+        repeats = len(samples)
+        records.append(subject.of("frame_time", median, repeats, unit="ms/frame", low=low, high=high, samples=samples))
+    return records
+
+
+def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Record:
+    return Record(
+        method=method.name, setting=method.setting, scene=shot.name, threads=1, provenance=provenance or Provenance()
+    )
+
+
+def _write(path: Path, picture: Floats, about: Mapping[str, str], noise: Floats | None = None) -> None:
+    channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
+    channels["A"] = np.ones(picture.shape[:2], np.float32)
+    if noise is not None:
+        channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
+    write_exr(path, channels, dict(about))

@@ -1,0 +1,101 @@
+"""A method for any query: nearest forms where there are any, quadrature where there are none."""
+
+import numpy as np
+import pytest
+
+from pipeline.models.fallback import Fallback
+from pipeline.models.options import PointSampledOptions
+from pipeline.models.registry import load_methods
+from pipeline.models.sums import Sums
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+
+
+class Seen:
+    """Remembers what it was asked."""
+
+    name, setting = "seen", ""
+
+    def __init__(self):
+        self.asked = []
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        self.asked.append(queries)
+        return np.ones((len(queries.u), 4), np.float32)
+
+    def bytes_stored(self, fabric):
+        return 1
+
+
+def mixed(count=60):
+    """Queries of every kind: ellipses, curvature, light from behind; every third one seen from behind."""
+    options = QueryOptions(behind=0.4, stretch=8.0, curvature=(0.01, 0.2), sigma=(0.2, 2.0))
+    queries = draw_queries(options, load_fabric("voile").weave.repeat, 5, 0, count)
+    wo = queries.wo.copy()
+    wo[::3, 2] *= -1.0
+    # Seen from behind, cloth is flat: curved cloth is known from outside alone.
+    return queries._replace(wo=wo, curvature=np.where(wo[:, 2] > 0, queries.curvature, np.float32(0.0)))
+
+
+def test_ellipses_become_round_ones_of_the_same_area_and_curvature_is_left_out():
+    queries, method = mixed(), Seen()
+    Fallback(method, {"behind"}).predict(load_fabric("voile"), queries)
+    (asked,) = method.asked
+    own = queries.take(queries.wo[:, 2] > 0)
+    np.testing.assert_allclose(asked.sigma**2, own.sigma * own.sigma_minor, rtol=1e-6)
+    np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
+    assert not asked.curvature.any() and not asked.angle.any()
+
+
+def test_the_major_axis_never_aliases():
+    queries, method = mixed(), Seen()
+    Fallback(method, {"behind"}, "major").predict(load_fabric("voile"), queries)
+    np.testing.assert_array_equal(method.asked[0].sigma, queries.take(queries.wo[:, 2] > 0).sigma)
+
+
+def test_what_a_method_knows_reaches_it_unchanged():
+    queries, method = mixed(), Seen()
+    Fallback(method, {"behind", "stretch", "curvature"}).predict(load_fabric("voile"), queries)
+    own = queries.take(queries.wo[:, 2] > 0)
+    for name in Queries._fields:
+        np.testing.assert_array_equal(getattr(method.asked[0], name), getattr(own, name))
+
+
+def test_what_no_form_stands_for_is_answered_by_quadrature():
+    fabric, queries = load_fabric("voile"), mixed()
+    method = Seen()
+    fallback = Fallback(method, ())
+    strange = fallback.strange(queries)
+    np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
+    found = fallback.predict(fabric, queries)
+    assert (found[~strange] == 1.0).all()
+    truth = TruthOptions(estimator="owen", min_count=8192, max_count=8192, relative_error=1e-6)
+    reference = estimate(fabric, queries.take(strange), truth, 1)
+    # Asked for 10 % of each answer's length, and an absolute error where it is dark.
+    wrong = np.linalg.norm(found[strange] - reference.mean, axis=1)
+    size = np.linalg.norm(reference.mean, axis=1)
+    assert np.median(wrong / size) < 0.1
+    assert wrong.sum() < 0.1 * size.sum()
+
+
+@pytest.mark.parametrize("rows", [0, 7])
+def test_plain_queries_are_the_methods_alone(rows):
+    fabric, sums = load_fabric("denim"), Sums()
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, rows)
+    np.testing.assert_array_equal(Fallback(sums, ()).predict(fabric, queries), sums.predict(fabric, queries))
+
+
+def test_it_is_called_as_its_method():
+    (points,) = load_methods(PointSampledOptions(counts=[4]))
+    fallback = Fallback(points, ())
+    assert (fallback.name, fallback.setting) == (points.name, points.setting)
+    assert fallback.bytes_stored(load_fabric("denim")) == points.bytes_stored(load_fabric("denim"))

@@ -1,0 +1,122 @@
+"""Frames of a scene and what is measured on them, at a size of a few pixels."""
+
+import numpy as np
+import pytest
+
+from pipeline.models.fallback import Fallback
+from pipeline.scenes.options import SceneOptions
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from reports.exr import read_exr
+from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
+from reports.scene_bench import measure_scene, time_scene, write_truth
+from reports.scene_frames import read_shot, shoot
+from reports.summary import scene_table
+from weaves.errors import BadInput
+
+pytest.importorskip("mitsuba")
+
+COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+SCENES = SceneBenchOptions(
+    names=("table",),
+    size=(40, 32),
+    frames=3,
+    options=SceneOptions(environment_directions=4),
+    truth=COARSE,
+    frame_truth=COARSE,
+    image=ImageOptions(block=4, resamples=100),
+)
+OPTIONS = BenchOptions(scenes=SCENES, timing_repeats=20, warm_up=1)
+
+
+class Answers:
+    """The truth with other points, times a factor."""
+
+    name = "answers"
+
+    def __init__(self, factor, covered=True):
+        self.factor, self.covered, self.setting = factor, covered, f"x {factor:g}"
+
+    def covers(self, fabric):
+        return self.covered
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        return self.factor * estimate(fabric, queries, COARSE, seed + 1).mean
+
+    def bytes_stored(self, fabric):
+        return 1
+
+
+ALL = {"behind", "stretch", "curvature"}
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    path = tmp_path_factory.mktemp("shot") / "table.npz"
+    shoot("table", SCENES, path)
+    return read_shot(path), path
+
+
+def test_the_same_work_gives_the_same_bytes(shot, tmp_path):
+    shoot("table", SCENES, tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == shot[1].read_bytes()
+
+
+def test_a_picture_is_the_base_and_the_light_of_its_questions(shot):
+    frames, _ = shot
+    pictures = frames.pictures()
+    assert pictures.shape == (3, 32, 40, 3) and np.isfinite(pictures).all() and (pictures >= 0).all()
+    # Where nothing is asked, the picture is its base; where something is, it is not darker.
+    np.testing.assert_allclose(pictures[~frames.lit], frames.base[~frames.lit], rtol=1e-6)
+    assert (pictures >= frames.base - 1e-6).all()
+    # Answers twice as bright add the scattered light once more.
+    twice = frames.pictures([2.0 * cloth.mean for cloth in frames.cloths])
+    np.testing.assert_allclose(twice - pictures, pictures - frames.base, rtol=1e-5, atol=1e-9)
+    assert len(frames.cloths) == 4
+
+
+def test_noise_of_many_lights_adds_in_quadrature(shot):
+    frames, _ = shot
+    cloth = frames.cloths[0]
+    pixel = np.bincount(cloth.pixel[cloth.frame == 0]).argmax()
+    rows = (cloth.frame == 0) & (cloth.pixel == pixel)
+    assert rows.sum() > 1
+    own = np.sqrt(np.square(cloth.noise()[rows]).sum(axis=0))
+    found = frames.noise()[0].reshape(-1, 3)[pixel]
+    others = any((c.pixel[c.frame == 0] == pixel).any() for c in frames.cloths[1:])
+    assert not others
+    np.testing.assert_allclose(found, own, rtol=1e-6)
+
+
+def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot, tmp_path):
+    frames, _ = shot
+    methods = [Fallback(Answers(1.0), ALL), Fallback(Answers(1.3), ALL), Fallback(Answers(1.0, covered=False), ALL)]
+    picture = tmp_path / "picture.exr"
+    records = measure_scene(methods, frames, OPTIONS, {"x 1.3": picture})
+    records += time_scene(methods, frames, OPTIONS)
+    table = scene_table(records).set_index("setting")
+    assert list(table.index) == ["x 1", "x 1.3"]
+    good, bad = table.loc["x 1"], table.loc["x 1.3"]
+    assert good.mse < bad.mse and good.flip_hdr < bad.flip_hdr and good.psnr > bad.psnr and good.delta_e < bad.delta_e
+    # A picture a third too bright is wrong by that share of the light that the cloth scatters.
+    light = (frames.pictures() - frames.base)[0][frames.lit[0]]
+    assert bad.mse == pytest.approx(0.09 * np.square(light).mean(), rel=0.1)
+    assert good.fallback_share == bad.fallback_share >= 0 and (table.frame_time > 0).all()
+    shown = read_exr(picture).stack("R", "G", "B")
+    np.testing.assert_allclose(shown[~frames.lit[0]], frames.base[0][~frames.lit[0]], rtol=1e-6)
+
+
+def test_the_truths_picture_holds_its_noise(shot, tmp_path):
+    frames, _ = shot
+    write_truth(frames, tmp_path / "truth.exr")
+    found = read_exr(tmp_path / "truth.exr")
+    np.testing.assert_allclose(found.stack("R", "G", "B"), frames.pictures()[0], rtol=1e-6)
+    np.testing.assert_allclose(found.stack("error.R", "error.G", "error.B"), frames.noise()[0], rtol=1e-5, atol=1e-9)
+
+
+def test_a_scene_that_does_not_exist_is_one_sentence(tmp_path):
+    with pytest.raises(BadInput, match="scene"):
+        shoot("tabel", SCENES, tmp_path / "x.npz")
