@@ -250,6 +250,23 @@ def compare(
     compared(a, b, recipe, other_machine)
 
 
+@app.command(sort_key=13)
+def require(
+    scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
+    *,
+    error: Annotated[float, Parameter(help="Largest relative RMSE of the colour: .05 is 5 %.")] = float("inf"),
+    time: Annotated[float, Parameter(help="Longest time of a frame on one thread, in milliseconds.")] = float("inf"),
+    recipe: Annotated[str, Parameter(help="General recipe whose page holds the measurements.")] = "quick",
+    frames: Annotated[int, Parameter(help="Frames of the camera's way to look at.")] = 4,
+    margin: Annotated[float, Parameter(help="Factor by which ranges are widened.")] = 1.25,
+    out: Out = OUT,
+) -> None:
+    """Tell what a scene requires and write the cheapest recipe that meets a wish."""
+    from jobs.requiring import require as required
+
+    required(scene, out, recipe, error, time, frames, margin)
+
+
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     tokens = sys.argv[1:] if tokens is None else tokens

@@ -120,6 +120,8 @@ def _questions(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     """Cut every fabric's splits into shards, each with the role of its fabric."""
     rows = recipe.dataset.rows
     named = {"train": rows.train, "validation": rows.validation, "test": rows.test}
+    if recipe.models and not any(model.learns for model in recipe.models):
+        named = {"test": rows.test}
     # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
     unseen = named if any(model.of_one_material for model in recipe.models) else {"test": rows.test}
     for role, fabrics, splits in (

@@ -19,6 +19,7 @@ from pipeline.models.fallback import Fallback
 from reports.aliasing import excess_energy, flicker
 from reports.exr import write_exr
 from reports.image_error import image_errors, noise_floor
+from reports.metrics import COLOUR_WEIGHTS, squared_error
 from reports.options import BenchOptions
 from reports.pictures import ERROR, RGB
 from reports.record import TRUTH, Provenance, Record
@@ -66,12 +67,14 @@ def measure_scene(
     light, still = [np.asarray(values @ np.array(LUMINANCE)) for values in (truth, noise)], lit.all(axis=0)
     records = []
     for method in (one for one in methods if shot.covered_by(one)):
-        shown = shot.pictures(shot.answers(method, options.scenes.seed))
+        answers = shot.answers(method, options.scenes.seed)
+        shown = shot.pictures(answers)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
             _write(pictures[method.setting], shown[0], about)
         subject = _subject(method, shot, provenance)
         records += image_errors(shown[0], truth[0], noise[0], lit[0], image, floor).records(subject)
+        records.append(_colour(subject, shot, answers))
         own = np.asarray(shown @ np.array(LUMINANCE))
         strange = [method.strange(cloth.queries) for cloth in shot.cloths]
         frames = len(truth)
@@ -109,6 +112,17 @@ def time_scene(
         repeats = len(samples)
         records.append(subject.of("frame_time", median, repeats, unit="ms/frame", low=low, high=high, samples=samples))
     return records
+
+
+def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float32]]) -> Record:
+    """Return the relative RMSE of the colour measure over the questions of all frames."""
+    values, truth, noise = (
+        np.concatenate(parts).astype(np.float64)
+        for parts in (answers, [c.mean for c in shot.cloths], [c.standard_error for c in shot.cloths])
+    )
+    spread = np.sqrt(np.square(noise) @ np.square(COLOUR_WEIGHTS))
+    error = squared_error(values @ COLOUR_WEIGHTS, truth @ COLOUR_WEIGHTS, spread, resamples=0)
+    return subject.of("colour_rrmse", error.relative_rmse, error.count)
 
 
 def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Record:

@@ -106,6 +106,7 @@ SCENE_METRICS: Final[tuple[Metric, ...]] = (
     "excess_energy",
     "fallback_share",
     "frame_time",
+    "colour_rrmse",
 )
 """What is measured of every method on a scene."""
 

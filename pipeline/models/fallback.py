@@ -25,6 +25,9 @@ from weaves.fabric import Fabric
 ERROR: Final = 0.1
 """Relative error stated by the quadrature that steps in: typically 2 % off, at a tenth of a millisecond a query."""
 
+QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=ERROR)
+"""What steps in."""
+
 
 class Fallback:
     """A method that answers any query.
@@ -57,7 +60,7 @@ class Fallback:
         if not strange.any():
             return self._method.predict(fabric, self._nearest(queries), seed)
         result = np.empty((len(strange), 4), np.float32)
-        result[strange] = estimate(fabric, queries.take(strange), _QUADRATURE, seed).mean
+        result[strange] = estimate(fabric, queries.take(strange), QUADRATURE, seed).mean
         if not strange.all():
             result[~strange] = self._method.predict(fabric, self._nearest(queries.take(~strange)), seed)
         return result
@@ -82,6 +85,3 @@ class Fallback:
         if "curvature" not in self._kinds:
             queries = queries._replace(curvature=np.zeros_like(queries.curvature))
         return queries
-
-
-_QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=ERROR)

@@ -1,0 +1,210 @@
+"""What a scene requires: its questions, the method that meets a wish, and a recipe for just that.
+
+The choice is made from the Records of a page (`reports.choice`); the recipe is a file like any other, with the fabrics
+and the distribution of queries narrowed to the scene.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jobs.comparing import records_file
+from jobs.narrow_recipe import savings, write_recipe
+from jobs.recipe import ModelRecipe, Recipe, load_recipe
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.table import Table
+
+    from pipeline.scenes.requirement import Requirement
+    from pipeline.truth.query import Queries
+    from reports.options import SceneBenchOptions
+
+_SAMPLE = 400  # questions by which quadrature is timed
+
+
+def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames: int, margin: float) -> None:
+    """Print what a scene asks and which method meets the wish, and write its recipe.
+
+    Parameters
+    ----------
+    scene : str
+        Name of a scene of the package, or path of one.
+    out : Path
+        Folder of products that holds the page of `recipe`; the new recipe goes to its folder `recipes`.
+    recipe : str
+        General recipe, whose models are chosen from.
+    error, ms : float
+        Wish: largest relative RMSE of the colour, longest milliseconds a frame; infinite if there is none.
+    frames : int
+        Frames that are looked at, spread over the camera's way.
+    margin : float
+        By how much ranges are widened (`Requirement.of`).
+
+    Raises
+    ------
+    BadInput
+        If the scene cannot be used, the page has no errors by size, or nothing meets the wish: then the nearest points
+        of the front are named.
+    """
+    from rich.console import Console
+
+    from reports.choice import cheapest, nearest, predictions, with_measured
+    from reports.equal_time import size_table
+    from reports.record import read_records
+    from reports.summary import rows, scene_table
+
+    if not (error > 0 and ms > 0 and margin >= 1 and frames >= 1):
+        raise BadInput(
+            "require", "error, time, margin, frames", (error, ms, margin, frames), "must be > 0, margin >= 1"
+        )
+    general = load_recipe(recipe)
+    records = read_records([records_file(out, general.name)])
+    sizes = size_table(records)
+    if sizes.empty:
+        raise BadInput(str(out), "recipe", recipe, "its page has no errors by the size of footprints; run it again")
+    asked, fabrics = _questions(scene, frames, general.bench.scenes)
+    requirement = _requirement(scene, asked, frames, margin)
+    left = {model.options.name: _left(model, requirement, fabrics, general) for model in general.models}
+    quadrature = _quadrature(asked, fabrics)
+    shares = {name: share for name, share in left.items() if share is not None}
+    table = predictions(sizes, requirement.sizes, requirement.questions, shares, quadrature)
+    table = with_measured(table, scene_table(records), requirement.scene)
+    console = Console()
+    console.print(_asked_table(requirement), "")
+    console.print(_choice_table(table), "")
+    chosen = cheapest(table, error, ms)
+    if chosen is None:
+        near = "; ".join(
+            f"{row.method} {row.setting}".strip() + f": {100 * row.error:.2g} % in {row.ms:.3g} ms"
+            for row in rows(nearest(table, error, ms))
+        )
+        wish = f"{100 * error:g} % in {ms:g} ms a frame"
+        raise BadInput("require", "wish", wish, f"no method meets it; the nearest points of the front are {near}")
+    path = out / "recipes" / f"require-{requirement.scene}.toml"
+    write_recipe(path, requirement, general, chosen.method, chosen.setting)
+    name = f"{chosen.method} {chosen.setting}".strip()
+    console.print(
+        f"{name}: {100 * chosen.error:.2g} % in {chosen.ms:.3g} ms a frame ({chosen.known}). {savings(path, general)}",
+        f"the recipe: {path}", sep="\n", soft_wrap=True, highlight=False,
+    )  # fmt: skip
+
+
+def _questions(scene: str, frames: int, options: SceneBenchOptions) -> tuple[dict[str, Queries], dict[str, Fabric]]:
+    """Return all questions of some frames about each fabric, by its name, and the fabrics."""
+    import numpy as np
+
+    from pipeline.scenes.catalogue import load_scene
+    from pipeline.scenes.frame import render
+    from pipeline.scenes.loading import load
+    from pipeline.truth.query import Queries
+
+    described = load_scene(scene)
+    loaded = load(described, options.options)
+    found: dict[str, list[Queries]] = {}
+    fabrics = {}
+    for index in np.linspace(0, max(described.frames - 1, 0), frames):
+        for key, gbuffer in render(loaded, float(index), options.size).gbuffers.items():
+            fabric = loaded.cloths[key][1]
+            fabrics[fabric.name] = fabric
+            found.setdefault(fabric.name, []).append(gbuffer.queries(fabric.weave.repeat))
+    return {
+        name: Queries(*(np.concatenate([getattr(part, column) for part in parts]) for column in Queries._fields))
+        for name, parts in found.items()
+    }, fabrics
+
+
+def _requirement(scene: str, asked: Mapping[str, Queries], frames: int, margin: float) -> Requirement:
+    from pipeline.scenes.catalogue import load_scene
+    from pipeline.scenes.requirement import Requirement
+    from reports.equal_time import EDGES, SIZES
+
+    return Requirement.of(load_scene(scene).name, frames, asked, EDGES[:-1], SIZES, margin)
+
+
+def _left(model: ModelRecipe, requirement: Requirement, fabrics: Mapping[str, Fabric], general: Recipe) -> float | None:
+    """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
+    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.fabrics}:
+        return None
+    return (
+        requirement.viewer_behind
+        if "behind" in model.options.kinds
+        else max(requirement.behind, requirement.viewer_behind)
+    )
+
+
+def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:
+    """Return the error that the quadrature states on the scene's questions, and its nanoseconds a question."""
+    import numpy as np
+
+    from pipeline.models.fallback import QUADRATURE
+    from pipeline.truth.estimator import estimate
+
+    states, seconds, count = [], 0.0, 0
+    for name, queries in asked.items():
+        rows = np.random.default_rng(0).permutation(len(queries.u))[: _SAMPLE // len(asked)]
+        if not rows.size:
+            continue
+        estimate(fabrics[name], queries.take(rows[:2]), QUADRATURE, 0)  # tables
+        start = time.perf_counter()
+        answers = estimate(fabrics[name], queries.take(rows), QUADRATURE, 0)
+        seconds, count = seconds + time.perf_counter() - start, count + rows.size
+        squared = np.square(answers.standard_error.astype(np.float64)).sum(axis=1).mean()
+        states.append(math.sqrt(squared) / max(float(answers.mean.sum(axis=1).mean()), 1e-9))
+    return float(np.mean(states)), 1e9 * seconds / count
+
+
+def _asked_table(requirement: Requirement) -> Table:
+    """Show what the scene asks."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+    fabrics = ", ".join(f"{name} {100 * share:.0f} %" for name, share in requirement.fabrics.items())
+    sizes = ", ".join(f"{name} {100 * share:.0f} %" for name, share in requirement.sizes.items() if share > 0)
+    curved = (
+        "none"
+        if not requirement.curved
+        else (
+            f"{100 * requirement.curved:.0f} %, {requirement.curvature[0]:.2g} to {requirement.curvature[1]:.2g} a yarn"
+        )
+    )
+    for name, text in (
+        (
+            "scene",
+            f"{requirement.scene}, {requirement.questions:,} questions a frame",
+        ),
+        ("fabrics", fabrics),
+        (
+            "footprints",
+            f"{requirement.sigma[0]:.2g} to {requirement.sigma[1]:.3g} yarns, axes up to {requirement.stretch:.2g} : 1",
+        ),
+        ("their sizes", sizes),
+        ("angles", f"light up to {requirement.angle[0]:.1f}°, viewer up to {requirement.angle[1]:.1f}°"),
+        ("curved cloth", curved),
+        ("light from behind", f"{100 * requirement.behind:.1f} %"),
+        ("back of the cloth", f"{100 * requirement.viewer_behind:.1f} %"),
+    ):
+        table.add_row(name, text)
+    return table
+
+
+def _choice_table(found: pd.DataFrame) -> Table:
+    """Show the methods, the fastest first; those on the front in bold."""
+    from rich.table import Table
+
+    from reports.style import display
+    from reports.summary import rows
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
+    for name in ("method", "error", "ms a frame", "not its own", ""):
+        table.add_column(name, justify="left" if name in ("method", "") else "right")
+    for row in rows(found):
+        cells = [f"{100 * row.error:.2g} %", f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known]
+        table.add_row(display(row.method, row.setting), *cells, style="bold" if row.front else "")
+    return table

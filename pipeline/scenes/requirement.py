@@ -1,0 +1,136 @@
+"""What a scene asks of a model: the questions that really occur, as the narrowest distribution that holds them.
+
+All frames' questions are gathered. Of every quantity the domain takes the range between the `_RARE` quantiles at both
+ends, widened by a margin: footprints and curvatures by a factor, angles by degrees. What never occurs is left out:
+light from behind, curved cloth, stretched footprints. A query outside of the domain is none of the model's business; it
+falls back to quadrature (`pipeline.models.fallback`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field
+
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.query import STEEPEST_CURVATURE, Queries
+from weaves.errors import BadInput
+
+_RARE = 5e-4  # share of the questions that may lie beyond either end of a range
+_ROUND = 1.05  # ratio of a footprint's axes up to which it counts as round
+_STEEPEST = 89.9  # degrees
+
+
+class Requirement(BaseModel):
+    """What a scene asks."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    scene: str
+    """Name of the scene."""
+    frames: int = Field(ge=1)
+    """Frames that were looked at."""
+    questions: int = Field(ge=1)
+    """Questions a frame, the mean."""
+    fabrics: dict[str, float]
+    """Share of the questions about each fabric."""
+    sigma: tuple[float, float]
+    """Range of the root of the product of a footprint's axes, in yarn spacings."""
+    stretch: float = Field(ge=1)
+    """Largest ratio of a footprint's axes."""
+    angle: tuple[float, float]
+    """Largest angle to the normal of the light and of the viewer, in degrees."""
+    curvature: tuple[float, float]
+    """Range of the curvature where cloth is curved, in 1/yarn spacings; [0, 0] where none is."""
+    curved: float = Field(ge=0, le=1)
+    """Share of the questions about curved cloth."""
+    behind: float = Field(ge=0, le=1)
+    """Share of the questions with light from the other side of the cloth."""
+    viewer_behind: float = Field(ge=0, le=1)
+    """Share of the questions about the back of the cloth."""
+    sizes: dict[str, float]
+    """Share of the questions in classes of footprints, by the names that `of` was given."""
+
+    @classmethod
+    def of(
+        cls,
+        scene: str,
+        frames: int,
+        asked: Mapping[str, Queries],
+        edges: Sequence[float],
+        names: Sequence[str],
+        margin: float = 1.25,
+    ) -> Requirement:
+        """Return what questions ask.
+
+        Parameters
+        ----------
+        scene : str
+            Name of the scene.
+        frames : int
+            Frames that the questions come from.
+        asked : mapping of Queries
+            All questions about each fabric, by its name.
+        edges, names : sequence
+            Edges of the classes of footprints, in yarn spacings, and the classes' names.
+        margin : float
+            Factor by which ranges of footprints and curvatures are widened at either end; angles by as many per cent of
+            what is left to 90 degrees, at least 1 degree.
+
+        Raises
+        ------
+        BadInput
+            If nothing is asked.
+        """
+        counts = {name: len(queries.u) for name, queries in asked.items() if len(queries.u)}
+        total = sum(counts.values())
+        if not total:
+            raise BadInput(scene, "frames", frames, "no cloth that is lit is in sight of the camera")
+        queries = Queries(*(np.concatenate([getattr(q, name) for q in asked.values()]) for name in Queries._fields))
+        size = np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor)
+        low, high = _range(size)
+        ratio = _range(queries.sigma / queries.sigma_minor)[1]
+        bent = queries.curvature[queries.curvature > 0]
+        least, most = _range(bent) if bent.size else (0.0, 0.0)
+        classes = np.clip(np.digitize(size, edges) - 1, 0, len(names) - 1)
+        return cls(
+            scene=scene,
+            frames=frames,
+            questions=max(1, round(total / frames)),
+            fabrics={name: count / total for name, count in counts.items()},
+            sigma=(low / margin, high * margin),
+            stretch=1.0 if ratio < _ROUND else ratio * margin,
+            angle=(_steepest(queries.wi, margin), _steepest(queries.wo, margin)),
+            curvature=(least / margin, min(most * margin, STEEPEST_CURVATURE)),
+            curved=float(bent.size / total),
+            behind=float((queries.wi[:, 2] * queries.wo[:, 2] < 0).mean()),
+            viewer_behind=float((queries.wo[:, 2] < 0).mean()),
+            sizes={name: float((classes == index).mean()) for index, name in enumerate(names)},
+        )
+
+    def queries(self, kinds: frozenset[str] = frozenset({"behind", "stretch", "curvature"})) -> QueryOptions:
+        """Return the distribution that a model of these kinds is to be taught; what it does not know is left out."""
+        return QueryOptions(
+            sigma=self.sigma,
+            max_angle=max(self.angle),
+            behind=self.behind if "behind" in kinds else 0.0,
+            stretch=self.stretch if "stretch" in kinds else 1.0,
+            curvature=self.curvature if "curvature" in kinds and self.curved > 0 else (0.0, 0.0),
+        )
+
+
+def _range(values: npt.NDArray[np.floating]) -> tuple[float, float]:
+    """Return the range of all but the rarest values at either end."""
+    low, high = np.quantile(values.astype(np.float64), [_RARE, 1.0 - _RARE])
+    return float(low), float(high)
+
+
+def _steepest(directions: npt.NDArray[np.float32], margin: float) -> float:
+    """Return the largest angle to the normal on either side, in degrees, with its margin."""
+    angles = np.degrees(np.arccos(np.clip(np.abs(directions[:, 2].astype(np.float64)), 0.0, 1.0)))
+    largest = _range(angles)[1]
+    room = max(1.0, (margin - 1.0) * (90.0 - largest))
+    return float(min(largest + room, _STEEPEST, math.nextafter(90.0, 0.0)))
