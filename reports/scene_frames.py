@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
+from pipeline.models.fallback import QUADRATURE, Fallback
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
@@ -32,6 +33,8 @@ from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
+
+_COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "stand_in")
 
 Floats = npt.NDArray[np.float64]
 
@@ -52,6 +55,9 @@ class Cloth:
         Linear RGB irradiance.
     mean, standard_error : float32 (M, 4)
         The truth's answers.
+    stand_in : float32 (M, 4)
+        What quadrature answers where light or viewer is behind the cloth: for methods that do not know that. 0
+        elsewhere.
     """
 
     fabric: Fabric
@@ -61,6 +67,7 @@ class Cloth:
     weight: npt.NDArray[np.float32]
     mean: npt.NDArray[np.float32]
     standard_error: npt.NDArray[np.float32]
+    stand_in: npt.NDArray[np.float32]
 
     def light(self, components: npt.ArrayLike) -> Floats:
         """Return the light of each question, (M, 3), from components (M, 4)."""
@@ -74,7 +81,7 @@ class Cloth:
     def of_frame(self, frame: int) -> Cloth:
         """Return the questions of one frame."""
         rows = np.flatnonzero(self.frame == frame)
-        parts = (getattr(self, name)[rows] for name in ("frame", "pixel", "weight", "mean", "standard_error"))
+        parts = (getattr(self, name)[rows] for name in _COLUMNS)
         return Cloth(self.fabric, self.queries.take(rows), *parts)
 
     def _colours(self) -> Floats:
@@ -134,14 +141,17 @@ class Shot:
         """Tell whether a method answers for every cloth."""
         return all(method.covers(cloth.fabric) for cloth in self.cloths)
 
-    def answers(self, method: Method, seed: int) -> list[npt.NDArray[np.float32]]:
-        """Return a method's components for every cloth; random methods draw anew in every frame."""
+    def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
+        """Return a method's components for every cloth; random methods draw anew in every frame.
+
+        What falls back is answered once for all methods.
+        """
         found = []
         for cloth in self.cloths:
             method.prepare(cloth.fabric)
-            values = np.empty((len(cloth.frame), 4), np.float32)
+            values, strange = cloth.stand_in.copy(), method.strange(cloth.queries)
             for frame in range(len(self.base)):
-                rows = np.flatnonzero(cloth.frame == frame)
+                rows = np.flatnonzero((cloth.frame == frame) & ~strange)
                 if rows.size:
                     own = int(fingerprint([self.name, cloth.fabric.name, frame, seed]), 16)
                     values[rows] = method.predict(cloth.fabric, cloth.queries.take(rows), own)
@@ -174,6 +184,7 @@ def shoot(name: str, options: SceneBenchOptions, path: Path) -> None:
             columns |= gbuffer.queries(fabric.weave.repeat)._asdict()
             columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
+            columns |= {"stand_in": _stand_in(fabric, gbuffer.queries(fabric.weave.repeat), seed)}
             parts[key].append(columns)
         bases.append(base)
     arrays = {"base": np.array(bases, np.float32)}
@@ -196,9 +207,18 @@ def read_shot(path: Path) -> Shot:
         cloths = []
         for key, fabric in about["cloths"].items():
             queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
-            rest = (file[f"{key}.{column}"] for column in ("frame", "pixel", "weight", "mean", "standard_error"))
+            rest = (file[f"{key}.{column}"] for column in _COLUMNS)
             cloths.append(Cloth(Fabric.model_validate(fabric), queries, *rest))
         return Shot(about["name"], file["base"], cloths)
+
+
+def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
+    """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
+    result = np.zeros((len(queries.u), 4), np.float32)
+    behind = (queries.wi[:, 2] < 0.0) | (queries.wo[:, 2] < 0.0)
+    if behind.any():
+        result[behind] = estimate(fabric, queries.take(behind), QUADRATURE, seed).mean
+    return result
 
 
 def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:
