@@ -25,7 +25,7 @@ from numba.core.registry import cpu_target
 _INHERITED = ("fastmath", "forceinline")
 
 
-class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
+class _SelfContained(JITCodeLibrary):
     """A compiled function that runs its own copies of what it calls, and is to its callers what the cache holds."""
 
     def _finalize_final_module(self) -> None:
@@ -34,7 +34,7 @@ class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
             self._shared_module = self._for_callers()
             for function in _defined(self._final_module, binding.Linkage.linkonce_odr):
                 function.linkage = binding.Linkage.internal
-        super()._finalize_final_module()
+        super()._finalize_final_module()  # type: ignore[no-untyped-call]
 
     def _for_callers(self) -> binding.ModuleRef:
         """Return the optimised code before machine code is made of it, by way of bytes like all that is cached."""
@@ -49,17 +49,17 @@ def _defined(module: binding.ModuleRef, linkage: binding.Linkage) -> list[bindin
     return [function for function in module.functions if not function.is_declaration and function.linkage == linkage]
 
 
-class _OwnFlags(CPUTargetOptions):  # type: ignore[misc]
+class _OwnFlags(CPUTargetOptions):
     """Options of a function: what it does not ask for is off, whatever its first caller has."""
 
     def finalize(self, flags: Any, options: Any) -> None:
         for name in _INHERITED:
             # Reading gives the default; what is set is not inherited.
             setattr(flags, name, getattr(flags, name))
-        super().finalize(flags, options)
+        super().finalize(flags, options)  # type: ignore[no-untyped-call]
 
 
-_compile_subroutine = BaseContext.compile_subroutine
+_compile_subroutine: Any = BaseContext.compile_subroutine
 _subroutines: dict[frozenset[str], dict[Any, Any]] = {}
 
 
@@ -74,4 +74,4 @@ def make_reproducible() -> None:
     """Replace these parts of numba's compiler in this process, before anything is compiled."""
     cpu_target.target_context.codegen()._library_class = _SelfContained
     cpu_target.options = _OwnFlags
-    BaseContext.compile_subroutine = _compile_by_flags
+    BaseContext.compile_subroutine = _compile_by_flags  # type: ignore[method-assign]

@@ -1,10 +1,10 @@
-"""How kernels are compiled: single-threaded, without the GIL, cached on disk, the same to the bit whoever compiled them.
+"""How kernels are compiled: single-threaded, without the GIL, cached on disk, the same bits whoever compiled them.
 
 numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of this
 package cannot serve a stale kernel. No fast-math but where a kernel says so (`fast_kernel`).
 
-The same bits whoever compiled a kernel and in whatever order: pipeline.truth.compiler. One process alone compiles at a
-time; the others wait and read what it wrote, because numba lets two overwrite each other's index of the cache.
+pipeline.truth.compiler sees to it that neither the process nor the order of first use changes a bit. One process alone
+compiles at a time; the others wait and read what it wrote, because numba lets two overwrite each other's index.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 from filelock import FileLock
 from numba.core.compiler_lock import global_compiler_lock
 
 from pipeline.truth.compiler import make_reproducible
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent
 
@@ -51,12 +53,12 @@ def _alone() -> Iterator[None]:
             yield
 
 
-def _decorator(**flags: Any) -> Callable[[Callable[..., Any]], Any]:
+def _decorator(**flags: Any) -> Callable[[_Function], _Function]:
     """Return a decorator with these flags, whose kernels one process alone compiles or reads at a time."""
     compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)
 
-    def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = compiled(function)
+    def decorate(function: _Function) -> _Function:
+        dispatcher: Any = compiled(function)
         compile_or_load = dispatcher.compile
 
         def compile_alone(signature: Any) -> Any:
@@ -64,7 +66,7 @@ def _decorator(**flags: Any) -> Callable[[Callable[..., Any]], Any]:
                 return compile_or_load(signature)
 
         dispatcher.compile = compile_alone
-        return dispatcher
+        return cast(_Function, dispatcher)
 
     return decorate
 
@@ -80,6 +82,9 @@ fast_kernel = _decorator(fastmath=_REGROUPED)
 NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never
 between runs, workers or orders on one, nor between who compiles a kernel and who reads it from the cache.
 """
+
+fused_kernel = _decorator(fastmath={"contract"})
+"""Decorator of arithmetic that must not be regrouped; a product and a sum may be one instruction, rounded once."""
 
 inlined_kernel = _decorator(forceinline=True)
 """Decorator of functions called once a point with many tables: a call would copy what it passes."""
