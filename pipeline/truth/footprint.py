@@ -15,7 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.kernel import fast_kernel, inlined_kernel, kernel
 from pipeline.truth.single import remaining
 
 GAUSSIAN, BOX = 0, 1
@@ -46,14 +46,14 @@ _D = (0.007784695709041462, 0.3224671290700398, 2.445134137142996, 3.75440866190
 _TAIL = 0.02425
 
 
-@kernel
+@inlined_kernel
 def _rational(t: float) -> float:
     return (((((_C[0] * t + _C[1]) * t + _C[2]) * t + _C[3]) * t + _C[4]) * t + _C[5]) / (
         (((_D[0] * t + _D[1]) * t + _D[2]) * t + _D[3]) * t + 1.0
     )
 
 
-@kernel
+@inlined_kernel
 def normal_quantile(p: float) -> float:
     """Return the x at which the standard normal distribution reaches p, 0 < p < 1, to 1.2e-9 relative.
 
@@ -72,14 +72,14 @@ def normal_quantile(p: float) -> float:
     )
 
 
-@kernel
+@inlined_kernel
 def _wrap(x: float, repeat: float) -> float:
     """Return x modulo the repeat, in [0, repeat)."""
     wrapped = x - repeat * math.floor(x / repeat)
     return wrapped if 0.0 <= wrapped < repeat else 0.0
 
 
-@kernel
+@inlined_kernel
 def place(shape: int, centre: float, sigma: float, repeat: float, number: float) -> tuple[float, float]:
     """Return the position in [0, repeat) that a number in (0, 1) names on one axis, and its weight (mean 1).
 
@@ -117,7 +117,7 @@ def place(shape: int, centre: float, sigma: float, repeat: float, number: float)
 _EVEN = 1.0  # in repeats: both axes of a Gaussian this wide cover the repeat evenly, to 4e-16
 
 
-@kernel
+@inlined_kernel
 def place_pair(
     shape: int,
     u: float,

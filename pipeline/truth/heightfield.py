@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel, kernel
 from pipeline.truth.options import Variation
 from pipeline.truth.variation import gloss
 from weaves.draft import cells
@@ -190,7 +190,7 @@ def local_position(family: int, offset: float, x: float, y: float, end: int, pic
     return y - (pick + 0.5), -(x - (end + 0.5) + offset)
 
 
-@kernel
+@inlined_kernel
 def surface_at(
     field: HeightField, x: float, y: float, end: int, pick: int, linear: bool
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
@@ -254,7 +254,7 @@ def surface_at(
     return family, side, height, -ny, nx, nz, -ty, tx, tz
 
 
-@kernel
+@inlined_kernel
 def height_along(
     field: HeightField, side: int, x: float, y: float, dx: float, dy: float, end: int, pick: int, column: int, row: int
 ) -> tuple[float, float]:

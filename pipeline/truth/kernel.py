@@ -1,16 +1,28 @@
-"""How kernels are compiled: single-threaded, without the GIL, cached on disk under a name that follows their sources.
+"""How kernels are compiled: single-threaded, without the GIL, cached on disk, the same bits whoever compiled them.
 
 numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of this
 package cannot serve a stale kernel. No fast-math but where a kernel says so (`fast_kernel`).
+
+pipeline.truth.compiler sees to it that neither the process nor the order of first use changes a bit. One process alone
+compiles at a time; the others wait and read what it wrote, because numba lets two overwrite each other's index.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numba
+from filelock import FileLock
+from numba.core.compiler_lock import global_compiler_lock
+
+from pipeline.truth.compiler import make_reproducible
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent
 
@@ -24,22 +36,58 @@ def _cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "twillight" / folder
 
 
-numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+_FOLDER = _cache_folder()
+numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
 
-kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
-"""Decorator of every compiled function of the ground truth."""
+make_reproducible()
+
+_LOCK = FileLock(_FOLDER.with_suffix(".lock"), thread_local=False)
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Hold this process's compiler and the cache's lock, in this order; whoever dies lets go of both."""
+    with global_compiler_lock:
+        _FOLDER.parent.mkdir(parents=True, exist_ok=True)
+        with _LOCK:
+            yield
+
+
+def _decorator(**flags: Any) -> Callable[[_Function], _Function]:
+    """Return a decorator with these flags, whose kernels one process alone compiles or reads at a time."""
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)
+
+    def decorate(function: _Function) -> _Function:
+        dispatcher: Any = compiled(function)
+        compile_or_load = dispatcher.compile
+
+        def compile_alone(signature: Any) -> Any:
+            with _alone():
+                return compile_or_load(signature)
+
+        dispatcher.compile = compile_alone
+        return cast(_Function, dispatcher)
+
+    return decorate
+
 
 _REGROUPED = {"reassoc", "contract", "nsz", "arcp"}
 
-fast_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_REGROUPED)
+kernel = _decorator()
+"""Decorator of every compiled function of the ground truth."""
+
+fast_kernel = _decorator(fastmath=_REGROUPED)
 """Decorator of the few flat loops in single precision that vector units must be free to sum in their own order.
 
 NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never
-between runs, workers or orders on one.
+between runs, workers or orders on one, nor between who compiles a kernel and who reads it from the cache.
 """
 
-inlined_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+fused_kernel = _decorator(fastmath={"contract"})
+"""Decorator of arithmetic that must not be regrouped; a product and a sum may be one instruction, rounded once."""
+
+inlined_kernel = _decorator(forceinline=True)
 """Decorator of functions called once a point with many tables: a call would copy what it passes."""
 
-inlined_fast_kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_REGROUPED, forceinline=True)
+inlined_fast_kernel = _decorator(fastmath=_REGROUPED, forceinline=True)
 """Decorator of what such a loop calls for every node: a call would keep it from the vector units."""

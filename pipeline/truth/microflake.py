@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel
 
 
-@kernel
+@inlined_kernel
 def _across_along(wx: float, wy: float, wz: float, tx: float, ty: float, tz: float) -> tuple[float, float]:
     """Return |w x t|^2 and (w.t)^2."""
     cx, cy, cz = wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx
@@ -20,14 +20,14 @@ def _across_along(wx: float, wy: float, wz: float, tx: float, ty: float, tz: flo
     return cx * cx + cy * cy + cz * cz, along * along
 
 
-@kernel
+@inlined_kernel
 def sigma(wx: float, wy: float, wz: float, tx: float, ty: float, tz: float, alpha: float) -> float:
     """Return the projected area of the flakes towards unit w: sqrt(|w x t|^2 + alpha^2 (w.t)^2), in [alpha, 1]."""
     across, along = _across_along(wx, wy, wz, tx, ty, tz)
     return math.sqrt(across + alpha * alpha * along)
 
 
-@kernel
+@inlined_kernel
 def density(vx: float, vy: float, vz: float, tx: float, ty: float, tz: float, alpha: float) -> float:
     """Return D at the half vector of v = wi + wo, which need not be normalised, in 1/sr.
 

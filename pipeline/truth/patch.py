@@ -143,7 +143,7 @@ def point_share(
     return family, area, specular * area, diffuse * area, through
 
 
-@kernel
+@inlined_kernel
 def _lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices: Choices) -> bool:
     """Say whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
     if not choices.shadows:

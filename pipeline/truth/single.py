@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.kernel import fast_kernel, fused_kernel
 
 _1, _HALF = np.float32(1.0), np.float32(0.5)
 _DEEPEST = np.float32(87.0)  # exp(-87) is the least that single precision holds with all its digits
@@ -24,7 +24,7 @@ _C2, _C3, _C4, _C5, _C6, _C7 = (np.float32(c) for c in (-1 / 2, 1 / 6, -1 / 24, 
 
 
 # Not a fast kernel: what it subtracts must not be regrouped.
-@kernel
+@fused_kernel
 def _halved(depth: np.float32) -> tuple[np.float32, np.float32]:
     """Return 2^-n and q, of which exp(-depth) = 2^-n (1 - q) is made."""
     x = min(depth, _DEEPEST)
@@ -36,7 +36,7 @@ def _halved(depth: np.float32) -> tuple[np.float32, np.float32]:
     return power.view(np.float32), q
 
 
-@kernel
+@fused_kernel
 def _absorbed(depth: np.float32) -> np.float32:
     power, q = _halved(depth)
     return (_1 - power) + power * q

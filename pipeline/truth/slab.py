@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel
 
 
-@kernel
+@inlined_kernel
 def reflection(flakes: float, sigma_i: float, sigma_o: float, cos_i: float, cos_o: float, thickness: float) -> float:
     """Return f_r without the incident cosine, for unit k_s, in 1/sr.
 
@@ -34,7 +34,7 @@ def reflection(flakes: float, sigma_i: float, sigma_o: float, cos_i: float, cos_
     return -flakes * math.expm1(-depth) / (4.0 * (sigma_i * cos_o + sigma_o * cos_i))
 
 
-@kernel
+@inlined_kernel
 def transmission(flakes: float, sigma_i: float, sigma_o: float, cos_i: float, cos_o: float, thickness: float) -> float:
     """Return f_t without the incident cosine; parameters as `reflection`, with the moduli of the cosines.
 
@@ -47,7 +47,7 @@ def transmission(flakes: float, sigma_i: float, sigma_o: float, cos_i: float, co
     return flakes * thickness * math.exp(-thickness * min(lambda_i, lambda_o)) * phi / (4.0 * cos_i * cos_o)
 
 
-@kernel
+@inlined_kernel
 def unscattered(sigma_o: float, cos_o: float, thickness: float) -> float:
     """Return the share of light that crosses the layer without meeting a flake, exp(-T Lambda)."""
     return math.exp(-thickness * sigma_o / cos_o)

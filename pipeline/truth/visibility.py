@@ -25,7 +25,7 @@ from pipeline.truth.heightfield import (
     local_position,
     span_over,
 )
-from pipeline.truth.kernel import kernel
+from pipeline.truth.kernel import inlined_kernel, kernel
 
 _STRIP_POINTS = 16
 _MAX_CELLS = 100_000  # a ray this long is as good as parallel to the cloth
@@ -60,13 +60,13 @@ class Ray(NamedTuple):
     stride_y: float
 
 
-@kernel
+@inlined_kernel
 def _altitude(z: float, towards: Ray, distance: float) -> float:
     """Return the height over the base of a ray that began at z."""
     return z + distance * (towards.rise + 0.5 * towards.bend * distance)
 
 
-@kernel
+@inlined_kernel
 def _piece_blocks(
     field: HeightField,
     x: float,
@@ -113,7 +113,7 @@ def _piece_blocks(
     return False
 
 
-@kernel
+@inlined_kernel
 def _strip_blocks(
     field: HeightField,
     x: float,
@@ -154,7 +154,7 @@ def ray(x: float, y: float, z: float, bend: float) -> Ray:
     return Ray(x, y, z, dx, dy, z / flat, bend, stride_x, stride_y)
 
 
-@kernel
+@inlined_kernel
 def visible(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> bool:
     """Say whether the point (x, y, z) sees a direction; one on the cloth only if that lies above its tangent plane.
 

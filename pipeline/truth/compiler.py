@@ -1,0 +1,77 @@
+"""numba's compiler, made a function of the sources: what a kernel computes depends on no process and no order.
+
+Compiled code holds copies of what it calls, each optimised once more in its new place. numba 0.61 to 0.68 let four
+things that are no part of a function decide about its bits:
+
+- which copy of a callee runs: the linker takes the first that the process loaded (`_SelfContained`);
+- whether a callee was compiled here or read from the cache, as code generation had rewritten it (`_SelfContained`);
+- the flags of whoever calls a function first, which the function then keeps for all (`_OwnFlags`);
+- the flags of whoever first uses an operation that numba writes in Python, such as `x**2` (`_compile_subroutine`).
+
+With reassociation allowed, each regroups sums: last bits. These are numba's internals;
+tests/pipeline/truth/test_kernel.py fails when an upgrade makes one of them void.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import binding
+from numba.core.base import BaseContext
+from numba.core.codegen import JITCodeLibrary
+from numba.core.cpu import CPUTargetOptions
+from numba.core.registry import cpu_target
+
+_INHERITED = ("fastmath", "forceinline")
+
+
+class _SelfContained(JITCodeLibrary):
+    """A compiled function that runs its own copies of what it calls, and is to its callers what the cache holds."""
+
+    def _finalize_final_module(self) -> None:
+        # One read from the cache has its code for callers already, and is finished.
+        if self._shared_module is None:
+            self._shared_module = self._for_callers()
+            for function in _defined(self._final_module, binding.Linkage.linkonce_odr):
+                function.linkage = binding.Linkage.internal
+        super()._finalize_final_module()  # type: ignore[no-untyped-call]
+
+    def _for_callers(self) -> binding.ModuleRef:
+        """Return the optimised code before machine code is made of it, by way of bytes like all that is cached."""
+        shared = self._final_module.clone()
+        for function in _defined(shared, binding.Linkage.external):
+            function.linkage = binding.Linkage.linkonce_odr
+        return binding.parse_bitcode(shared.as_bitcode())
+
+
+def _defined(module: binding.ModuleRef, linkage: binding.Linkage) -> list[binding.ValueRef]:
+    """Return the functions that a module defines with this linkage."""
+    return [function for function in module.functions if not function.is_declaration and function.linkage == linkage]
+
+
+class _OwnFlags(CPUTargetOptions):
+    """Options of a function: what it does not ask for is off, whatever its first caller has."""
+
+    def finalize(self, flags: Any, options: Any) -> None:
+        for name in _INHERITED:
+            # Reading gives the default; what is set is not inherited.
+            setattr(flags, name, getattr(flags, name))
+        super().finalize(flags, options)  # type: ignore[no-untyped-call]
+
+
+_compile_subroutine: Any = BaseContext.compile_subroutine
+_subroutines: dict[frozenset[str], dict[Any, Any]] = {}
+
+
+def _compile_by_flags(self: BaseContext, *arguments: Any, **keywords: Any) -> Any:
+    """Compile what numba writes in Python itself, once for each set of fast-math flags instead of once for all."""
+    flags = frozenset(getattr(self.fastmath, "flags", ()))
+    self.cached_internal_func = _subroutines.setdefault(flags, {})
+    return _compile_subroutine(self, *arguments, **keywords)
+
+
+def make_reproducible() -> None:
+    """Replace these parts of numba's compiler in this process, before anything is compiled."""
+    cpu_target.target_context.codegen()._library_class = _SelfContained
+    cpu_target.options = _OwnFlags
+    BaseContext.compile_subroutine = _compile_by_flags  # type: ignore[method-assign]
