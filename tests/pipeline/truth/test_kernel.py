@@ -98,7 +98,7 @@ fabric = load_fabric("denim")
 queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="table"), 1)[:2]),
-    "quadrature": lambda: Quadrature(4, QuadratureOptions(kind="quadrature")).predict(fabric, queries),
+    "quadrature": lambda: Quadrature(4, QuadratureOptions(model="quadrature")).predict(fabric, queries),
     "sums": lambda: Sums().predict(fabric, queries),
     "points": lambda: HorizonSampler(fabric).sample(queries, 16, True, 1),
 }
