@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.truth.gauss_rules import Double
-from pipeline.truth.kernel import fast_kernel, inlined_fast_kernel, kernel
+from pipeline.truth.kernel import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.truth.table import Single
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
@@ -67,9 +67,10 @@ def ramp(above: np.float32) -> np.float32:
     return min(max(_HALF + above, _0), _1)
 
 
-@inlined_fast_kernel
+# Not a fast kernel: regrouped, first + second - 1 would lose a small share's digits, and shadows could make light.
+@inlined_kernel
 def seen_and_lit(
     first: np.float32, second: np.float32, alike: np.float32, right: np.float32, opposite: np.float32
 ) -> np.float32:
     """Return the share of a box from which two directions are both free, given those of each and `azimuths_apart`."""
-    return alike * min(first, second) + right * first * second + opposite * max(first + second - _1, _0)
+    return alike * min(first, second) + right * first * second + opposite * max(first - (_1 - second), _0)

@@ -248,4 +248,4 @@ def _uncover(
     for k in range(len(seen)):
         o = ramp(above(oz, low_o[k], high_o[k], turn_o, steep_o[k]) * sharpness)
         i = ramp(above(iz, low_i[k], high_i[k], turn_i, steep_i[k]) * sharpness)
-        seen[k], both[k] = o, seen_and_lit(i, o, alike, right, opposite)
+        seen[k], both[k] = o, seen_and_lit(o, i, alike, right, opposite)
