@@ -1,6 +1,6 @@
 """Gauss-Legendre nodes on every piece of yarn, k across it: the patch integral by a fixed rule.
 
-Single precision, folded by the cloth's periodicity; see pipeline.truth.gauss_nodes. What is not smooth is left over:
+Single precision, folded by the cloth's periodicity; see pipeline.truth.gauss. What is not smooth is left over:
 the line where a yarn turns away from the light, shadows, taken as ramps as wide as horizons spread over a node, and
 highlights narrower than a node's box.
 """
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pipeline.models.options import QuadratureOptions
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
-from pipeline.truth.gauss_nodes import GaussQuadrature
+from pipeline.truth.gauss.quadrature import GaussQuadrature
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

@@ -13,10 +13,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.truth.azimuths import azimuth_rows
 from pipeline.truth.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
-from pipeline.truth.horizon_map import ALONG, BOUND, CURVE, SCALE, SLOTS, START, HorizonMap, Single
+from pipeline.truth.horizon_map import HorizonMap
 from pipeline.truth.kernel import fast_kernel, kernel
 from pipeline.truth.single import absorbed
+from pipeline.truth.soft_horizons import above, ramp
+from pipeline.truth.table import Single
 
 LANES: Final = 2048
 """Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""
@@ -35,27 +38,8 @@ INTEGERS: Final = 5
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _TINY = np.float32(1e-20)
-_DEEPEST = np.float32(80.0)
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _FOURTH_PI = np.float32(1.0 / (4.0 * math.pi))
-_AS0, _AS1, _AS2, _AS3 = (np.float32(c) for c in (1.5707288, -0.2121144, 0.0742610, -0.0187293))
-
-
-@fast_kernel
-def arcsine(x: np.float32) -> np.float32:
-    """Return asin x to 7e-5 [Abramowitz1964Handbook, 4.4.45]."""
-    size = min(abs(x), _1)
-    angle = np.float32(0.5 * math.pi) - np.sqrt(_1 - size) * (_AS0 + size * (_AS1 + size * (_AS2 + size * _AS3)))
-    signed: np.float32 = angle if x >= _0 else -angle
-    return signed
-
-
-@kernel
-def azimuth_rows(x: float, y: float, count: int) -> tuple[int, int, float]:
-    """Return the two azimuths around a direction, and where between them it lies."""
-    place = math.atan2(y, x) / (2.0 * math.pi) * count
-    row = math.floor(place)
-    return int(row) % count, int(row + 1) % count, place - row
 
 
 @kernel
@@ -97,59 +81,6 @@ def _repeat(source: npt.NDArray[Any], queries: int, count: int, out: npt.NDArray
         out[q * count : (q + 1) * count] = source[q]
 
 
-@fast_kernel
-def locate(
-    count: int,
-    x: Single,
-    y: Single,
-    ends: np.int32,
-    last_end: np.float32,
-    last_pick: np.float32,
-    top: npt.NDArray[np.int32],
-    pieces: Single,
-    blocks: npt.NDArray[np.int32],
-    grid: np.int32,
-    warp_radius: np.float32,
-    weft_radius: np.float32,
-    sine: Single,
-    distance: Single,
-    curvature: Single,
-    limit: Single,
-    warpness: Single,
-    weftness: Single,
-    node: npt.NDArray[np.int32],
-) -> None:
-    """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node."""
-    size = np.float32(grid)
-    for k in range(count):
-        column, line = min(np.floor(x[k]), last_end), min(np.floor(y[k]), last_pick)
-        cell = np.int32(line) * ends + np.int32(column)
-        fx, fy = x[k] - column - _HALF, y[k] - line - _HALF
-        in_warp, in_weft = abs(fx) <= warp_radius, abs(fy) <= weft_radius
-        warp_top = top[cell] == np.int32(0)
-        covered = in_warp if warp_top else in_weft
-        beneath = in_weft if warp_top else in_warp
-        warp = warp_top if covered else not warp_top
-        gap = not (covered or beneath)
-        along = fy if warp else fx
-        slot = np.int32(0) if covered else (np.int32(3) if gap else (np.int32(1) if along < _0 else np.int32(2)))
-        piece = cell * np.int32(SLOTS) + slot
-        row = piece * np.int32(5)
-        across = (fx if warp else fy) / (warp_radius if warp else weft_radius)
-        across = min(max(across, -_1), _1)
-        place = (along + _HALF - pieces[row + np.int32(START)]) * pieces[row + np.int32(SCALE)] * size
-        turn = (arcsine(across) * _INVERSE_PI + _HALF) * size
-        i = np.int32(min(max(turn, _0), size - _HALF))
-        j = np.int32(min(max(place, _0), size - _HALF))
-        node[k] = blocks[piece] + j * grid + i
-        sine[k] = across
-        distance[k] = (along if warp else -along) + pieces[row + np.int32(ALONG)]
-        curvature[k] = pieces[row + np.int32(CURVE)]
-        limit[k] = pieces[row + np.int32(BOUND)]
-        warpness[k] = _1 if (warp and not gap) else _0
-        weftness[k] = _0 if (warp or gap) else _1
-
-
 @kernel
 def uncover(
     count: int,
@@ -171,9 +102,9 @@ def uncover(
     for k in range(count):
         at = np.uint32(nodes[k])
         first, second = horizon[at + np.uint32(low_o[k])], horizon[at + np.uint32(high_o[k])]
-        viewed = min(max(_HALF + (oz[k] - first - turn_o[k] * (second - first)) * steepness[k], _0), _1)
+        viewed = ramp(above(oz[k], first, second, turn_o[k], steepness[k]))
         first, second = horizon[at + np.uint32(low_i[k])], horizon[at + np.uint32(high_i[k])]
-        lit = min(max(_HALF + (iz[k] - first - turn_i[k] * (second - first)) * steepness[k], _0), _1)
+        lit = ramp(above(iz[k], first, second, turn_i[k], steepness[k]))
         seen[k], both[k] = viewed, viewed * lit
 
 
@@ -258,7 +189,7 @@ def shade(
         q0, q1 = q0 * q0, q1 * q1
         flakes = _HALF * (q0 + q1) / (q0 * q1 * crossed)
         cosines = cos_i * cos_o
-        depth = min(thickness * crossed / (cosines + _TINY), _DEEPEST)
+        depth = thickness * crossed / (cosines + _TINY)
         wide = weight[k] / (nz * n)
         a = wide * cos_o
         bare = weight[k] * oz_k

@@ -11,6 +11,7 @@ unless it covers the repeat evenly.
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,11 @@ GAUSSIAN, BOX = 0, 1
 
 _WIDE_GAUSSIAN = 0.3  # in repeats; from here on three harmonics give the wrapped density to 1e-12
 _HARMONICS = 3
+
+EVENLY: Final = 0.6
+"""Standard deviation of a Gaussian, in repeats, from which on single precision takes it as even: its one wave is
+2 exp(-2 pi^2 .36)."""
+
 BOX_SIDE = math.sqrt(12.0)  # side of the square whose standard deviation is 1
 
 # Acklam's rational approximation of the normal quantile [Acklam2003Quantile].

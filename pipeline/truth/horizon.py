@@ -231,3 +231,23 @@ def horizons(
             if own_plane and family != GAP:
                 slopes[a, k] = max(slopes[a, k], min(-(nx * dx + ny * dy) / nz, _STEEPEST))
     return slopes
+
+
+def horizon_sines(
+    front: HeightField,
+    back: HeightField,
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    gap: npt.NDArray[np.bool_],
+    azimuths: int,
+) -> npt.NDArray[np.float64]:
+    """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
+
+    Who looks through a gap sees it if nothing on the other side of the cloth, `back` seen from -wo, hides it either:
+    there the higher of both horizons counts. `azimuths` is even.
+    """
+    slopes = horizons(front, x, y, azimuths, False).astype(np.float64)
+    if gap.any():
+        other = horizons(back, x[gap], y[gap], azimuths, True)
+        slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, azimuths // 2, axis=0))
+    return np.asarray(slopes / np.sqrt(1.0 + slopes * slopes))

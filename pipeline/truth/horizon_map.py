@@ -14,22 +14,13 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.heightfield import (
-    BEND_RADIUS,
-    GAP,
-    HALF_LENGTH,
-    OFFSET,
-    RADIUS,
-    TOP,
-    UNDER,
-    WARP,
-    WEFT,
-    HeightField,
-)
-from pipeline.truth.horizon import horizons
-from pipeline.truth.table import orbits
-
-Single = npt.NDArray[np.float32]
+from pipeline.truth.gauss_rules import grid_middles
+from pipeline.truth.heightfield import GAP, TOP, WARP, WEFT, HeightField
+from pipeline.truth.horizon import horizon_sines
+from pipeline.truth.kernel import fast_kernel
+from pipeline.truth.pieces import Piece, cell_pieces
+from pipeline.truth.single import arcsine
+from pipeline.truth.table import Double, Single, orbits
 
 SLOTS: Final = 4
 """Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
@@ -37,6 +28,8 @@ SLOTS: Final = 4
 # Columns of `HorizonMap.pieces`.
 ALONG, CURVE, BOUND, START, SCALE = range(5)
 
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_INVERSE_PI = np.float32(1.0 / math.pi)
 _STEEPEST: Final = 0.99999  # sine of u that rounding may not pass
 
 
@@ -88,28 +81,24 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     picks, ends = field.top.shape
     pieces = np.zeros((picks, ends, SLOTS, 5))
     blocks = np.zeros((picks, ends, SLOTS), np.int32)
-    xs: list[npt.NDArray[np.float64]] = []
-    ys: list[npt.NDArray[np.float64]] = []
+    xs: list[Double] = []
+    ys: list[Double] = []
     gaps: list[bool] = []
     size = azimuths * grid * grid
     for orbit in orbits(field.top):
         pick, end = orbit[0]
-        for slot, family, low, high in slots(field, pick, end):
+        # One horizon will do for all gaps of a cell: the first one's, so that it comes last here.
+        for slot, piece in {slot_of(piece): piece for piece in reversed(cell_pieces(field, pick, end))}.items():
             for p, e in orbit:
-                pieces[p, e, slot] = _piece(field, p, e, slot, family, low, high)
+                pieces[p, e, slot] = _row(piece)
                 blocks[p, e, slot] = len(xs) * size
-            x, y = _nodes(field, family, low, high, grid)
-            gaps.append(family == GAP)
+            x, y = _nodes(piece, grid)
+            gaps.append(piece.family == GAP)
             xs.append(end + x)
             ys.append(pick + y)
-    x, y = np.concatenate(xs), np.concatenate(ys)
-    slopes = horizons(field, x, y, azimuths, False).astype(np.float64)
     gap = np.repeat(gaps, grid * grid)
-    if gap.any():
-        # Who looks through a gap sees it if nothing on the other side of the cloth, seen from -wo, hides it either.
-        other = horizons(back, x[gap], y[gap], azimuths, True)
-        slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, azimuths // 2, axis=0))
-    sines = (slopes / np.sqrt(1.0 + slopes * slopes)).reshape(azimuths, len(xs), grid * grid)
+    sines = horizon_sines(field, back, np.concatenate(xs), np.concatenate(ys), gap, azimuths)
+    sines = sines.reshape(azimuths, len(xs), grid * grid)
     return HorizonMap(
         repeat=np.array([ends, picks], np.int64),
         top=field.top.ravel().astype(np.int32),
@@ -123,46 +112,83 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     )
 
 
-def slots(field: HeightField, pick: int, end: int) -> list[tuple[int, int, float, float]]:
-    """Return slot, family and extent along the yarn, within the cell, of everything seen from above."""
-    top = int(field.top[pick, end])
-    margin, gap = (max(0.0, 0.5 - float(field.yarn[family, RADIUS])) for family in (top, 1 - top))
-    found = [(0, top, 0.0, 1.0)]
-    if margin > 1e-9:
-        found += [(1, 1 - top, 0.0, margin), (2, 1 - top, 1.0 - margin, 1.0)]
-        if gap > 1e-9:
-            found.append((3, GAP, 0.0, min(margin, gap)))
-    return found
+def slot_of(piece: Piece) -> int:
+    """Return which of the SLOTS of its cell a piece is."""
+    if piece.family == GAP:
+        return 3
+    if piece.side == TOP:
+        return 0
+    return 1 if piece.along[0] == 0.0 else 2
 
 
-def _piece(
-    field: HeightField, pick: int, end: int, slot: int, family: int, low: float, high: float
-) -> tuple[float, ...]:
+def _row(piece: Piece) -> tuple[float, ...]:
     """Return the row of `HorizonMap.pieces`."""
-    if family == GAP:
+    if piece.family == GAP:
         return (0.0, 0.0, 0.0, 0.0, 0.0)
-    side = TOP if slot == 0 else UNDER
-    own = field.floats[pick, end, side]
-    bend, half = float(own[BEND_RADIUS]), float(own[HALF_LENGTH])
-    curve, bound = 0.0, _STEEPEST
-    if bend > 0.0:
-        curve = 1.0 / bend if side == TOP else -1.0 / bend
-        bound = _STEEPEST if side == TOP else min(half / bend, _STEEPEST)
+    low, high = piece.along
     # A weft is measured along -x.
-    offset = float(own[OFFSET]) * (1.0 if family == WARP else -1.0)
-    return (offset, curve, bound, low, 1.0 / (high - low))
+    offset = piece.offset if piece.family == WARP else -piece.offset
+    return (offset, piece.sign * piece.curve, min(piece.steepest, _STEEPEST), low, 1.0 / (high - low))
 
 
-def _nodes(
-    field: HeightField, family: int, low: float, high: float, grid: int
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _nodes(piece: Piece, grid: int) -> tuple[Double, Double]:
     """Return x and y of a block's nodes within the cell, (grid * grid,): across the yarn runs fastest."""
-    middle = (np.arange(grid) + 0.5) / grid
-    if family == GAP:
-        # One horizon will do for all four corners: that of the middle of the first.
-        x = np.full(grid * grid, 0.5 * high)
+    if piece.family == GAP:
+        x = np.full(grid * grid, 0.5 * min(piece.across[1], piece.along[1]))
         return x, x
-    radius = float(field.yarn[family, RADIUS])
-    across = np.tile(0.5 + radius * np.sin(math.pi * (middle - 0.5)), grid)
-    along = np.repeat(low + (high - low) * middle, grid)
-    return (across, along) if family != WEFT else (along, across)
+    across = np.tile(grid_middles(*piece.across, grid, piece.radius), grid)
+    along = np.repeat(grid_middles(*piece.along, grid, 0.0), grid)
+    return (across, along) if piece.family != WEFT else (along, across)
+
+
+@fast_kernel
+def locate(
+    count: int,
+    x: Single,
+    y: Single,
+    ends: np.int32,
+    last_end: np.float32,
+    last_pick: np.float32,
+    top: npt.NDArray[np.int32],
+    pieces: Single,
+    blocks: npt.NDArray[np.int32],
+    grid: np.int32,
+    warp_radius: np.float32,
+    weft_radius: np.float32,
+    sine: Single,
+    distance: Single,
+    curvature: Single,
+    limit: Single,
+    warpness: Single,
+    weftness: Single,
+    node: npt.NDArray[np.int32],
+) -> None:
+    """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node."""
+    size = np.float32(grid)
+    for k in range(count):
+        column, line = min(np.floor(x[k]), last_end), min(np.floor(y[k]), last_pick)
+        cell = np.int32(line) * ends + np.int32(column)
+        fx, fy = x[k] - column - _HALF, y[k] - line - _HALF
+        in_warp, in_weft = abs(fx) <= warp_radius, abs(fy) <= weft_radius
+        warp_top = top[cell] == np.int32(0)
+        covered = in_warp if warp_top else in_weft
+        beneath = in_weft if warp_top else in_warp
+        warp = warp_top if covered else not warp_top
+        gap = not (covered or beneath)
+        along = fy if warp else fx
+        slot = np.int32(0) if covered else (np.int32(3) if gap else (np.int32(1) if along < _0 else np.int32(2)))
+        piece = cell * np.int32(SLOTS) + slot
+        row = piece * np.int32(5)
+        across = (fx if warp else fy) / (warp_radius if warp else weft_radius)
+        across = min(max(across, -_1), _1)
+        place = (along + _HALF - pieces[row + np.int32(START)]) * pieces[row + np.int32(SCALE)] * size
+        turn = (arcsine(across) * _INVERSE_PI + _HALF) * size
+        i = np.int32(min(max(turn, _0), size - _HALF))
+        j = np.int32(min(max(place, _0), size - _HALF))
+        node[k] = blocks[piece] + j * grid + i
+        sine[k] = across
+        distance[k] = (along if warp else -along) + pieces[row + np.int32(ALONG)]
+        curvature[k] = pieces[row + np.int32(CURVE)]
+        limit[k] = pieces[row + np.int32(BOUND)]
+        warpness[k] = _1 if (warp and not gap) else _0
+        weftness[k] = _0 if (warp or gap) else _1

@@ -7,8 +7,6 @@ density is then constant to 0.2 %. The random numbers are 23 bits of an integer 
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
@@ -33,19 +31,17 @@ from pipeline.truth.flat_points import (
     Y,
     fill_lanes,
     gather,
-    locate,
     query_rows,
     shade_all,
 )  # fmt: skip
-from pipeline.truth.horizon_map import HorizonMap, Single, horizon_map
+from pipeline.truth.footprint import EVENLY
+from pipeline.truth.horizon_map import HorizonMap, horizon_map, locate
 from pipeline.truth.kernel import fast_kernel, kernel
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.sequences import derive
+from pipeline.truth.table import Single
 from weaves.fabric import Fabric
-
-EVENLY: Final = 0.6
-"""Standard deviation of a Gaussian, in repeats, from which on it counts as even: its one wave is 2 exp(-2 pi^2 .36)."""
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _STEP = np.float32(1e9)  # points are seen or not

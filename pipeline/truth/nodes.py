@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.truth.azimuths import azimuth_rows
 from pipeline.truth.cloth import Columns, Model
 from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP
@@ -30,14 +31,6 @@ _SUBDIVISIONS: Final = (2, 4)
 
 _0 = np.float32(0.0)
 _STEEPEST = 1e4
-
-
-@kernel
-def azimuth_rows(x: float, y: float, count: int) -> tuple[int, int, float]:
-    """Return the rows of the two tabulated azimuths around a direction, and where between them it lies."""
-    place = math.atan2(y, x) / (2.0 * math.pi) * count
-    row = math.floor(place)
-    return int(row) % count, int(row + 1) % count, place - row
 
 
 @kernel

@@ -24,10 +24,9 @@ import numpy.typing as npt
 from pipeline.truth.kernel import kernel
 from pipeline.truth.query import Queries
 from pipeline.truth.single import absorbed
+from pipeline.truth.table import Single
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
-
-Single = npt.NDArray[np.float32]
 
 NONE, TOKSVIG, LEAN = range(3)
 WIDENINGS: Final = {"none": NONE, "toksvig": TOKSVIG, "lean": LEAN}
@@ -39,7 +38,6 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _TINY = np.float32(1e-12)
 _FAINT = np.float32(1e-6)  # coverage below which a family is not there
 _INVERSE_PI, _FOURTH_PI = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
-_DEEPEST = np.float32(80.0)
 
 
 class Pyramid(NamedTuple):
@@ -187,7 +185,7 @@ def _answer(
             sigma_i = np.sqrt(max(_1 - rest * along_i * along_i, square))
             sigma_o = np.sqrt(max(_1 - rest * along_o * along_o, square))
             crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
-            depth = min(thickness * crossed / (cos_i * cos_o), _DEEPEST)
+            depth = thickness * crossed / (cos_i * cos_o)
             q = square + rest * size * (along_i + along_o) * (along_i + along_o)
             flakes = square * np.sqrt(square) * _FOURTH_PI / (q * q * crossed)
             blend = yarn[family, 1]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.truth.azimuths import azimuth_rows
 from pipeline.truth.cloth import Columns, Model
 from pipeline.truth.heightfield import ALPHA, BLEND
 from pipeline.truth.kernel import fast_kernel, kernel
 from pipeline.truth.lanes import reflected, weigh
-from pipeline.truth.nodes import azimuth_rows, bounded_slope
+from pipeline.truth.nodes import bounded_slope
 from pipeline.truth.table import COLUMNS, FAMILY, FINE_START, ROWS, START, Single, Table
 
 OPERATIONS = {"specular": (74, 2, 1), "everything": (112, 2, 1)}

@@ -10,16 +10,20 @@ arithmetic. All constants are typed, because numba computes float32 times a lite
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pipeline.truth.kernel import fast_kernel, fused_kernel
 
-_1, _HALF = np.float32(1.0), np.float32(0.5)
-_DEEPEST = np.float32(87.0)  # exp(-87) is the least that single precision holds with all its digits
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_DEEPEST = np.float32(80.0)  # beyond exp(-87) numbers lose digits, and processors their speed
 _HALVINGS = np.float32(1.4426950408889634)  # 1 / ln 2
 # ln 2 in two parts: the first has so few digits that its products with n are exact.
 _LN2, _LN2_REST = np.float32(0.693359375), np.float32(-2.1219444e-4)
 _BIAS, _MANTISSA = np.int32(127), np.int32(23)  # of the format: (127 + exponent) << 23 are the bits of 2^exponent
+_RIGHT = np.float32(0.5 * math.pi)
+_AS0, _AS1, _AS2, _AS3 = (np.float32(c) for c in (1.5707288, -0.2121144, 0.0742610, -0.0187293))
 _C2, _C3, _C4, _C5, _C6, _C7 = (np.float32(c) for c in (-1 / 2, 1 / 6, -1 / 24, 1 / 120, -1 / 720, 1 / 5040))
 
 
@@ -50,6 +54,15 @@ def absorbed(depth: np.float32) -> np.float32:
 
 @fast_kernel
 def remaining(depth: np.float32) -> np.float32:
-    """Return exp(-depth) for depth from 0 to 87, to 3e-7 relative; 1.6e-38 beyond."""
+    """Return exp(-depth) for depth from 0 to 80, to 3e-7 relative; 1.8e-35 beyond."""
     power, q = _halved(depth)
     return power * (_1 - q)
+
+
+@fast_kernel
+def arcsine(x: np.float32) -> np.float32:
+    """Return asin x to 7e-5 [Abramowitz1964Handbook, 4.4.45]."""
+    size = min(abs(x), _1)
+    angle = _RIGHT - np.sqrt(_1 - size) * (_AS0 + size * (_AS1 + size * (_AS2 + size * _AS3)))
+    signed: np.float32 = angle if x >= _0 else -angle
+    return signed

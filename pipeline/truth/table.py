@@ -25,11 +25,13 @@ from pipeline.truth.heightfield import (
     TOP,
     UNDER,
     WARP,
+    WEFT,
     HeightField,
     surface_at,
 )
 from pipeline.truth.horizon import horizons
 from pipeline.truth.kernel import kernel
+from pipeline.truth.pieces import cell_pieces
 
 NODES: Final = 32
 """Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
@@ -212,7 +214,6 @@ def _pieces(
     field: HeightField, pick: int, end: int, nodes: int
 ) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
     """Return family, x edges and y edges of everything seen from above in a cell."""
-    top = int(field.top[pick, end])
     around = [tuple((0.5 + radius * np.sin(np.linspace(-math.pi / 2, math.pi / 2, nodes + 1))).tolist())
               for radius in field.yarn[:, RADIUS]]  # fmt: skip
 
@@ -225,27 +226,18 @@ def _pieces(
         step = _SIDE * (places[1] - low)
         return (low, low + step, *places[1:-1], high - step, high)
 
-    def oriented(
-        family: int, across: tuple[float, ...], along: tuple[float, ...]
-    ) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
-        return (family, across, along) if family == WARP else (family, along, across)
-
     # Nodes end where the crossing yarn does: from there on the other side of the cloth is another one.
-    margin, gap = (max(0.0, 0.5 - float(field.yarn[family, RADIUS])) for family in (top, 1 - top))
+    gap = max(0.0, 0.5 - float(field.yarn[1 - int(field.top[pick, end]), RADIUS]))
     if gap > 1e-9:
-        along = straight(0.0, gap)[:-1] + beneath_another(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
+        covered = straight(0.0, gap)[:-1] + beneath_another(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
     else:
-        along = beneath_another(0.0, 1.0)
-    found = [oriented(top, around[top], along)]
-    if margin > 1e-9:
-        beneath = 1 - top
-        for low, high in ((0.0, margin), (1.0 - margin, 1.0)):
-            found.append(oriented(beneath, around[beneath], straight(low, high)))
-        if gap > 1e-9:
-            sides = [[(0.0, width), (1.0 - width, 1.0)] for width in (margin, gap)]
-            for first in sides[0]:
-                for second in sides[1]:
-                    found.append((GAP, *oriented(top, straight(*first), straight(*second))[1:]))
+        covered = beneath_another(0.0, 1.0)
+    found = []
+    for piece in cell_pieces(field, pick, end):
+        across = straight(*piece.across) if piece.family == GAP else around[piece.family]
+        along = covered if piece.side == TOP else straight(*piece.along)
+        x, y = (along, across) if piece.family == WEFT else (across, along)
+        found.append((piece.family, x, y))
     return found
 
 

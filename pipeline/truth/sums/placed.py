@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from pipeline.truth.heightfield import WARP
 from pipeline.truth.kernel import fast_kernel, kernel
-from pipeline.truth.single import remaining
+from pipeline.truth.single import arcsine, remaining
+from pipeline.truth.soft_horizons import above, ramp
 from pipeline.truth.sums.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT
 from pipeline.truth.sums.table import BOUND, CURVE, LANES, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.truth.table import Single
@@ -32,7 +33,6 @@ for _n in range(1, MOST_ACROSS + 1):
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _INVERSE_PI, _INVERSE_TURN = np.float32(1.0 / math.pi), np.float32(0.5 / math.pi)
-_DEEPEST = np.float32(80.0)
 _VERTICAL = np.float32(0.99999)  # largest sine of v
 _LEVELS = np.float32(LEVELS)
 
@@ -49,16 +49,6 @@ def nodes_for(length: np.float32) -> int:
     if length < 3.5:
         return 5
     return MOST_ACROSS
-
-
-@fast_kernel
-def _arcsine(x: np.float32) -> np.float32:
-    """Return asin x to 7e-5 [Abramowitz1964Handbook, 4.4.45]."""
-    size = min(abs(x), _1)
-    series = np.float32(0.0742610) + size * np.float32(-0.0187293)
-    series = np.float32(1.5707288) + size * (np.float32(-0.2121144) + size * series)
-    angle = np.float32(0.5 * math.pi) - np.sqrt(_1 - size) * series
-    return np.float32(angle if x >= _0 else -angle)
 
 
 @fast_kernel
@@ -126,7 +116,7 @@ def place_nodes(
         low, length = bounds[X_LOW], bounds[X_HIGH] - bounds[X_LOW]
         step_a, step_b = size, 1
     across, along = nodes_for((a_high - a_low) * inverse_a), nodes_for((b_high - b_low) * inverse_b)
-    v_low, v_high = _arcsine(a_low / radius), _arcsine(a_high / radius)
+    v_low, v_high = arcsine(a_low / radius), arcsine(a_high / radius)
     half_v, middle_v = _HALF * (v_high - v_low), _HALF * (v_high + v_low)
     half_b, middle_b = _HALF * (b_high - b_low), _HALF * (b_high + b_low)
     area = half_v * half_b * radius * inverse_a * inverse_b * _INVERSE_TURN
@@ -135,12 +125,12 @@ def place_nodes(
         sv, cv = _sine_cosine(v)
         da = (radius * sv - centre_a) * inverse_a
         line[0, k], line[1, k] = sv, cv
-        line[2, k] = area * _GAUSS_WEIGHTS[across, k] * cv * remaining(min(_HALF * da * da, _DEEPEST))
+        line[2, k] = area * _GAUSS_WEIGHTS[across, k] * cv * remaining(_HALF * da * da)
         line[3, k] = min(max((v * _INVERSE_PI + _HALF) * count, _0), count - np.float32(0.01))
         place = middle_b + half_b * _GAUSS_PLACES[along, k]
         db = (place - centre_b) * inverse_b
         line[4, k] = place - _HALF + bounds[SHIFT]
-        line[5, k] = _GAUSS_WEIGHTS[along, k] * remaining(min(_HALF * db * db, _DEEPEST))
+        line[5, k] = _GAUSS_WEIGHTS[along, k] * remaining(_HALF * db * db)
         line[6, k] = min(max((place - low) / length * count, _0), count - np.float32(0.01))
     k = start
     for j in range(along):
@@ -208,8 +198,7 @@ def gap_area(
             dx = (place_x - x) * inverse_x
             cell = row + min(max(int((place_x - bounds[X_LOW]) * per_x), 0), size - 1)
             low, high = np.float32(grid[cell + low_o]), np.float32(grid[cell + high_o])
-            over = (oz - (low + turn_o * (high - low)) / _LEVELS) * sharpness
-            density = remaining(min(_HALF * (dx * dx + dy * dy), _DEEPEST))
+            density = remaining(_HALF * (dx * dx + dy * dy))
             share = _GAUSS_WEIGHTS[rows, j] * _GAUSS_WEIGHTS[columns, i]
-            total += share * density * min(max(_HALF + over, _0), _1)
+            total += share * density * ramp(above(oz * _LEVELS, low, high, turn_o, sharpness / _LEVELS))
     return total * half_x * half_y * inverse_x * inverse_y * _INVERSE_TURN * oz

@@ -1,8 +1,7 @@
 """The point model over blocks of lanes, soft shadows included; the innermost loops of the sums.
 
 The formulas are those of `patch`, `microflake` and `slab`, written with cosines only. What differs: a horizon is a
-ramp; how much of a box both viewer and light reach depends on their azimuths: alike (the better hidden one decides), at
-right angles (independently) or opposite (what hides one shows the other); a highlight has four places in a node's box.
+ramp (soft_horizons), and a highlight has four places in a node's box.
 
 Of each family come ten sums, each a share of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and
 lit; BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR, the same with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, how much
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from pipeline.truth.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
 from pipeline.truth.kernel import fast_kernel, inlined_fast_kernel
 from pipeline.truth.single import absorbed
+from pipeline.truth.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
 from pipeline.truth.sums.table import LANES, LEVELS
 from pipeline.truth.table import Single
 
@@ -43,9 +43,8 @@ Ten = tuple[
     np.float32,
 ]  # fmt: skip
 
-_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_0, _1 = np.float32(0.0), np.float32(1.0)
 _TINY = np.float32(1e-12)
-_DEEPEST = np.float32(80.0)
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _LEVELS = np.float32(LEVELS)
@@ -63,7 +62,7 @@ class Directions(NamedTuple):
     size : float32
         1 / |wi + wo|^2.
     alike, right, opposite : float32
-        Weights of the three ways in which shadow and mask go together; they sum to 1.
+        How their azimuths lie to each other (soft_horizons).
     """
 
     ix: np.float32
@@ -84,12 +83,10 @@ def directions(
 ) -> Directions:
     """Prepare a query's directions for a family."""
     size = _1 / ((ix + ox) ** 2 + (iy + oy) ** 2 + (iz + oz) ** 2)
-    lengths = (ix * ix + iy * iy) * (ox * ox + oy * oy)
-    cosine = (ix * ox + iy * oy) / np.sqrt(max(lengths, np.float32(1e-20)))
-    alike, opposite = max(cosine, _0), max(-cosine, _0)
+    alike, right, opposite = azimuths_apart(ix, iy, ox, oy)
     if family == WEFT:
         ix, iy, ox, oy = iy, -ix, oy, -ox
-    return Directions(ix, iy, iz, ox, oy, oz, size, alike, _1 - alike - opposite, opposite)
+    return Directions(ix, iy, iz, ox, oy, oz, size, alike, right, opposite)
 
 
 @inlined_fast_kernel
@@ -120,7 +117,7 @@ def _node(
     facing_o = d.ox * nx + d.oy * ny + d.oz * nz
     facing_i = d.ix * nx + d.iy * ny + d.iz * nz
     cos_o, cos_i = max(facing_o, _0), max(facing_i, _0)
-    both = d.alike * min(seen, lit) + d.right * seen * lit + d.opposite * max(seen + lit - _1, _0)
+    both = seen_and_lit(seen, lit, d.alike, d.right, d.opposite)
     wide = weight * inverse
     area = wide * cos_o
     diffuse = area * ((blend * cos_i + (_1 - blend) * d.iz) if facing_i > _0 else _0)
@@ -137,7 +134,7 @@ def _node(
     sigma_o = np.sqrt(max(_1 - (_1 - square) * to * to, square))
     crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
     cosines = cos_i * cos_o
-    depth = min(thickness * crossed / (cosines + _TINY), _DEEPEST)
+    depth = thickness * crossed / (cosines + _TINY)
     flakes = ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23 * crossed)
     specular = wide * scale * flakes * cosines * absorbed(depth)
     return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
@@ -171,10 +168,10 @@ def shade_fixed(
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(LANES):
-            over_o = (d.oz - low_o[b, k] - turn_o * (high_o[b, k] - low_o[b, k])) * sharpness_o[b, k]
-            over_i = (d.iz - low_i[b, k] - turn_i * (high_i[b, k] - low_i[b, k])) * sharpness_i[b, k]
-            seen = min(max(_HALF + over_o, _0), _1) + _TAIL / (_1 + over_o * over_o)
-            lit = min(max(_HALF + over_i, _0), _1)
+            over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
+            over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+            lit = ramp(over_i)
             along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
             node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
@@ -226,11 +223,10 @@ def shade_placed(
     for b in range(len(cells)):
         for k in range(LANES):
             at = cells[b, k]
-            first_i, first_o = np.float32(grid[at + low_i]), np.float32(grid[at + low_o])
-            over_i = (level_i - first_i - turn_i * (np.float32(grid[at + high_i]) - first_i)) * sharp
-            over_o = (level_o - first_o - turn_o * (np.float32(grid[at + high_o]) - first_o)) * sharp
-            seen = min(max(_HALF + over_o, _0), _1) + _TAIL / (_1 + over_o * over_o)
-            lit = min(max(_HALF + over_i, _0), _1)
+            over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
+            over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+            lit = ramp(over_i)
 
             # Normal and tangent, as in heightfield.surface_at; the tangent's change, as in `surface`.
             sv, cv, turn = nodes[b, SIN, k], nodes[b, COS, k], nodes[b, TURN, k]
@@ -275,6 +271,5 @@ def shade_gaps(
     area = _0
     for b in range(len(weight)):
         for k in range(LANES):
-            over = (oz - low_o[b, k] - turn_o * (high_o[b, k] - low_o[b, k])) * sharpness_o[b, k]
-            area += weight[b, k] * min(max(_HALF + over, _0), _1)
+            area += weight[b, k] * ramp(above(oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k]))
     return area * oz

@@ -15,21 +15,22 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.truth.axis_densities import NARROW, axis_densities
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP, RADIUS
-from pipeline.truth.kernel import fast_kernel, kernel
-from pipeline.truth.sums.pieces import COLUMNS
+from pipeline.truth.kernel import kernel
+from pipeline.truth.soft_horizons import sharpness_of_points
+from pipeline.truth.sums.diamond import AZIMUTHS, around
+from pipeline.truth.sums.kinds import COLUMNS
 from pipeline.truth.sums.placed import LINE_ROWS, MOST_ACROSS, fill_block, gap_area, place_nodes
 from pipeline.truth.sums.shade import ROWS, SUMS, directions, shade_fixed, shade_gaps, shade_placed
-from pipeline.truth.sums.table import AZIMUTHS, BLOCK, FAMILY, LANES, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
+from pipeline.truth.sums.table import BLOCK, FAMILY, LANES, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
 from pipeline.truth.sums.waves import HIGHEST
-from pipeline.truth.sums.weights import REACH, TURN_ROWS, axis_densities, product_weights, wave_weights
+from pipeline.truth.sums.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.truth.table import Single
 
-NARROW: Final = 0.25
-"""Deviation, in yarn spacings, below which a footprint places its own nodes."""
-
 LONG: Final = 0.75
-"""Largest deviation along the other axis for which it does: the nodes that it may place are counted."""
+"""Largest deviation along the wider axis for which a footprint narrow along the other places its own nodes: these are
+counted."""
 
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; a narrower one is taken as this."""
@@ -38,20 +39,7 @@ RESOLVED: Final = 0.12
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
 _MOST_NODES = 3 * _MOST_CELLS * MOST_ACROSS**2
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
-_RAMP, _RAMP_SLOPE = np.float32(0.02), np.float32(0.4)  # width of a horizon's ramp, and its growth with the deviation
-_TINY = np.float32(1e-12)
-_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-
-
-@fast_kernel
-def _azimuth(x: np.float32, y: np.float32) -> tuple[int, int, np.float32]:
-    """Return the two azimuths of a table around a direction, and where between them it lies."""
-    size = abs(x) + abs(y)
-    t = y / size if size > _TINY else _0
-    t = _1 - t if x >= _0 else np.float32(3.0) + t
-    t = t * np.float32(AZIMUTHS / 4)
-    low = min(int(t), AZIMUTHS - 1)
-    return low, (low + 1 if low + 1 < AZIMUTHS else 0), t - np.float32(low)
+_HALF = np.float32(0.5)
 
 
 @kernel
@@ -106,8 +94,8 @@ def sum_queries(
 
     for n in range(count):
         ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
-        low_i, high_i, turn_i = _azimuth(ix, iy)
-        low_o, high_o, turn_o = _azimuth(ox, oy)
+        low_i, high_i, turn_i = around(ix, iy)
+        low_o, high_o, turn_o = around(ox, oy)
         # Reduced in double precision: single would lose the place of a far centre within the repeat.
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
@@ -127,9 +115,13 @@ def sum_queries(
                 widest_x = np.float32(min(max(dx, RESOLVED), max(table.uniform, LONG)))
                 widest_y = np.float32(min(max(dy, RESOLVED), max(table.uniform, LONG)))
                 across = axis_densities(
-                    table.places, table.weights, np.float32(x), widest_x, density_x, touched_x, columns
-                )
-                along = axis_densities(table.places, table.weights, np.float32(y), widest_y, density_y, touched_y, rows)
+                    table.places, table.weights, COLUMNS, np.float32(x), widest_x, np.float32(REACH), density_x,
+                    touched_x, columns,
+                )  # fmt: skip
+                along = axis_densities(
+                    table.places, table.weights, COLUMNS, np.float32(y), widest_y, np.float32(REACH), density_y,
+                    touched_y, rows,
+                )  # fmt: skip
                 product_weights(
                     table.kind_starts, table.cell_kinds, table.kinds, density_x, density_y, columns[:across],
                     rows[:along], ends, lines,
@@ -154,7 +146,7 @@ def sum_queries(
 
         # Place nodes in every piece that the footprint touches.
         stops[:] = 0
-        ramp = _1 / (_RAMP + _RAMP_SLOPE * widest)
+        sharp = sharpness_of_points(widest)
         left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
         for row in range(math.floor(lower), math.floor(upper) + 1):
             for column in range(math.floor(left), math.floor(right) + 1):
@@ -167,7 +159,7 @@ def sum_queries(
                     family, first = pieces[p, FAMILY], pieces[p, BLOCK] * per_grid
                     if family == GAP:
                         gaps[n] += gap_area(
-                            bounds[p], grid, first, size, low_o * per_azimuth, high_o * per_azimuth, turn_o, ramp, oz,
+                            bounds[p], grid, first, size, low_o * per_azimuth, high_o * per_azimuth, turn_o, sharp, oz,
                             np.float32(x - column), np.float32(y - row), dx, dy, np.float32(x_low),
                             np.float32(x_high), np.float32(y_low), np.float32(y_high),
                         )  # fmt: skip
@@ -185,7 +177,7 @@ def sum_queries(
             found = shade_placed(
                 placed[family, :blocks], cells[family, :blocks], grid, np.uint32(low_i * per_azimuth),
                 np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
-                np.uint32(high_o * per_azimuth), turn_o, ramp, d, yarn[family], thickness,
+                np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
             )  # fmt: skip
             for q in range(SUMS):
                 result[n, family, q] = found[q]

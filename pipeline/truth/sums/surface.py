@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.heightfield import BETA, COS_TWIST, GAP, RADIUS, SIN_TWIST, TOP, WARP
-from pipeline.truth.sums.pieces import Piece
-from pipeline.truth.sums.rules import Double, Rule
+from pipeline.truth.gauss_rules import Double, Rule
+from pipeline.truth.heightfield import BETA, COS_TWIST, GAP, SIN_TWIST, WARP
+from pipeline.truth.pieces import Piece
 
 ROWS: Final = 13
 """Normal (3), 1 / n_z, tangent (3), its change along (3) and across (3)."""
@@ -22,7 +22,8 @@ ROWS: Final = 13
 LEVEL: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
 """The rows of a gap, and of what fills a block of lanes."""
 
-_STEEPEST = 0.999  # sine of an inclination
+STEEPEST: Final = 0.999
+"""Largest sine of an inclination."""
 
 
 def piece_rows(yarn: npt.NDArray[np.float64], piece: Piece, across: Rule, along: Rule) -> Double:
@@ -41,7 +42,7 @@ def piece_rows(yarn: npt.NDArray[np.float64], piece: Piece, across: Rule, along:
     if piece.family == GAP:
         return np.tile(LEVEL[:, None], lines * columns)
     own = yarn[piece.family]
-    radius, sin_t, cos_t, beta = own[RADIUS], own[SIN_TWIST], own[COS_TWIST], own[BETA]
+    radius, sin_t, cos_t, beta = piece.radius, own[SIN_TWIST], own[COS_TWIST], own[BETA]
     turned = 1.0 if piece.family == WARP else -1.0  # y of the yarn's frame against the cell's axis
 
     # Sines and cosines of the angles across (v) and along (u).
@@ -49,7 +50,7 @@ def piece_rows(yarn: npt.NDArray[np.float64], piece: Piece, across: Rule, along:
     cv = np.sqrt((1.0 - sv) * (1.0 + sv))
     place = turned * (np.repeat(along.places, columns) - 0.5 + piece.offset)
     curve = piece.sign * piece.curve / (1.0 + piece.sign * radius * piece.curve * cv)
-    bound = _STEEPEST if piece.side == TOP else min(piece.half * piece.curve, _STEEPEST)
+    bound = min(piece.steepest, STEEPEST)
     su = np.clip(place * curve, -bound, bound)
     cu = np.sqrt((1.0 - su) * (1.0 + su))
 

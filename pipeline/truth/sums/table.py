@@ -17,21 +17,21 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth.cloth import model_of
-from pipeline.truth.heightfield import GAP, HALF_LENGTH, RADIUS, TOP, WARP, WEFT, HeightField
-from pipeline.truth.horizon import horizons
+from pipeline.truth.gauss_rules import Double, Rule, gauss_rule, grid_edges, grid_middles, overlap
+from pipeline.truth.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
+from pipeline.truth.horizon import horizon_sines
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.sums.pieces import COLUMNS, Kind, Piece, cell_pieces, gather
-from pipeline.truth.sums.rules import Double, Rule, grid_edges, grid_middles, overlap, rule
-from pipeline.truth.sums.surface import LEVEL, piece_rows
+from pipeline.truth.pieces import Piece, cell_pieces
+from pipeline.truth.soft_horizons import over_boxes
+from pipeline.truth.sums.diamond import AZIMUTHS, from_even
+from pipeline.truth.sums.kinds import COLUMNS, Kind, gather
+from pipeline.truth.sums.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.truth.sums.waves import tabulate_waves
 from pipeline.truth.table import Index, Single, longest_period, orbits
 from weaves.fabric import Fabric
 
 LANES: Final = 16
 """Numbers in single precision that the widest vector units take at a time."""
-
-AZIMUTHS: Final = 32
-"""Azimuths for which horizons are known."""
 
 LEVELS: Final = 255.0
 """Largest value of a grid, for a horizon straight above."""
@@ -40,7 +40,6 @@ _GRIDS = (24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 _GRID_BYTES = 1 << 20
 _EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
 _SHARPEST = 0.02  # least spread of a horizon
-_STEEPEST = 0.999  # sine of an inclination
 
 # Columns of `Table.kinds`.
 START, LINES, RULE_ALONG, RULE_ACROSS, KIND_FAMILY = range(5)
@@ -146,7 +145,7 @@ def tabulate(fabric: Fabric) -> Table:
 
     # The nodes of every kind, each family in whole blocks.
     kinds = gather(placed)
-    rules = [(_rule(front, kind.piece, False), _rule(front, kind.piece, True)) for kind in kinds]
+    rules = [_rules(kind) for kind in kinds]
     starts, first_nodes, stop = [], [], 0
     for family in (WARP, WEFT, GAP):
         starts.append(stop // LANES)
@@ -160,10 +159,10 @@ def tabulate(fabric: Fabric) -> Table:
     evenly, mean = np.zeros(stop), np.zeros((AZIMUTHS, stop))
     variance = np.ones((AZIMUTHS, stop))
     for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True):
-        lanes = (start + np.arange(kind.nodes)).reshape(kind.piece.lines, COLUMNS)[:, : len(across.places)].ravel()
+        lanes = (start + np.arange(kind.nodes)).reshape(kind.lines, COLUMNS)[:, : len(across.places)].ravel()
         nodes[:, lanes] = piece_rows(front.yarn, kind.piece, across, along)
         evenly[lanes] = np.outer(along.weights, across.weights).ravel() * len(kind.cells) / (ends * picks)
-        mean[:, lanes], variance[:, lanes] = _soft_horizons(front, kind, across, along, grid)
+        mean[:, lanes], variance[:, lanes] = _soft_horizons(kind, across, along, grid)
     used = list({id(one): one for pair in rules for one in pair}.values())
     number = {id(one): index for index, one in enumerate(used)}
     waves = tabulate_waves(kinds, rules, first_nodes, stop, (ends, picks))
@@ -189,7 +188,7 @@ def tabulate(fabric: Fabric) -> Table:
         sharpness=lanes_of(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2))),
         kinds=np.array(
             [
-                (start, kind.piece.lines, number[id(along)], number[id(across)], kind.piece.family)
+                (start, kind.lines, number[id(along)], number[id(across)], kind.piece.family)
                 for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True)
             ],
             np.uint32,
@@ -208,24 +207,16 @@ def tabulate(fabric: Fabric) -> Table:
     )
 
 
-def _radius(front: HeightField, piece: Piece) -> float:
-    """Return the radius of a piece's yarn; 0 for a gap."""
-    return 0.0 if piece.family == GAP else float(front.yarn[piece.family, RADIUS])
-
-
-def _rule(front: HeightField, piece: Piece, along: bool) -> Rule:
-    """Return the nodes of a piece along one axis."""
-    if along:
-        return rule(*piece.along, piece.lines, 0.0)
-    if piece.family == GAP:
-        return rule(*piece.across, piece.lines, 0.0)
-    return rule(*piece.across, COLUMNS, _radius(front, piece))
+def _rules(kind: Kind) -> tuple[Rule, Rule]:
+    """Return the nodes of a kind across and along."""
+    piece = kind.piece
+    columns = kind.lines if piece.family == GAP else COLUMNS
+    return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, kind.lines, 0.0)
 
 
 def _bounds(piece: Piece) -> tuple[float, ...]:
-    bound = _STEEPEST if piece.side == TOP else min(piece.half * piece.curve, _STEEPEST)
     x, y = piece.box
-    return (*x, *y, piece.offset, piece.sign * piece.curve, bound)
+    return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, STEEPEST))
 
 
 def _filled(rows: list[Double], edge: bool) -> Single:
@@ -239,7 +230,8 @@ def _filled(rows: list[Double], edge: bool) -> Single:
 def _float_lengths(front: HeightField) -> Single:
     found = []
     for family in (WARP, WEFT):
-        shown = front.floats[front.top == family, TOP, HALF_LENGTH]
+        # Floats that never end count as long as the repeat.
+        shown = np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], 0.5 * front.top.shape[family])
         found.append(2.0 * float(shown.mean()) if shown.size else 1.0)
     return np.array(found, np.float32)
 
@@ -250,45 +242,24 @@ def _horizon_grids(
     """Return the horizons of pieces, given with pick and end, in the middles of the cells of their grids."""
     xs, ys, gaps = [], [], []
     for pick, end, piece in samples:
-        x, y = (
-            grid_middles(*extent, size, _radius(front, piece) if bent else 0.0)
-            for extent, bent in zip(piece.box, (piece.family == WARP, piece.family == WEFT), strict=True)
-        )
+        x, y = (grid_middles(*extent, size, radius) for extent, radius in zip(piece.box, piece.radii, strict=True))
         xs.append(np.tile(end + x, size))
         ys.append(np.repeat(pick + y, size))
         gaps.append(np.full(size * size, piece.family == GAP))
     x, y, gap = (np.concatenate(parts) for parts in (xs, ys, gaps))
-    slopes = horizons(front, x, y, 2 * AZIMUTHS, False)
-    if gap.any():
-        # Who looks through a gap sees it if nothing on the other side of the cloth, seen from -wo, hides it either.
-        other = horizons(back, x[gap], y[gap], 2 * AZIMUTHS, True)
-        slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, AZIMUTHS, axis=0))
-    sines = slopes / np.sqrt(1.0 + slopes.astype(np.float64) ** 2)
-
-    # From evenly spaced azimuths to those even in the diamond angle: from +y through +x, -y, -x.
-    t = 4.0 * np.arange(AZIMUTHS) / AZIMUTHS
-    dy = np.where(t <= 2.0, 1.0 - t, t - 3.0)
-    dx = np.where(t <= 2.0, 1.0, -1.0) * (1.0 - np.abs(dy))
-    turn = np.mod(np.arctan2(dy, dx), 2.0 * np.pi) * AZIMUTHS / np.pi
-    low = np.floor(turn + 1e-9).astype(np.int64)
-    share = (turn - low)[:, None]
-    even = sines[low % (2 * AZIMUTHS)] * (1.0 - share) + sines[(low + 1) % (2 * AZIMUTHS)] * share
-    grids = even.reshape(AZIMUTHS, len(samples), size, size).transpose(1, 0, 2, 3)
+    sines = from_even(horizon_sines(front, back, x, y, gap, 2 * AZIMUTHS))
+    grids = sines.reshape(AZIMUTHS, len(samples), size, size).transpose(1, 0, 2, 3)
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
 
 
-def _soft_horizons(
-    front: HeightField, kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]
-) -> tuple[Double, Double]:
+def _soft_horizons(kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]) -> tuple[Double, Double]:
     """Return mean and variance of the horizon over each node's box and all cells of a kind, (AZIMUTHS, nodes)."""
     piece, size = kind.piece, grid.shape[-1]
-    of_across = overlap(across.borders, grid_edges(*piece.across, size, _radius(front, piece)))
+    of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
     of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
-    x, y = (of_along, of_across) if piece.family == WEFT else (of_across, of_along)
-    order = "bayx,jx,iy->aji" if piece.family == WEFT else "bayx,jx,iy->aij"
     blocks, counts = np.unique(kind.blocks, return_counts=True)
     values = grid[blocks] / LEVELS
+    if piece.family == WEFT:
+        values = values.transpose(0, 1, 3, 2)
     share = (counts / counts.sum())[:, None, None, None]
-    first = np.einsum(order, share * values, x, y, optimize=True).reshape(AZIMUTHS, -1)
-    second = np.einsum(order, share * values**2, x, y, optimize=True).reshape(AZIMUTHS, -1)
-    return first, np.maximum(second - first**2, 0.0)
+    return over_boxes((share * values).sum(axis=0), (share * values**2).sum(axis=0), of_along, of_across)

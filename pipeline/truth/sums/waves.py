@@ -15,9 +15,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.truth.gauss_rules import Rule
 from pipeline.truth.heightfield import WEFT
-from pipeline.truth.sums.pieces import Kind
-from pipeline.truth.sums.rules import Rule
+from pipeline.truth.sums.kinds import Kind
 
 MOST_WAVES: Final = 24
 """Waves kept: as many cost about what the densities of all cells do."""
@@ -91,7 +91,7 @@ def tabulate_waves(
             at_x, at_y = np.exp(2j * np.pi * m * x.places / ends), np.exp(2j * np.pi * n * y.places / picks)
             product = np.outer(at_x, at_y) if kind.piece.family == WEFT else np.outer(at_y, at_x)
             # A line of nodes may be longer than the rule across; the rest of it weighs nothing.
-            lines = np.zeros((kind.piece.lines, kind.nodes // kind.piece.lines), np.complex128)
+            lines = np.zeros((kind.lines, kind.nodes // kind.lines), np.complex128)
             lines[:, : product.shape[1]] = mean * product
             wave[start : start + kind.nodes] = lines.ravel()
         if np.abs(wave).max() < _ABSENT:

@@ -1,7 +1,6 @@
 """Which share of a wide footprint falls on each fixed node: a sum of waves, or of the Gaussian over all its images.
 
-A Gaussian along the axes is a product, so that its densities at the nodes of a cell are those of a rule along x times
-those of a rule along y: one outer product for every touched cell and kind.
+A Gaussian along the axes is a product: one outer product of densities (axis_densities) for every touched cell and kind.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy.typing as npt
 from pipeline.truth.heightfield import WEFT
 from pipeline.truth.kernel import fast_kernel
 from pipeline.truth.single import remaining
-from pipeline.truth.sums.pieces import COLUMNS
+from pipeline.truth.sums.kinds import COLUMNS
 from pipeline.truth.sums.table import KIND_FAMILY, LANES, LINES, RULE_ACROSS, RULE_ALONG, START
 from pipeline.truth.sums.waves import HIGHEST, faintest
 from pipeline.truth.table import Index, Single
@@ -26,11 +25,10 @@ REACH: Final = 2.6
 TURN_ROWS: Final = 4
 """Rows of the scratch of `wave_weights`: cosines and sines of whole turns of x, then of y."""
 
-_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_0, _1 = np.float32(0.0), np.float32(1.0)
 _TURN = np.float32(2.0 * math.pi)
 _DAMPING = np.float32(2.0 * math.pi**2)
 _FAINTEST = np.float32(faintest(1.0) ** 2)
-_DEEPEST = np.float32(80.0)
 
 
 @fast_kernel
@@ -67,7 +65,7 @@ def wave_weights(
     for h in range(count):
         m, n = waves[h, 0], waves[h, 1]
         of_x, of_y = np.float32(m) / ends * deviation_x, np.float32(n) / picks * deviation_y
-        damping = remaining(min(_DAMPING * (of_x * of_x + of_y * of_y), _DEEPEST))
+        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y))
         cos_x, sin_x, cos_y, sin_y = turns[0, m], turns[1, m], turns[2, abs(n)], turns[3, abs(n)]
         sin_y = -sin_y if n < 0 else sin_y
         cosine, sine = damping * (cos_x * cos_y - sin_x * sin_y), damping * (sin_x * cos_y + cos_x * sin_y)
@@ -78,46 +76,6 @@ def wave_weights(
     for b in range(len(weight)):
         for k in range(LANES):
             weight[b, k] = max(weight[b, k], _0) * evenly[b, k]
-
-
-@fast_kernel
-def axis_densities(
-    places: Single,
-    weights: Single,
-    centre: np.float32,
-    deviation: np.float32,
-    density: Single,
-    touched: npt.NDArray[np.bool_],
-    found: npt.NDArray[np.uint32],
-) -> int:
-    """Write the weights of all rules in the cells of one axis, (cells, rules, COLUMNS); list the touched cells.
-
-    Returns
-    -------
-    int
-        How many cells are touched.
-    """
-    cells = len(touched)
-    reach = np.float32(REACH) * deviation
-    inverse = _1 / deviation
-    first, last = int(np.floor(centre - reach)), int(np.floor(centre + reach))
-    count = 0
-    touched[:] = False
-    cell = first % cells
-    for column in range(first, last + 1):
-        here = density[cell]
-        if not touched[cell]:
-            touched[cell] = True
-            found[count] = cell
-            count += 1
-            here[:, :] = _0
-        middle = centre - np.float32(column)
-        for r in range(len(here)):
-            for k in range(COLUMNS):
-                d = (places[r, k] - middle) * inverse
-                here[r, k] += weights[r, k] * remaining(min(_HALF * d * d, _DEEPEST))
-        cell = cell + 1 if cell + 1 < cells else 0
-    return count
 
 
 @fast_kernel

@@ -7,7 +7,7 @@ import pytest
 from scipy import special, stats
 
 from pipeline.truth.footprint import BOX, BOX_SIDE, GAUSSIAN, interval_masses, normal_distribution, place
-from pipeline.truth.single import absorbed, remaining
+from pipeline.truth.single import absorbed, arcsine, remaining
 
 DEPTHS = np.concatenate([np.logspace(-30, 1.9, 4000), [0.0]]).astype(np.float32)
 
@@ -24,6 +24,12 @@ def test_remaining_decays_to_nothing():
     ours = np.array([remaining(x) for x in DEPTHS], np.float64)
     assert np.max(np.abs(ours / exact - 1)[DEPTHS < 60]) < 3e-5
     assert np.all(ours >= 0) and remaining(np.float32(1e30)) < 1e-30
+
+
+def test_arcsine():
+    x = np.linspace(-1, 1, 2001).astype(np.float32)
+    ours = np.array([arcsine(value) for value in x])
+    assert np.max(np.abs(ours - np.arcsin(x.astype(np.float64)))) < 7e-5
 
 
 def test_normal_distribution():

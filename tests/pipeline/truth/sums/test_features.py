@@ -79,3 +79,15 @@ def test_rows_do_not_depend_on_each_other(lopsided, table):
     whole, part = read_queries(table, asked), read_queries(table, asked.take(slice(20, 40)))
     for all_rows, some in zip(whole, part, strict=True):
         np.testing.assert_array_equal(some, all_rows[20:40])
+
+
+@pytest.mark.parametrize("rows", [("###", "#.#", ".#."), ("#..", "#.#", "##."), ("##", "##")])
+def test_yarns_that_never_change_side(rows):
+    """A float without end is straight: numbers stay finite, beneath and on top, with and without room around."""
+    denim = load_fabric("denim")
+    for width in (0.7, 1.0):
+        families = {family: getattr(denim, family).model_copy(update={"width": width}) for family in ("warp", "weft")}
+        fabric = denim.model_copy(update={**families, "draft": Matrix(rows=rows)})
+        asked = draw_queries(QueryOptions(), fabric.weave.repeat, 4, 0, 200)
+        for found in read_queries(tabulate(fabric), asked):
+            assert np.isfinite(found).all()

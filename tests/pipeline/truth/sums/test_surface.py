@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.truth.gauss_rules import gauss_rule
 from pipeline.truth.heightfield import GAP, RADIUS, WARP, height_field, surface_at
-from pipeline.truth.sums.pieces import cell_pieces
-from pipeline.truth.sums.rules import rule
+from pipeline.truth.pieces import cell_pieces
 from pipeline.truth.sums.surface import piece_rows
 from weaves.fabric import load_fabric
 
@@ -35,7 +35,7 @@ def test_nodes_lie_on_the_cloth(name, width):
             if piece.family == GAP:
                 continue
             radius = field.yarn[piece.family, RADIUS]
-            across, along = rule(*piece.across, 8, radius), rule(*piece.along, 3, 0.0)
+            across, along = gauss_rule(*piece.across, 8, radius), gauss_rule(*piece.along, 3, 0.0)
             rows = piece_rows(field.yarn, piece, across, along)
             for node in range(0, 24, 5):
                 a, b = across.places[node % 8], along.places[node // 8]
@@ -52,7 +52,7 @@ def test_the_tangents_change_is_its_derivative():
     """Central differences over a hundredth of a box; their error is of second order."""
     field = height_field(cloth("cotton_twill", 1.0))
     piece = cell_pieces(field, 0, 0)[0]
-    across, along = rule(*piece.across, 8, field.yarn[piece.family, RADIUS]), rule(*piece.along, 4, 0.0)
+    across, along = gauss_rule(*piece.across, 8, field.yarn[piece.family, RADIUS]), gauss_rule(*piece.along, 4, 0.0)
     rows = piece_rows(field.yarn, piece, across, along)
     step = 0.005
     boxes = np.diff(along.borders)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.truth.sums.pieces import COLUMNS
+from pipeline.truth.axis_densities import axis_densities
+from pipeline.truth.sums.kinds import COLUMNS
 from pipeline.truth.sums.table import LANES, tabulate
 from pipeline.truth.sums.waves import HIGHEST
-from pipeline.truth.sums.weights import TURN_ROWS, axis_densities, product_weights, wave_weights
+from pipeline.truth.sums.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from weaves.fabric import load_fabric
 
 
@@ -17,8 +18,9 @@ def by_products(table, x, y, deviation_x, deviation_y):
         density = np.zeros((cells, len(table.places), COLUMNS), np.float32)
         touched, listed = np.zeros(cells, np.bool_), np.zeros(cells, np.uint32)
         count = axis_densities(
-            table.places, table.weights, np.float32(centre), np.float32(deviation), density, touched, listed
-        )
+            table.places, table.weights, COLUMNS, np.float32(centre), np.float32(deviation), np.float32(REACH), density,
+            touched, listed,
+        )  # fmt: skip
         found.append((density, listed[:count]))
     weight = np.zeros((table.starts[3] * LANES // COLUMNS, COLUMNS), np.float32)
     (of_x, columns), (of_y, rows) = found

@@ -20,25 +20,29 @@ class Rule(NamedTuple):
     places, weights : float64 (n,)
         Positions within the cell; weights that sum to the length.
     borders : float64 (n + 1,)
-        Where the boxes of the nodes end.
+        Where the boxes of the nodes end: as long as their weights.
+    shares : float64 (n + 1,)
+        The same as shares of the variable that the rule is Gauss's in, v across a yarn: from 0 to 1.
     """
 
     places: Double
     weights: Double
     borders: Double
+    shares: Double
 
 
 @lru_cache(maxsize=256)
-def rule(low: float, high: float, count: int, radius: float) -> Rule:
+def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
     """Return the rule of `count` nodes from `low` to `high`: Gauss's, in v where x = r sin v if `radius` is not 0."""
     s, weight = np.polynomial.legendre.leggauss(count)
+    shares = np.concatenate([[0.0], np.cumsum(weight) / 2.0])
     if radius:
         v = 0.5 * math.pi * s
         places, weights = 0.5 + radius * np.sin(v), weight * np.cos(v)
     else:
         places, weights = 0.5 * (low + high) + 0.5 * (high - low) * s, weight
     weights = weights * ((high - low) / weights.sum())
-    return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]))
+    return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]), shares)
 
 
 def grid_edges(low: float, high: float, count: int, radius: float) -> Double:
