@@ -113,10 +113,19 @@ Metric = Literal[
     "flip_hdr_floor",
     "delta_e_floor",
     "fovvideovdp",
+    "not_run",
+    "extreme_error",
+    "extreme_grazing",
+    "extreme_rounding",
+    "extreme_far",
+    "extreme_large",
+    "extreme_not_finite",
+    "extreme_negative",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
 `accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error` and
-`fovvideovdp`."""
+`fovvideovdp`, from `extreme_error` on in `stability_methods`; `not_run` is 1 for a runtime that the machine lacks, its
+`note` the reason."""
 
 
 class Provenance(BaseModel):
