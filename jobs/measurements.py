@@ -226,7 +226,9 @@ def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
 def _extremes_task(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> Task:
     """Return the measurements of a model's methods at their extremes, on one fabric of each role."""
     options = model.options
-    fabrics = [(fabric, role) for role, named in (("seen", recipe.seen), ("unseen", recipe.unseen)) for fabric in named[:1]]
+    fabrics = [
+        (fabric, role) for role, named in (("seen", recipe.seen), ("unseen", recipe.unseen)) for fabric in named[:1]
+    ]
     # Of networks that know one fabric each, those of the fabrics asked about.
     needed = [trainings[key] for key in ("", *(fabric.name for fabric, _ in fabrics)) if key in trainings]
     spec = {

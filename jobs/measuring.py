@@ -89,11 +89,9 @@ def extremes(task: Task, out: Path, progress: Progress) -> None:
     if not setting["of_one_material"]:
         fabrics.append((lustrous(fabrics[0][0]), "unseen"))
     provenance = Provenance(model=" ".join(spec["models"]))
-    records: list[Record] = []
-    for one in _methods(setting["model"], setting["models"], out):
-        precisions = runs(one, EXTREME_PRECISIONS) if setting["models"] else []
-        records += measure_extremes([one, *precisions], fabrics, provenance)
-    write_records(out / task.products[0], records, this_machine(1))
+    precisions = EXTREME_PRECISIONS if setting["models"] else ()
+    families = [[one, *runs(one, precisions)] for one in _methods(setting["model"], setting["models"], out)]
+    write_records(out / task.products[0], measure_extremes(families, fabrics, provenance), this_machine(1))
 
 
 def latents(task: Task, out: Path, progress: Progress) -> None:

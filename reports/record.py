@@ -29,6 +29,7 @@ PACKAGES: Final = (
     "scipy",
     "numba",
     "torch",
+    "onnxruntime",
     "pyarrow",
     "pandas",
     "OpenEXR",

@@ -106,14 +106,14 @@ def extremes(repeat: tuple[int, int]) -> Extremes:
 
 
 def measure_extremes(
-    methods: Sequence[Method], fabrics: Sequence[tuple[Fabric, Role]], provenance: Provenance | None = None
+    families: Sequence[Sequence[Method]], fabrics: Sequence[tuple[Fabric, Role]], provenance: Provenance | None = None
 ) -> list[Record]:
     """Measure methods at their extremes.
 
     Parameters
     ----------
-    methods : sequence of Method
-        The first is what the others are lower precisions of.
+    families : sequence of sequence of Method
+        Methods, each followed by its lower precisions.
     fabrics : sequence of (Fabric, role)
         The cloths; methods answer for those that they cover.
 
@@ -121,33 +121,27 @@ def measure_extremes(
     -------
     list of Record
         For each method and fabric `extreme_error`, the worst over footprints with all of them as its curve, and
-        `extreme_grazing`; `extreme_rounding` except for the first method; `extreme_far`, `extreme_large`,
+        `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`,
         `extreme_not_finite`, `extreme_negative`. Numbers that no finite answer is left for are left out.
     """
     records = []
     for fabric, role in fabrics:
         asked = extremes(fabric.weave.repeat)
-        truth: Array | None = None
-        own: Array | None = None
-        for method in methods:
-            if not method.covers(fabric):
-                continue
-            if truth is None:
-                truth = estimate(fabric, asked.queries, TRUTH, 0).mean.astype(np.float64)
-            method.prepare(fabric)
-            subject = Record(
-                method=method.name,
-                setting=method.setting,
-                fabric=fabric.name,
-                role=role,
-                provenance=provenance or Provenance(),
-            )
-            answers, found = _measured(subject, method, fabric, asked, truth)
-            records += found
-            if own is None:
-                own = answers
-            else:
-                records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
+        covering = [[method for method in family if method.covers(fabric)] for family in families]
+        if not any(covering):
+            continue
+        truth = estimate(fabric, asked.queries, TRUTH, 0).mean.astype(np.float64)
+        about = Record(fabric=fabric.name, role=role, provenance=provenance or Provenance(), method="")
+        for family in covering:
+            own: Array | None = None
+            for method in family:
+                subject = about.model_copy(update={"method": method.name, "setting": method.setting})
+                method.prepare(fabric)
+                answers, found = _measured(subject, method, fabric, asked, truth)
+                records += found
+                if own is not None:
+                    records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
+                own = answers if own is None else own
     return records
 
 
@@ -231,8 +225,8 @@ def _row(method: str, setting: str, records: Sequence[Record]) -> dict[str, obje
 
 
 def error_name(size: float) -> str:
-    """Return the column of the errors at a footprint."""
-    return f"error_{size:g}"
+    """Return the column of the errors at a footprint: ``error_1em04`` for 1e-4."""
+    return "error_" + f"{size:g}".replace("-", "m").replace(".", "p")
 
 
 def _direction(theta: npt.NDArray[np.float64], phi: float) -> npt.NDArray[np.float32]:

@@ -14,7 +14,7 @@ import pandas as pd
 from pipeline.scenes.options import ViewOptions
 from reports.equal_time import SIZES, WHOLE
 from reports.options import BenchOptions
-from reports.record import TRUTH
+from reports.record import TRUTH, Record
 from reports.style import display
 from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
@@ -170,6 +170,19 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
             f"{names} learns every fabric by itself, so no fabric is unseen to it; its rows stand for comparison."
         )
     return notes
+
+
+def lacking(records: Sequence[Record]) -> list[str]:
+    """Return a sentence for each way of running methods that the machine lacked, with the reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for record in records:
+        if record.metric == "not_run":
+            reasons.setdefault((record.setting, record.note), []).append(display(record.method))
+    return [
+        f"{_and(list(dict.fromkeys(methods)))} by {runtime} {'was' if len(set(methods)) == 1 else 'were'} not measured "
+        f"({reason.rstrip('.')})."
+        for (runtime, reason), methods in reasons.items()
+    ]
 
 
 def _footprint_note(view: ViewOptions) -> str:

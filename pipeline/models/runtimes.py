@@ -74,7 +74,7 @@ def _compiled(dtype: torch.dtype | None = None) -> Runtime:
     def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
         torch._dynamo.config.recompile_limit = _MODULES
         for column in example[:rows]:
-            torch._dynamo.mark_dynamic(column, 0)  # type: ignore[no-untyped-call]
+            torch._dynamo.mark_dynamic(column, 0)
         return _Program(_rounding(torch.compile(module, fullgraph=True), dtype))
 
     return Runtime(_no_compiler, load)
@@ -248,7 +248,8 @@ class RunBy:
     def _compare(self, fabric: Fabric, part: PerQuery, program: _Program, queries: Queries) -> None:
         """Hold answers against the method's own."""
         own = self._method.predict(fabric, queries)
-        error = float(np.linalg.norm(_answered(part, program, queries) - own) / max(np.linalg.norm(own), 1e-30))
+        difference = np.linalg.norm(_answered(part, program, queries) - own)
+        error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
         if not error <= TOLERANCE:
             raise WorkFailed(
                 f"{self.name} by {self._runtime} on {fabric.name}: answers differ from the method's own by "
