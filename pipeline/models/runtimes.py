@@ -17,8 +17,8 @@ from __future__ import annotations
 import importlib.util
 import logging
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -75,7 +75,10 @@ def _compiled(dtype: torch.dtype | None = None) -> Runtime:
         torch._dynamo.config.recompile_limit = _MODULES
         for column in example[:rows]:
             torch._dynamo.mark_dynamic(column, 0)
-        return _Program(_rounding(torch.compile(module, fullgraph=True), dtype))
+        run = _rounding(torch.compile(module, fullgraph=True), dtype)
+        with _quiet(), torch.inference_mode():
+            run(*example)
+        return _Program(run)
 
     return Runtime(_no_compiler, load)
 
@@ -94,10 +97,11 @@ def _rounding(module: Callable[..., Tensor], dtype: torch.dtype | None) -> Calla
 def _no_compiler() -> str:
     """Return why torch cannot compile here: the one sure way to know is to try."""
     try:
-        torch.compile(torch.sin, fullgraph=True)(torch.ones(2))
+        with _quiet():
+            torch.compile(torch.sin, fullgraph=True)(torch.ones(2))
     except Exception as error:  # whatever torch raises, of any version, means the same
-        first, *_ = str(error).strip().splitlines() or [type(error).__name__]
-        return f"torch.compile does not work on this machine: {first}"
+        lines = [line for line in str(error).splitlines() if line and not line.endswith("raised:")]
+        return f"torch.compile does not work on this machine: {(lines or [type(error).__name__])[0]}"
     return ""
 
 
@@ -132,25 +136,19 @@ def exported(module: nn.Module, example: Sequence[Tensor], rows: int) -> bytes:
     """Return a module as an ONNX model whose inputs are named x0, x1, …; the first `rows` of them have any length."""
     free = torch.export.Dim("rows", min=2)
     shapes = tuple({0: free} if place < rows else None for place in range(len(example)))
-    with TemporaryDirectory() as folder, warnings.catch_warnings(), torch.no_grad():
-        warnings.simplefilter("ignore")  # about the exporter itself
-        level = logging.root.manager.disable
-        logging.disable(logging.WARNING)
-        try:
-            path = Path(folder) / "model.onnx"
-            torch.onnx.export(
-                module,
-                tuple(example),
-                path,
-                input_names=[f"x{place}" for place in range(len(example))],
-                output_names=["components"],
-                dynamic_shapes=(shapes,),
-                dynamo=True,
-                external_data=False,
-                verbose=False,
-            )
-        finally:
-            logging.disable(level)
+    with TemporaryDirectory() as folder, _quiet(), torch.no_grad():
+        path = Path(folder) / "model.onnx"
+        torch.onnx.export(
+            module,
+            tuple(example),
+            path,
+            input_names=[f"x{place}" for place in range(len(example))],
+            output_names=["components"],
+            dynamic_shapes=(shapes,),
+            dynamo=True,
+            external_data=False,
+            verbose=False,
+        )
         return path.read_bytes()
 
 
@@ -161,16 +159,23 @@ def _quantised(model: bytes) -> bytes:
 
     graph = onnx.load_from_string(model)
     del graph.graph.value_info[:]  # shapes noted by the exporter, which those found again may contradict
-    with TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with TemporaryDirectory() as folder, _quiet():
         path = Path(folder) / "model.onnx"
-        level = logging.root.manager.disable
+        quantize_dynamic(graph, path)
+        return path.read_bytes()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Hear nothing of what compilers and exporters have to say about themselves."""
+    level = logging.root.manager.disable
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         logging.disable(logging.WARNING)
         try:
-            quantize_dynamic(graph, path)
+            yield
         finally:
             logging.disable(level)
-        return path.read_bytes()
 
 
 RUNTIMES: Final[dict[str, Runtime]] = {
@@ -239,8 +244,6 @@ class RunBy:
         program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
         if self._runtime in EXACT:
             self._compare(fabric, part, program, queries)
-        else:
-            _answered(part, program, queries)  # compiles, where the first call does
         # The module is kept beside its program: an identity is another object's once its own is gone.
         self._programs[key] = part.module, program
         return part, program
