@@ -15,6 +15,7 @@ from jobs.dataset import SECONDS_A_POINT, Shard, fingerprint_of, folder_of, poin
 from jobs.recipe import ModelRecipe, Recipe
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import PHYSICS
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
 from reports.options import EXTREMES_VERSION, LATENT_PAIRS
@@ -237,6 +238,7 @@ def _extremes_task(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, T
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in needed],
         "fabrics": [[fabric.name, fabric.optics(), role] for fabric, role in fabrics],
+        "physics": recipe.dataset.truth.model_dump(mode="json", include=set(PHYSICS)),
     }
     return Task(
         "bench",

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from jobs.task import Task
 from pipeline.models.bounded import counterpart
+from pipeline.models.domain import PHYSICS
 from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
 from pipeline.models.registry import load_methods
@@ -27,6 +28,7 @@ from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from reports.silhouette import measure_silhouette, render_edge
+from reports.stability_methods import TRUTH as EXTREMES_TRUTH
 from reports.stability_methods import lustrous, measure_extremes
 from reports.timing import thread_counts
 from weaves.fabric import Fabric
@@ -91,7 +93,10 @@ def extremes(task: Task, out: Path, progress: Progress) -> None:
     provenance = Provenance(model=" ".join(spec["models"]))
     precisions = EXTREME_PRECISIONS if setting["models"] else ()
     families = [[one, *runs(one, precisions)] for one in _methods(setting["model"], setting["models"], out)]
-    write_records(out / task.products[0], measure_extremes(families, fabrics, provenance), this_machine(1))
+    physics = TruthOptions.model_validate(spec["physics"])
+    truth = EXTREMES_TRUTH.model_copy(update={name: getattr(physics, name) for name in PHYSICS})
+    records = measure_extremes(families, fabrics, provenance, truth)
+    write_records(out / task.products[0], records, this_machine(1))
 
 
 def latents(task: Task, out: Path, progress: Progress) -> None:

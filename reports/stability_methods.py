@@ -106,7 +106,10 @@ def extremes(repeat: tuple[int, int]) -> Extremes:
 
 
 def measure_extremes(
-    families: Sequence[Sequence[Method]], fabrics: Sequence[tuple[Fabric, Role]], provenance: Provenance | None = None
+    families: Sequence[Sequence[Method]],
+    fabrics: Sequence[tuple[Fabric, Role]],
+    provenance: Provenance | None = None,
+    truth: TruthOptions = TRUTH,
 ) -> list[Record]:
     """Measure methods at their extremes.
 
@@ -116,6 +119,8 @@ def measure_extremes(
         Methods, each followed by its lower precisions.
     fabrics : sequence of (Fabric, role)
         The cloths; methods answer for those that they cover.
+    truth : TruthOptions
+        What the methods are held against.
 
     Returns
     -------
@@ -130,14 +135,14 @@ def measure_extremes(
         covering = [[method for method in family if method.covers(fabric)] for family in families]
         if not any(covering):
             continue
-        truth = estimate(fabric, asked.queries, TRUTH, 0).mean.astype(np.float64)
+        true = estimate(fabric, asked.queries, truth, 0).mean.astype(np.float64)
         about = Record(fabric=fabric.name, role=role, provenance=provenance or Provenance(), method="")
         for family in covering:
             own: Array | None = None
             for method in family:
                 subject = about.model_copy(update={"method": method.name, "setting": method.setting})
                 method.prepare(fabric)
-                answers, found = _measured(subject, method, fabric, asked, truth)
+                answers, found = _measured(subject, method, fabric, asked, true)
                 records += found
                 if own is not None:
                     records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))

@@ -272,7 +272,9 @@ def _answered(part: PerQuery, program: _Program, queries: Queries) -> npt.NDArra
 
 def runs(method: Method, names: Iterable[str]) -> list[Method]:
     """Return the method run in each of these ways that this machine can; none if it is not `Portable`."""
-    return [RunBy(method, name) for name in names if isinstance(method, Portable) and not RUNTIMES[name].missing()]
+    if not isinstance(method, Portable):
+        return []
+    return [RunBy(method, name) for name in dict.fromkeys(names) if not RUNTIMES[name].missing()]
 
 
 def not_run(method: Method, names: Iterable[str]) -> dict[str, str]:
