@@ -49,7 +49,7 @@ FAR: Final = 1e6
 """How far away, in yarn spacings; single precision still holds sixteenths of a yarn there."""
 
 TRUTH: Final = TruthOptions(estimator="quadrature", relative_error=0.01)
-"""How true the truth is: half a second a fabric, and within 3 % of 16,384 points a query on all footprints."""
+"""How true the truth is: half a second a fabric, and 1 to 3 % from 16,384 points a query at every footprint."""
 
 Array = npt.NDArray[np.float64]
 
