@@ -50,8 +50,8 @@ DEFINITIONS: Final = {
     "front": "The methods that no other beats on both error (relative RMSE of the colour) and time. Only methods that "
     "answer for the same fabrics are compared; an error that is lost in the noise of the truth takes no part.",
     "eager-bf16, eager-fp16, compile, onnx, onnx-int8": "A trained network run in another way, of the same weights: "
-    "products of matrices in half precision, compiled by torch, by ONNX Runtime, with weights and activations of 8 bits. "
-    "What computes in single precision agrees with the network itself to 1e-4.",
+    "products of matrices in half precision, compiled by torch, by ONNX Runtime, with weights and activations of 8 "
+    "bits. What computes in single precision agrees with the network itself to 1e-4.",
     "bytes stored": "What a renderer keeps to answer for one fabric: weights and textures, or tables; mean over "
     "fabrics.",
 }

@@ -2,8 +2,8 @@
 
 None is another training: the same weights answer the same queries, faster or slower, a little different or not.
 
-    eager-bf16, eager-fp16   torch's autocast: products of matrices in half precision, encodings and sums of blobs in
-                             single, because 8 bits cannot tell places within a repeat
+    eager-bf16, eager-fp16   torch's autocast: products of matrices in half precision, encodings and exponentials in
+                             single: 8 bits cannot tell places within a repeat, and float16 ends at 65,504
     compile, compile-bf16    torch.compile, which needs a C++ compiler
     onnx                     ONNX Runtime on the exported module
     onnx-int8                the same with weights of 8 bits, and activations rounded to 8 bits as they come
