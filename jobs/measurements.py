@@ -16,9 +16,10 @@ from jobs.recipe import ModelRecipe, Recipe
 from jobs.scenes import scene_tasks
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import PHYSICS
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
-from reports.options import LATENT_PAIRS
+from reports.options import EXTREMES_VERSION, LATENT_PAIRS
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import Fabric, load_fabric
 
@@ -83,6 +84,8 @@ def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Ma
             yield _latents_task(recipe, model, trained[model.options.name][""])
     for name in recipe.bench.scenes.names:
         yield from scene_tasks(recipe, name, trained)
+    for model in recipe.models:
+        yield _extremes_task(recipe, model, trained.get(model.options.name, {}))
     yield _timing_task(recipe, subjects, parts, trained)
 
 
@@ -224,6 +227,41 @@ def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
     )
 
 
+def _extremes_task(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> Task:
+    """Return the measurements of a model's methods at their extremes, on one fabric of each role."""
+    options = model.options
+    fabrics = [
+        (fabric, role) for role, named in (("seen", recipe.seen), ("unseen", recipe.unseen)) for fabric in named[:1]
+    ]
+    # Of networks that know one fabric each, those of the fabrics asked about.
+    needed = [trainings[key] for key in ("", *(fabric.name for fabric, _ in fabrics)) if key in trainings]
+    spec = {
+        "measure": "extremes",
+        "versions": [TRUTH_VERSION, EXTREMES_VERSION, options.version],
+        "options": options.model_dump(mode="json"),
+        "models": [training.id for training in needed],
+        "fabrics": [[fabric.name, fabric.optics(), role] for fabric, role in fabrics],
+        "physics": recipe.dataset.truth.model_dump(mode="json", include=set(PHYSICS)),
+    }
+    return Task(
+        "bench",
+        options.name,
+        f"extremes of {options.name}",
+        spec,
+        _records(f"extremes-{options.name}-{identity('bench', spec)[:8]}"),
+        tuple(training.id for training in needed),
+        cost=3.0,
+        size=6000,
+        setting={
+            "make": "extremes",
+            "model": options.model_dump(mode="json"),
+            "models": [str(Path(training.products[0]).parent) for training in needed],
+            "of_one_material": options.of_one_material,
+            "fabrics": [[fabric.model_dump(mode="json"), role] for fabric, role in fabrics],
+        },
+    )
+
+
 def _timing_task(
     recipe: Recipe, subjects: Sequence[Subject], parts: Sequence[Shard], trained: Mapping[str, Mapping[str, Task]]
 ) -> Task:
@@ -235,7 +273,7 @@ def _timing_task(
         "measure": "timing",
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "options": bench.model_dump(mode="json", include={"rows", "bounds", *_TIMED}),
+        "options": bench.model_dump(mode="json", include={"rows", "bounds", "runtimes", *_TIMED}),
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
         "trainings": [task.id for task in trainings],
     }

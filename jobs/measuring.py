@@ -10,10 +10,12 @@ from pydantic import TypeAdapter
 
 from jobs.task import Task
 from pipeline.models.bounded import counterpart
+from pipeline.models.domain import PHYSICS
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.models.options import ModelOptions
 from pipeline.models.registry import load_methods
+from pipeline.models.runtimes import not_run, runs
 from pipeline.shards.manifest import Manifest
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
@@ -22,13 +24,15 @@ from reports.equal_time import measure_by_size
 from reports.frames import measure_aliasing, measure_truth_frames, render_frames
 from reports.furnace import measure_furnace
 from reports.latents import measure_edits, measure_paths, pairs
-from reports.options import BenchOptions
+from reports.options import EXTREME_PRECISIONS, BenchOptions
 from reports.page import ModelNote, PageInput, PictureFile, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from reports.scene_bench import measure_scene, time_scene, write_truth
 from reports.scene_frames import read_shot, shoot
 from reports.silhouette import measure_silhouette, render_edge
+from reports.stability_methods import TRUTH as EXTREMES_TRUTH
+from reports.stability_methods import lustrous, measure_extremes
 from reports.timing import thread_counts
 from weaves.fabric import Fabric
 
@@ -68,7 +72,7 @@ def method(task: Task, out: Path, progress: Progress) -> None:
     fabric = manifest.fabrics[name]
     provenance = Provenance(dataset=manifest.fingerprint, model=" ".join(task.spec["models"]))
     records: list[Record] = []
-    methods = _methods(setting["model"], setting["models"], out, options.bounds)
+    methods = _methods(setting["model"], setting["models"], out, options)
     for index, one in enumerate(methods):
         records += measure_errors(one, manifest, folder, name, role, options, provenance)
         records += measure_furnace(one, fabric, role, provenance)
@@ -80,6 +84,21 @@ def method(task: Task, out: Path, progress: Progress) -> None:
             reference = out / setting["truth"][scene]
             records += render_method(one, fabric, role, scene, options, reference, out / path, provenance)
         progress((index + 1) / len(methods))
+    write_records(out / task.products[0], records, this_machine(1))
+
+
+def extremes(task: Task, out: Path, progress: Progress) -> None:
+    """Measure every method that a model's options describe at its extremes, in half precision too if it is trained."""
+    setting, spec = task.setting, task.spec
+    fabrics = [(Fabric.model_validate(fabric), role) for fabric, role in setting["fabrics"]]
+    if not setting["of_one_material"]:
+        fabrics.append((lustrous(fabrics[0][0]), "unseen"))
+    provenance = Provenance(model=" ".join(spec["models"]))
+    precisions = EXTREME_PRECISIONS if setting["models"] else ()
+    families = [[one, *runs(one, precisions)] for one in _methods(setting["model"], setting["models"], out)]
+    physics = TruthOptions.model_validate(spec["physics"])
+    truth = EXTREMES_TRUTH.model_copy(update={name: getattr(physics, name) for name in PHYSICS})
+    records = measure_extremes(families, fabrics, provenance, truth)
     write_records(out / task.products[0], records, this_machine(1))
 
 
@@ -103,10 +122,11 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     manifest = Manifest.load(folder)
     asked = [(model["options"], model["folders"], out) for model in task.setting["models"]]
     provenance = Provenance(dataset=manifest.fingerprint)
-    methods = [one for ask in asked for one in _methods(*ask, options.bounds)]
+    methods = [one for ask in asked for one in _methods(*ask, options)]
     records = measure_timing(methods, manifest, folder, options, provenance)
     progress(0.4)
     methods = [one for ask in asked for one in _methods(*ask)]
+    records += [record for one in methods for record in _not_run(one, options, provenance)]
     records += measure_by_size(methods, manifest, folder, options, provenance)
     write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
 
@@ -172,8 +192,21 @@ def _fallbacks(entry: Mapping[str, Any], options: BenchOptions, out: Path) -> li
     return [Fallback(one, kinds, options.scenes.footprint) for one in methods]
 
 
-def _methods(options: Mapping[str, Any], folders: list[str], out: Path, bounds: bool = False) -> list[Method]:
-    """Load the methods that a model's options describe; with `bounds` each trained one's counterpart too."""
+def _methods(
+    options: Mapping[str, Any], folders: list[str], out: Path, bench: BenchOptions | None = None
+) -> list[Method]:
+    """Load the methods that a model's options describe; with `bench` also what it asks of each trained one."""
     model = TypeAdapter[Any](ModelOptions).validate_python(options)
     methods = load_methods(model, [out / folder for folder in folders])
-    return methods + [counterpart(one) for one in methods if bounds and folders]
+    if bench is None or not folders:
+        return methods
+    others = [counterpart(one) for one in methods if bench.bounds]
+    return methods + others + [run for one in methods for run in runs(one, bench.runtimes)]
+
+
+def _not_run(method: Method, bench: BenchOptions, provenance: Provenance) -> list[Record]:
+    """Return a record for every way in which this machine cannot run a trained method."""
+    return [
+        Record(method=method.name, setting=name, metric="not_run", value=1.0, note=reason, provenance=provenance)
+        for name, reason in not_run(method, bench.runtimes).items()
+    ]

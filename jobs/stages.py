@@ -57,6 +57,7 @@ def _bench(task: Task, out: Path, progress: Progress) -> None:
     {
         "truth": measuring.truth,
         "method": measuring.method,
+        "extremes": measuring.extremes,
         "latents": measuring.latents,
         "timing": measuring.timing,
         "frames": measuring.frames,

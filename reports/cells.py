@@ -17,6 +17,7 @@ from reports.memory import UNSURE
 from reports.record import TRUTH, Record
 from reports.sampling import SETTINGS, Saving
 from reports.stability import Finding
+from reports.stability_methods import FOOTPRINTS, error_name
 from reports.style import NO_BREAK, display
 from reports.summary import BASELINE, COMPONENTS, rows
 from reports.tiles import EXPOSURE, hex_colour
@@ -280,6 +281,31 @@ def stability_rows(findings: Sequence[Finding]) -> dict[str, list[Row]]:
             }
         )
     return result
+
+
+EXTREMES: Final = (
+    *(f"σ {size:g}" for size in FOOTPRINTS),
+    "89.9°",
+    "α = .01",
+    "from fp32",
+    "far",
+    "1e4 − 1e2",
+    "NaN, ∞",
+    "below 0",
+)
+"""Columns of `extreme_rows` after the method."""
+
+
+def extreme_rows(table: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of methods at their extremes, in groups; what none may answer is marked."""
+    lines = []
+    for row in rows(table):
+        errors = [percent(getattr(row, name)) for name in map(error_name, FOOTPRINTS)]
+        errors += [percent(row.grazing), percent(row.lustrous)]
+        others = [NONE if _missing(x) else "0" if x == 0 else f"{x:.1e}" for x in (row.rounding, row.far, row.large)]
+        wrong = [f"{count} of {row.asked} ✗" if count else "0" for count in (row.not_finite, row.negative)]
+        lines.append(_line(row.method, row.setting) | {"cells": [*errors, *others, *wrong]})
+    return groups(lines)
 
 
 def rate_rows(records: Sequence[Record]) -> list[list[str]]:

@@ -29,6 +29,16 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
 
 
+EXTREMES_VERSION: Final = 1
+"""Version of the numbers of `reports.stability_methods`, which have tasks of their own."""
+
+RuntimeName = Literal["eager-bf16", "eager-fp16", "compile", "compile-bf16", "onnx", "onnx-int8"]
+"""Ways to run a trained method, `pipeline.models.runtimes` says which."""
+
+EXTREME_PRECISIONS: Final[tuple[RuntimeName, ...]] = ("eager-bf16", "eager-fp16")
+"""Those in which every trained method is asked the extremes, beside single precision (`reports.stability_methods`)."""
+
+
 class EdgeOptions(BaseModel):
     """The edge of a cloth cylinder (`reports.silhouette`): cylinder, camera, light and truth."""
 
@@ -167,6 +177,9 @@ class BenchOptions(BaseModel):
     bounds: bool = False
     """Measure every trained network a second time: under the energy bound of `pipeline.models.bounded`, or without it
     if it is bounded by itself. For flat cloth lit from the viewer's side."""
+    runtimes: tuple[RuntimeName, ...] = ()
+    """Measure every trained network run in these ways too: errors, aliasing and time, of the same weights. What a
+    machine cannot run is named on the page with the reason."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth of the pictures and of the random points of the baseline."""
 

@@ -23,9 +23,19 @@ from reports.options import BenchOptions
 from reports.record import OF_A_PAGE, TRUTH, Machine, Record, Role, to_table, write_records
 from reports.silhouette import silhouette_table
 from reports.stability import Finding, from_records
+from reports.stability_methods import extremes_table
 from reports.style import DARK, LIGHT, Scheme, display, render
 from reports.tradeoff import tradeoff_table
-from reports.wording import DEFINITIONS, beaten, caveats, cheapest_sentences, equal_time_sentences, headline, learnt
+from reports.wording import (
+    DEFINITIONS,
+    beaten,
+    caveats,
+    cheapest_sentences,
+    equal_time_sentences,
+    headline,
+    lacking,
+    learnt,
+)
 from weaves.fabric import Fabric
 
 
@@ -128,6 +138,9 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     between = summary.path_table(page.records)
     if len(between):
         tables["between"] = between
+    extremes = extremes_table(page.records)
+    if len(extremes):
+        tables["extremes"] = extremes
     findings = from_records(page.records)
     if findings:
         tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
@@ -257,6 +270,8 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         edits=cells.edit_rows(page.records),
         shares=[f"t = {share:g}" for share in latents.SHARES],
         stability=cells.stability_rows(findings),
+        extremes=cells.extreme_rows(extremes_table(page.records)),
+        extreme_columns=cells.EXTREMES,
         rates=cells.rate_rows(page.records),
         accuracies=cells.accuracy_rows(measured["truth_accuracy"]),
         reference=cells.percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
@@ -276,7 +291,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         shown=shown,
         plots=plots,
         definitions=DEFINITIONS,
-        caveats=caveats(page.options, per_material, errors),
+        caveats=[*caveats(page.options, per_material, errors), *lacking(page.records)],
         colours={name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for name, scheme in schemes.items()},
         schemes=schemes,
         difference_range=tiles.DIFFERENCE_RANGE,

@@ -29,6 +29,7 @@ PACKAGES: Final = (
     "scipy",
     "numba",
     "torch",
+    "onnxruntime",
     "pyarrow",
     "pandas",
     "OpenEXR",
@@ -115,10 +116,19 @@ Metric = Literal[
     "fovvideovdp",
     "frame_time",
     "fallback_share",
+    "not_run",
+    "extreme_error",
+    "extreme_grazing",
+    "extreme_rounding",
+    "extreme_far",
+    "extreme_large",
+    "extreme_not_finite",
+    "extreme_negative",
 ]
 """Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
 `accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error`,
-`fovvideovdp` and `scene_bench`."""
+`fovvideovdp` and `scene_bench`, from `extreme_error` on in `stability_methods`; `not_run` is 1 for a runtime that the
+machine lacks, its `note` the reason."""
 
 
 class Provenance(BaseModel):

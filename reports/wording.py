@@ -14,7 +14,7 @@ import pandas as pd
 from pipeline.scenes.options import ViewOptions
 from reports.equal_time import SIZES, WHOLE
 from reports.options import BenchOptions
-from reports.record import TRUTH
+from reports.record import TRUTH, Record
 from reports.style import display
 from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
@@ -49,6 +49,9 @@ DEFINITIONS: Final = {
     "× time": "That time over the time of point sampling at 2 points.",
     "front": "The methods that no other beats on both error (relative RMSE of the colour) and time. Only methods that "
     "answer for the same fabrics are compared; an error that is lost in the noise of the truth takes no part.",
+    "eager-bf16, eager-fp16, compile, onnx, onnx-int8": "A trained network run in another way, of the same weights: "
+    "products of matrices in half precision, compiled by torch, by ONNX Runtime, with weights and activations of 8 "
+    "bits. What computes in single precision agrees with the network itself to 1e-4.",
     "bytes stored": "What a renderer keeps to answer for one fabric: weights and textures, or tables; mean over "
     "fabrics.",
 }
@@ -170,6 +173,19 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
             f"{names} learns every fabric by itself, so no fabric is unseen to it; its rows stand for comparison."
         )
     return notes
+
+
+def lacking(records: Sequence[Record]) -> list[str]:
+    """Return a sentence for each way of running methods that the machine lacked, with the reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for record in records:
+        if record.metric == "not_run":
+            reasons.setdefault((record.setting, record.note), []).append(display(record.method))
+    return [
+        f"{_and(list(dict.fromkeys(methods)))} by {runtime} {'was' if len(set(methods)) == 1 else 'were'} not measured "
+        f"({reason.rstrip('.')})."
+        for (runtime, reason), methods in reasons.items()
+    ]
 
 
 def _footprint_note(view: ViewOptions) -> str:

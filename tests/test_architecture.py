@@ -30,6 +30,8 @@ HOMES = {
     "numba": ["pipeline.truth"],
     "pyarrow": ["pipeline.shards"],
     "torch": ["pipeline.models", "pipeline.training"],
+    "onnx": ["pipeline.models"],
+    "onnxruntime": ["pipeline.models"],
     "safetensors": ["pipeline.models", "pipeline.training"],
     "colour": ["weaves"],
     "pandas": ["reports"],

@@ -16,6 +16,7 @@ from pipeline.models.domain import Domain
 from pipeline.models.method import Trained
 from pipeline.models.options import BtfAutoencoderOptions
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import PerQuery
 from pipeline.models.unified_btf import UnifiedBtf, UnifiedBtfNetwork, restored
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -50,6 +51,10 @@ class BtfAutoencoder:
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         return self._known.of(fabric).predict(fabric, queries, seed)
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the decoder of the fabric's own network."""
+        return self._known.of(fabric).per_query(fabric)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the latents, float32."""

@@ -22,6 +22,7 @@ four components, specular ones in log space, counts of texels and steps. The pap
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -34,6 +35,7 @@ from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import CurvedOptions
+from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.perceptron import perceptron
 from pipeline.models.silhouettes import Silhouettes, View, draw_silhouettes
 from pipeline.models.texture import level_shapes, random_pyramid, read_pyramid, shifted
@@ -183,11 +185,21 @@ class Curved(OneMaterial[CurvedNetwork]):
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
         network = self._asked(fabric, queries)
+        return self._in_chunks(fabric, queries, partial(_components, network), 4)
 
-        def answer(view: View, wi: Tensor) -> Tensor:
-            return to_components(network(view, wi), network.options.log_k)
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the reflectance of the fabric's network; what it covers is another question."""
+        network, repeat = self.network_of(fabric), fabric.weave.repeat
 
-        return self._in_chunks(fabric, queries, answer, 4)
+        def refuse(queries: Queries) -> None:
+            self._asked(fabric, queries)
+
+        def answer(*asked: Tensor) -> Tensor:
+            return _components(network, View(*asked[:-1]), asked[-1])
+
+        names = (*View._fields, "wi")
+        module = Answering(network, answer)
+        return PerQuery(refuse, lambda queries: columns_of(in_repeat(queries, repeat), names), module)
 
     def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
@@ -214,6 +226,10 @@ class Curved(OneMaterial[CurvedNetwork]):
         columns = (*View._fields, "wi")
         near = in_repeat(queries, fabric.weave.repeat)
         return in_chunks(near, lambda *asked: answer(View(*asked[:-1]), asked[-1]), self._device, columns, width)
+
+
+def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:
+    return to_components(network(view, wi), network.options.log_k)
 
 
 def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:

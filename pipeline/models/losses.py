@@ -21,6 +21,8 @@ def to_network(components: Tensor, log_k: float) -> Tensor:
 
 def to_components(output: Tensor, log_k: float) -> Tensor:
     """Take network space (..., 4) to components: S = (e^x - 1)/k, C unchanged, both at least 0."""
+    # Half precision would overflow at x = 11.
+    output = output.to(torch.promote_types(output.dtype, torch.float32))
     specular = torch.expm1(output[..., SPECULAR]) / log_k
     return torch.cat([specular, output[..., DIFFUSE]], dim=-1).clamp_min_(0.0)
 

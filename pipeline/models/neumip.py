@@ -17,6 +17,7 @@ a mask. So are the counts of texels, queries and steps; the published training t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -28,6 +29,7 @@ from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.options import NeumipOptions
+from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.perceptron import perceptron
 from pipeline.models.texture import level_shapes, random_pyramid, read_pyramid, shifted
 from pipeline.models.texture_network import TextureNetwork
@@ -97,15 +99,24 @@ class Neumip(OneMaterial[NeumipNetwork]):
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        self._refuse(queries)
+        answer = partial(_components, self.network_of(fabric))
+        return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return all of the fabric's network."""
+        network, repeat = self.network_of(fabric), fabric.weave.repeat
+        module = Answering(network, partial(_components, network))
+        return PerQuery(self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), module)
+
+    def _refuse(self, queries: Queries) -> None:
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        network = self.network_of(fabric)
 
-        def answer(*columns: Tensor) -> Tensor:
-            components = to_components(network(*columns), network.options.log_k)
-            return components * (columns[3][:, 2:] > 0.0) if network.options.ignore_curvature else components
 
-        return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
+def _components(network: NeumipNetwork, *columns: Tensor) -> Tensor:
+    components = to_components(network(*columns), network.options.log_k)
+    return components * (columns[3][:, 2:] > 0.0) if network.options.ignore_curvature else components
 
 
 def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:

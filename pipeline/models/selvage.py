@@ -32,6 +32,7 @@ from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import CHUNK, Batch
 from pipeline.models.options import QuadratureOptions, SelvageOptions
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import Answering, Columns, PerQuery
 from pipeline.models.quadrature import Quadrature
 from pipeline.models.sums import refuse
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -168,6 +169,7 @@ class Selvage:
             self._first = weight.t().contiguous(), first.bias - weight @ network.mean
             self._others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
         self._of_query = self._first[0][:OF_QUERY].contiguous()
+        self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be tabulated."""
@@ -181,15 +183,10 @@ class Selvage:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-        refuse(queries, self.name)
+        self._refuse(queries)
         if self._rule is None:
             return self._corrected(fabric, queries)
-        # How much of each answer is the network's.
-        low, high = self._network.options.seam
-        place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
-        share = np.clip(place, 0.0, 1.0)[:, None]
+        share = self._share(queries)
         by_network, by_rule = (np.flatnonzero(rows) for rows in (share[:, 0] > 0.0, share[:, 0] < 1.0))
         result = np.zeros((len(share), 4), np.float32)
         if by_network.size:
@@ -199,11 +196,50 @@ class Selvage:
             result[by_rule] = share[by_rule] * result[by_rule] + (1.0 - share[by_rule]) * narrow
         return result
 
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the network; sums and rule are read before it, and the bias of the fabric is its constant."""
+        table, bias = self._cloths.of(fabric)
+
+        def inputs(queries: Queries) -> Columns:
+            features, components, bounds = read_queries(table, queries)
+            read = (np.ascontiguousarray(features[:, :OF_QUERY]), components, bounds)
+            if self._rule is None:
+                return read
+            share, narrow = self._share(queries).astype(np.float32), np.zeros_like(components)
+            by_rule = np.flatnonzero(share[:, 0] < 1.0)
+            if by_rule.size:
+                narrow[by_rule] = self._rule.predict(fabric, queries.take(by_rule))
+            return (*read, share, narrow)
+
+        return PerQuery(self._refuse, inputs, self._answering, (bias,))
+
     def with_bound(self, bound: bool) -> Selvage:
         """Return the same network, bounded in energy or not."""
         other = Selvage(self._network, self.domain)
         other.bound, other.setting = bound, "bounded" if bound else "unbounded"
         return other
+
+    def _components(self, *given: Tensor) -> Tensor:
+        """Answer from features, components and bounds, share and answers of the rule if there is one, and the bias."""
+        features, components, bounds, *by_rule, bias = given
+        x = torch.addmm(bias, features, self._of_query)
+        for weight, shift in self._others:
+            x = torch.addmm(shift, functional.leaky_relu(x, _SLOPE), weight)
+        answer = _LARGEST * torch.sigmoid(x.float()) * components
+        if self.bound:
+            answer = torch.minimum(answer, bounds)
+        return torch.lerp(by_rule[1], answer, by_rule[0]) if by_rule else answer
+
+    def _share(self, queries: Queries) -> npt.NDArray[np.floating]:
+        """Return how much of each answer is the network's, (N, 1)."""
+        low, high = self._network.options.seam
+        place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
+        return np.asarray(np.clip(place, 0.0, 1.0)[:, None])
+
+    def _refuse(self, queries: Queries) -> None:
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+        refuse(queries, self.name)
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the sums and the network."""

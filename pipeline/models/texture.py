@@ -130,6 +130,7 @@ def read_texture(
             for dx, weight_x in ((0, 1.0 - right_share), (1, right_share)):
                 indices.append(of_row + torch.remainder(column + dx, width))
                 weights.append(weight_x * weight_y * share)
-    return functional.embedding_bag(
-        torch.stack(indices, -1), table, per_sample_weights=torch.stack(weights, -1), mode="sum"
-    )
+    texels, share = torch.stack(indices, -1), torch.stack(weights, -1)
+    if torch.compiler.is_exporting():  # other runtimes would loop over the bags
+        return (table[texels] * share.unsqueeze(-1)).sum(dim=-2)
+    return functional.embedding_bag(texels, table, per_sample_weights=share, mode="sum")

@@ -36,6 +36,7 @@ from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat, loaded
 from pipeline.models.options import BtfOptions, UnifiedBtfOptions
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.perceptron import perceptron
 from pipeline.models.set_encoder import ANGLES, SetEncoder, Texels, angles_of, read_texels
 from pipeline.models.texture import level_shapes, read_pyramid
@@ -159,6 +160,7 @@ class UnifiedBtf:
         self._device = device or torch.device("cpu")
         self._network = network.eval().to(self._device)
         self._pyramids = PerFabric(self._encode)
+        self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be encoded."""
@@ -170,15 +172,28 @@ class UnifiedBtf:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-        network, pyramid = self._network, self._pyramids.of(fabric)
+        self._refuse(queries)
+        pyramid = self._pyramids.of(fabric)
 
-        def answer(u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-            output = network.decode(network.read(pyramid, u, v, sigma), wi, wo)
-            return to_components(output, network.options.log_k)
+        def answer(*columns: Tensor) -> Tensor:
+            return self._components(*columns, *pyramid)
 
         return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the decoder; the levels of the pyramid are its constants, so that fabrics of one repeat share it."""
+        pyramid, repeat = self._pyramids.of(fabric), fabric.weave.repeat
+        return PerQuery(
+            self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), self._answering, tuple(pyramid)
+        )
+
+    def _components(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor, *pyramid: Tensor) -> Tensor:
+        output = self._network.decode(self._network.read(list(pyramid), u, v, sigma), wi, wo)
+        return to_components(output, self._network.options.log_k)
+
+    def _refuse(self, queries: Queries) -> None:
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the fabric's latents, float32; the encoder is not needed to render."""
@@ -188,7 +203,7 @@ class UnifiedBtf:
     def _encode(self, fabric: Fabric) -> list[Tensor]:
         network = self._network
         samples = angular_samples(fabric, network.options)
-        with torch.inference_mode():
+        with torch.no_grad():
             texels = read_texels(samples, network.options).to(self._device)
             return [level.contiguous() for level in averaged(network.encode(texels))]
 

@@ -34,6 +34,7 @@ from pipeline.models.losses import to_components, to_network, weighted_error
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat, loaded
 from pipeline.models.options import WovenOptions
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.placement import Placement
 from pipeline.models.residual import SLOPE
 from pipeline.models.woven_cloth import Cloth, read_cloth
@@ -144,6 +145,7 @@ class Woven:
         self._device = device or torch.device("cpu")
         self._network = network.eval().to(self._device)
         self._encoded = PerFabric(self._encode)
+        self._answering = Answering(self._network, self._all_at_once)
 
     def covers(self, fabric: Fabric) -> bool:
         """Say yes: any fabric can be encoded."""
@@ -208,8 +210,7 @@ class Woven:
     def _answer(
         self, queries: Queries, latent: Tensor, place: Placement, read: Callable[[Tensor], Tensor]
     ) -> npt.NDArray[np.float32]:
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
+        self._refuse(queries)
 
         def answer(*columns: Tensor) -> Tensor:
             return read(self._network.decode(latent, place, *(column.unsqueeze(0) for column in columns)))
@@ -217,13 +218,31 @@ class Woven:
         ends, picks = place.own_repeat()[0].tolist()
         return in_chunks(in_repeat(queries, (int(ends), int(picks))), answer, self._device)
 
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the decoder; latent and placement are its constants, so that all fabrics share it."""
+        latent, place = self._encoded.of(fabric)
+        repeat = fabric.weave.repeat
+        return PerQuery(
+            self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), self._answering, (latent, *place)
+        )
+
+    def _all_at_once(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor, *fabric: Tensor) -> Tensor:
+        latent, place = fabric[0], Placement(*fabric[1:])
+        columns = (column.unsqueeze(0) for column in (u, v, sigma, wi, wo))
+        output = self._network.decode(latent, place, *columns)
+        return to_components(place.swap(output[..., :4])[0], self._network.options.log_k)
+
+    def _refuse(self, queries: Queries) -> None:
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the decoder and of the fabric's latent; the encoder is not needed to render."""
         latent, _ = self._encoded.of(fabric)
         return 4 * (sum(weight.numel() for weight in self._network.decoder.parameters()) + latent.numel())
 
     def _encode(self, fabric: Fabric) -> tuple[Tensor, Placement]:
-        with torch.inference_mode():
+        with torch.no_grad():
             cloth = read_cloth([fabric], self._network.options).to(self._device)
             return self._network.encode(cloth), cloth.placement
 

@@ -183,6 +183,28 @@ def test_what_lies_between_fabrics_needs_the_training_alone(files, tasks):
     assert ids(edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 9.0]"), "bench", "latents") != [task.id]
 
 
+def test_extremes_need_the_trainings_alone_and_know_one_fabric_of_each_role(files, tasks):
+    found = {task.title: task for task in tasks if task.title.startswith("extremes")}
+    assert set(found) == {"extremes of woven", "extremes of neumip", "extremes of point_sampled"}
+    assert list(found["extremes of woven"].needs) == ids(tasks, "train", "woven")
+    ends = ids(tasks, "train", "neumip on denim") + ids(tasks, "train", "neumip on twill_4_4")
+    assert list(found["extremes of neumip"].needs) == ends
+    assert [(name, role) for name, _, role in found["extremes of woven"].spec["fabrics"]] == [
+        ("denim", "seen"),
+        ("twill_4_4", "unseen"),
+    ]
+    every = ids(tasks, "bench", "extremes")
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "extremes") == every
+    assert ids(edited(files, "test = 500", "test = 600"), "bench", "extremes") == every
+
+
+def test_ways_to_run_are_measured_again_and_nothing_is_trained_again(files, tasks):
+    after = edited(files, "frames = 4", 'frames = 4\nruntimes = ["onnx", "eager-bf16"]')
+    assert ids(after, "train") == ids(tasks, "train")
+    for title in ("woven on denim", "timing of all methods"):
+        assert set(ids(after, "bench", title)).isdisjoint(ids(tasks, "bench", title))
+
+
 def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):
     after = edited(files, "frames = 4", "frames = 4\ntiming_repeats = 21")
     changed = {task.id for task in after} ^ {task.id for task in tasks}

@@ -209,6 +209,24 @@ def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path)
     assert page.words.count("float32") == 1
 
 
+def test_methods_at_their_extremes_are_shown_and_what_was_not_run_is_said(page_input, tmp_path):
+    subject = Record(method="woven", setting="eager-bf16")
+    records = [
+        subject.of("extreme_error", 0.5, 90, curve=((1e-4, 0.5), (1.0, 0.125))),
+        subject.of("extreme_rounding", 0.004, 90),
+        subject.of("extreme_not_finite", 3.0, 180),
+        subject.of("extreme_negative", 0.0, 180),
+        Record(method="woven", setting="compile", metric="not_run", value=1.0, note="no <compiler>"),
+    ]
+    more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *records]})
+    page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
+    assert "stability" in page.ids and "#stability" in page.targets
+    words = page.words.replace(" ", "").replace("\N{NO-BREAK SPACE}", "")
+    assert "50.0%–12.5%––––4.0e-03––3of180✗0" in words
+    assert "woven by compile was not measured (no <compiler>)." in page.words
+    assert len(pd.read_csv(tmp_path / "tables" / "extremes.csv")) == 1
+
+
 def test_what_lies_between_fabrics_is_shown_where_it_was_measured(written, page_input, tmp_path):
     assert "latents" not in written[1].ids and "#latents" not in written[1].targets
     subject = Record(method="woven", fabric="denim")

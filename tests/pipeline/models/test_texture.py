@@ -57,3 +57,14 @@ def test_shift_is_clamped_at_grazing_views():
     u, v = shifted(torch.full((2, 1), 1.5), half, half, wo, (4, 1))
     torch.testing.assert_close(u, torch.tensor([0.5 + 0.15 * 0.6 / 0.8 * 2 / 4, 0.5]))
     torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + 0.15 * 0.96 / 0.6 * 2 / 1]))
+
+
+def test_what_is_exported_reads_the_same(monkeypatch):
+    """Exported modules gather and add where torch sums bags: up to the order of eight terms."""
+    random = torch.Generator().manual_seed(0)
+    levels = [torch.randn(3, *shape, generator=random) for shape in ((8, 12), (4, 6), (2, 3), (1, 1))]
+    u, v = (20.0 * torch.randn(200, generator=random) for _ in range(2))
+    sigma = torch.exp2(6.0 * torch.rand(200, generator=random) - 5.0)
+    bags = read_pyramid(levels, u, v, sigma, 4)
+    monkeypatch.setattr(torch.compiler, "is_exporting", lambda: True)
+    torch.testing.assert_close(read_pyramid(levels, u, v, sigma, 4), bags, rtol=1e-5, atol=1e-5)

@@ -1,0 +1,284 @@
+"""Ways to run a trained method: in half precision, compiled, by ONNX Runtime, in 8-bit integers; all on the CPU.
+
+None is another training: the same weights answer the same queries, faster or slower, a little different or not.
+
+    eager-bf16, eager-fp16   torch's autocast: products of matrices in half precision, encodings and exponentials in
+                             single: 8 bits cannot tell places within a repeat, and float16 ends at 65,504
+    compile, compile-bf16    torch.compile, which needs a C++ compiler
+    onnx                     ONNX Runtime on the exported module
+    onnx-int8                the same with weights of 8 bits, and activations rounded to 8 bits as they come
+
+What computes in single precision throughout (`EXACT`) must agree with the method itself: it is held against it once for
+every module, and refused beyond `TOLERANCE`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+
+from pipeline.models.method import CHUNK, Method
+from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import PerQuery, Portable
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.query import Queries
+from weaves.errors import WorkFailed
+from weaves.fabric import Fabric
+
+TOLERANCE: Final = 1e-4
+"""Most by which answers in single precision may differ: norm of the difference over that of the method's own."""
+
+_STREAM = 0x0A57  # of the queries that modules are compiled and compared on
+_COMPARED = 512
+_MODULES = 1024  # that torch may compile in one process; beyond 8 it would fall back to eager, silently
+
+
+class _Program(NamedTuple):
+    """A module, ready to run."""
+
+    run: Callable[..., Tensor]
+    """From inputs and constants to components (N, 4)."""
+    saved: int = 0
+    """Bytes that its weights take less than in single precision."""
+
+
+class Runtime(NamedTuple):
+    """A way to run modules."""
+
+    missing: Callable[[], str]
+    """Returns why this machine cannot; empty if it can."""
+    load: Callable[[nn.Module, Sequence[Tensor], int], _Program]
+    """Takes a module, what it will be given, and how many of that, the first ones, have a row a query."""
+
+
+def _eager(dtype: torch.dtype) -> Runtime:
+    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
+        return _Program(_rounding(module, dtype))
+
+    return Runtime(lambda: "", load)
+
+
+def _compiled(dtype: torch.dtype | None = None) -> Runtime:
+    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
+        torch._dynamo.config.recompile_limit = _MODULES
+        for column in example[:rows]:
+            torch._dynamo.mark_dynamic(column, 0)
+        run = _rounding(torch.compile(module, fullgraph=True), dtype)
+        with _quiet(), torch.inference_mode():
+            run(*example)
+        return _Program(run)
+
+    return Runtime(_no_compiler, load)
+
+
+def _rounding(module: Callable[..., Tensor], dtype: torch.dtype | None) -> Callable[..., Tensor]:
+    """Return the module with its products of matrices in `dtype`; None: all of it in single precision."""
+
+    def run(*given: Tensor) -> Tensor:
+        with torch.autocast("cpu", dtype=dtype) if dtype else nullcontext():
+            return module(*given).float()
+
+    return run
+
+
+@cache
+def _no_compiler() -> str:
+    """Return why torch cannot compile here: the one sure way to know is to try."""
+    try:
+        with _quiet():
+            torch.compile(torch.sin, fullgraph=True)(torch.ones(2))
+    except Exception as error:  # whatever torch raises, of any version, means the same
+        lines = [line for line in str(error).splitlines() if line and not line.endswith("raised:")]
+        return f"torch.compile does not work on this machine: {(lines or [type(error).__name__])[0]}"
+    return ""
+
+
+def _onnx(quantised: bool) -> Runtime:
+    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
+        import onnxruntime
+
+        plain = exported(module, example, rows)
+        model = _quantised(plain) if quantised else plain
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        # An input that the answers do not depend on is no input of the graph.
+        places = [(int(entry.name.removeprefix("x")), entry.name) for entry in session.get_inputs()]
+
+        def run(*given: Tensor) -> Tensor:
+            (answer,) = session.run(None, {name: given[place].numpy() for place, name in places})
+            return torch.from_numpy(answer)
+
+        return _Program(run, len(plain) - len(model))
+
+    return Runtime(_no_onnx, load)
+
+
+def _no_onnx() -> str:
+    lacking = [name for name in ("onnx", "onnxruntime", "onnxscript") if importlib.util.find_spec(name) is None]
+    return f"not installed: {', '.join(lacking)}" if lacking else ""
+
+
+def exported(module: nn.Module, example: Sequence[Tensor], rows: int) -> bytes:
+    """Return a module as an ONNX model whose inputs are named x0, x1, …; the first `rows` of them have any length."""
+    free = torch.export.Dim("rows", min=2)
+    shapes = tuple({0: free} if place < rows else None for place in range(len(example)))
+    with TemporaryDirectory() as folder, _quiet(), torch.no_grad():
+        path = Path(folder) / "model.onnx"
+        torch.onnx.export(
+            module,
+            tuple(example),
+            path,
+            input_names=[f"x{place}" for place in range(len(example))],
+            output_names=["components"],
+            dynamic_shapes=(shapes,),
+            dynamo=True,
+            external_data=False,
+            verbose=False,
+        )
+        return path.read_bytes()
+
+
+def _quantised(model: bytes) -> bytes:
+    """Return an ONNX model with 8-bit weights in all products of matrices."""
+    import onnx
+    from onnxruntime.quantization import quantize_dynamic
+
+    graph = onnx.load_from_string(model)
+    del graph.graph.value_info[:]  # shapes noted by the exporter, which those found again may contradict
+    with TemporaryDirectory() as folder, _quiet():
+        path = Path(folder) / "model.onnx"
+        quantize_dynamic(graph, path)
+        return path.read_bytes()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Hear nothing of what compilers and exporters have to say about themselves."""
+    level = logging.root.manager.disable
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        logging.disable(logging.WARNING)
+        try:
+            yield
+        finally:
+            logging.disable(level)
+
+
+RUNTIMES: Final[dict[str, Runtime]] = {
+    "eager-bf16": _eager(torch.bfloat16),
+    "eager-fp16": _eager(torch.float16),
+    "compile": _compiled(),
+    "compile-bf16": _compiled(torch.bfloat16),
+    "onnx": _onnx(quantised=False),
+    "onnx-int8": _onnx(quantised=True),
+}
+"""Every way by its name, the names of `reports.options.RuntimeName`."""
+
+EXACT: Final = frozenset({"compile", "onnx"})
+"""Those that round like the method itself."""
+
+
+class RunBy:
+    """A method run in another way; its setting says which.
+
+    Parameters
+    ----------
+    method : Portable
+        What answers.
+    runtime : str
+        A key of `RUNTIMES`.
+    """
+
+    def __init__(self, method: Portable, runtime: str) -> None:
+        self.name, self.setting = method.name, " ".join(filter(None, (method.setting, runtime)))
+        self._method, self._runtime = method, runtime
+        self._programs: dict[tuple[Any, ...], tuple[nn.Module, _Program]] = {}
+        self._ready = PerFabric(self._prepared)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Tell whether the method covers the fabric."""
+        return self._method.covers(fabric)
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Prepare the method; compile or export its module, unless an earlier fabric's serves this one too.
+
+        Raises
+        ------
+        WorkFailed
+            If the answers are not the method's own, though they are computed in single precision.
+        """
+        self._ready.of(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        part, program = self._ready.of(fabric)
+        part.refuse(queries)
+        return _answered(part, program, queries)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the method's bytes, less what smaller weights save."""
+        return self._method.bytes_stored(fabric) - self._ready.of(fabric)[1].saved
+
+    def _prepared(self, fabric: Fabric) -> tuple[PerQuery, _Program]:
+        self._method.prepare(fabric)
+        part = self._method.per_query(fabric)
+        key = (id(part.module), *(tuple(constant.shape) for constant in part.constants))
+        if key in self._programs:
+            return part, self._programs[key][1]
+        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _STREAM, 0, _COMPARED)
+        inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
+        program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
+        if self._runtime in EXACT:
+            self._compare(fabric, part, program, queries)
+        # The module is kept beside its program: an identity is another object's once its own is gone.
+        self._programs[key] = part.module, program
+        return part, program
+
+    def _compare(self, fabric: Fabric, part: PerQuery, program: _Program, queries: Queries) -> None:
+        """Hold answers against the method's own."""
+        own = self._method.predict(fabric, queries)
+        difference = np.linalg.norm(_answered(part, program, queries) - own)
+        error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
+        if not error <= TOLERANCE:
+            raise WorkFailed(
+                f"{self.name} by {self._runtime} on {fabric.name}: answers differ from the method's own by "
+                f"{error:.1e}, beyond {TOLERANCE:g}"
+            )
+
+
+def _answered(part: PerQuery, program: _Program, queries: Queries) -> npt.NDArray[np.float32]:
+    result = np.empty((len(queries.u), 4), np.float32)
+    with torch.inference_mode():
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            inputs = (torch.from_numpy(column) for column in part.inputs(queries.take(rows)))
+            result[rows] = program.run(*inputs, *part.constants).numpy()
+    return result
+
+
+def runs(method: Method, names: Iterable[str]) -> list[Method]:
+    """Return the method run in each of these ways that this machine can; none if it is not `Portable`."""
+    if not isinstance(method, Portable):
+        return []
+    return [RunBy(method, name) for name in dict.fromkeys(names) if not RUNTIMES[name].missing()]
+
+
+def not_run(method: Method, names: Iterable[str]) -> dict[str, str]:
+    """Return the ways in which this machine cannot run the method, each with the reason."""
+    if not isinstance(method, Portable):
+        return {}
+    return {name: reason for name in names if (reason := RUNTIMES[name].missing())}
