@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jobs.comparing import records_file
 from jobs.narrow_recipe import savings, write_recipe
@@ -19,7 +19,6 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    import pandas as pd
     from rich.table import Table
 
     from pipeline.scenes.requirement import Requirement
@@ -78,7 +77,7 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
     table = with_measured(table, scene_table(records), requirement.scene)
     console = Console()
     console.print(_asked_table(requirement), "")
-    console.print(_choice_table(table), "")
+    console.print(_choice_table(rows(table)), "")
     chosen = cheapest(table, error, ms)
     if chosen is None:
         near = "; ".join(
@@ -194,17 +193,16 @@ def _asked_table(requirement: Requirement) -> Table:
     return table
 
 
-def _choice_table(found: pd.DataFrame) -> Table:
+def _choice_table(found: Iterable[Any]) -> Table:
     """Show the methods, the fastest first; those on the front in bold."""
     from rich.table import Table
 
     from reports.style import display
-    from reports.summary import rows
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     for name in ("method", "error", "ms a frame", "not its own", ""):
         table.add_column(name, justify="left" if name in ("method", "") else "right")
-    for row in rows(found):
+    for row in found:
         cells = [f"{100 * row.error:.2g} %", f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known]
         table.add_row(display(row.method, row.setting), *cells, style="bold" if row.front else "")
     return table
