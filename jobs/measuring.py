@@ -122,10 +122,10 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     manifest = Manifest.load(folder)
     asked = [(model["options"], model["folders"], out) for model in task.setting["models"]]
     provenance = Provenance(dataset=manifest.fingerprint)
-    methods = [one for ask in asked for one in _methods(*ask, options)]
-    records = measure_timing(methods, manifest, folder, options, provenance)
-    progress(0.4)
     methods = [one for ask in asked for one in _methods(*ask)]
+    others = [one for ask in asked for one in _variants(_methods(*ask), ask[1], options)]
+    records = measure_timing(methods + others, manifest, folder, options, provenance)
+    progress(0.6)
     records += [record for one in methods for record in _not_run(one, options, provenance)]
     records += measure_by_size(methods, manifest, folder, options, provenance)
     write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
@@ -198,10 +198,15 @@ def _methods(
     """Load the methods that a model's options describe; with `bench` also what it asks of each trained one."""
     model = TypeAdapter[Any](ModelOptions).validate_python(options)
     methods = load_methods(model, [out / folder for folder in folders])
-    if bench is None or not folders:
-        return methods
+    return methods + (_variants(methods, folders, bench) if bench else [])
+
+
+def _variants(methods: list[Method], folders: list[str], bench: BenchOptions) -> list[Method]:
+    """Return what a benchmark measures beside trained methods: counterparts without or with a bound, and runtimes."""
+    if not folders:
+        return []
     others = [counterpart(one) for one in methods if bench.bounds]
-    return methods + others + [run for one in methods for run in runs(one, bench.runtimes)]
+    return others + [run for one in methods for run in runs(one, bench.runtimes)]
 
 
 def _not_run(method: Method, bench: BenchOptions, provenance: Provenance) -> list[Record]:

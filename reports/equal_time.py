@@ -51,8 +51,14 @@ MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
 }
 """What errors are taken of: the Record's metric and the colour of each component."""
 
-LONGEST: Final = 0.01
-"""Seconds of a timed call of one class, over all fabrics."""
+LONGEST: Final = 0.02
+"""Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
+
+FEWEST: Final = 512
+"""Least queries a fabric in such a call: what a call itself costs must not stand for what a query costs."""
+
+TIMED: Final = 3
+"""Fabrics of each class that are timed, evenly spaced in the order of the recipe."""
 
 COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
 
@@ -68,8 +74,8 @@ def measure_by_size(
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
-    Errors are of all queries of a class; timed calls, on one thread, of as many as `LONGEST` allows. The time over all
-    classes weighs them as they occur. A Record's curve holds (lower edge of the class, value); its value is that over
+    Errors are of all queries of a class. Timed are calls about `TIMED` fabrics that the method covers, on one thread, of
+    as many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower edge of the class, value); its value is that over
     all classes.
     """
     classes, shares = _classes(manifest, folder)
@@ -82,9 +88,8 @@ def measure_by_size(
             own = [one for one in asked if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
-            contenders.append(
-                affordable(Contender(method.predict, [(cloth, queries) for cloth, queries, _ in own]), LONGEST)
-            )
+            timed = [(cloth, queries) for cloth, queries, _ in own[:: max(1, len(own) // TIMED)][:TIMED]]
+            contenders.append(affordable(Contender(method.predict, timed), LONGEST, FEWEST))
             for name, error in _errors(method, own, options.seed):
                 errors.setdefault((index, name), []).append((low, error))
         timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)

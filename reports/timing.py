@@ -108,17 +108,20 @@ def time_side_by_side(
 
 
 def affordable(
-    contender: Contender, longest: float = LONGEST, clock: Callable[[], int] = time.perf_counter_ns
+    contender: Contender,
+    longest: float = LONGEST,
+    fewest: int = FEWEST,
+    clock: Callable[[], int] = time.perf_counter_ns,
 ) -> Contender:
     """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
 
-    Queries a fabric are doubled from `FEWEST` on while the last call says that twice as many will do: their number is a
+    Queries a fabric are doubled from `fewest` on while the last call says that twice as many will do: their number is a
     power of 2 times that, or all there are, and so the same in two runs unless a method is near the limit. At most
-    `FEWEST` queries a fabric take longer.
+    `fewest` queries a fabric take longer.
     """
     set_threads(1)
     most = max(len(queries.u) for _, queries in contender.questions)
-    rows = FEWEST
+    rows = fewest
     _answer(contender.first(rows))  # warms up
     while rows < most:
         start = clock()
