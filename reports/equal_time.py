@@ -74,9 +74,9 @@ def measure_by_size(
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
-    Errors are of all queries of a class. Timed are calls about `TIMED` fabrics that the method covers, on one thread, of
-    as many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower edge of the class, value); its value is that over
-    all classes.
+    Errors are of all queries of a class. Timed are calls about `TIMED` fabrics that the method covers, on one thread,
+    of as many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds
+    (lower edge of the class, value); its value is that over all classes.
     """
     classes, shares = _classes(manifest, folder)
     methods = [one for one in methods if any(one.covers(cloth) for asked in classes.values() for cloth, _, _ in asked)]
