@@ -132,7 +132,8 @@ def scene_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
     for scene, group in table.groupby("scene", sort=False) if len(table) else ():
         lines = []
         for row in rows(group):
-            cells: list[Any] = [percent(row.colour_rrmse), scientific(row.mse), times(row.ratio), fixed_to(row.psnr, 1)]
+            colour = percent(row.colour_rrmse) if row.colour_rrmse > 0 else "in the noise"
+            cells: list[Any] = [colour, scientific(row.mse), times(row.ratio), fixed_to(row.psnr, 1)]
             cells += [fixed(value) for value in (row.ssim, row.flip_ldr, row.flip_hdr)]
             cells += [fixed_to(row.delta_e, 2), signed(row.flicker), signed(row.excess_energy)]
             cells += [percent(row.fallback_share, 0), {"text": fixed_to(row.frame_time, 1), "best": bool(row.front)}]

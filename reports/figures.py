@@ -158,7 +158,7 @@ def _against_time(
     width = max(2.3 * len(panels), _NARROWEST)
     figure, flat = new_figure(width, height, len(panels), sharey=True, lines=len(measures))
     grid = np.asarray(flat).reshape(len(measures), len(panels))
-    for (measure, label), line in zip(measures.items(), grid, strict=True):
+    for place, ((measure, label), line) in enumerate(zip(measures.items(), grid, strict=True)):
         for axes, (panel, title) in zip(line, panels.items(), strict=True):
             # What is nothing, or less than the truth has, cannot be drawn.
             found = table[(table["panel"] == panel) & (table[measure] > 0) & table["time"].notna()]
@@ -168,7 +168,7 @@ def _against_time(
                     knobs["time"], knobs[measure], color=colours[str(method)], marker=scheme.marker(str(method)),
                     markersize=4.5, linewidth=1.1,
                 )  # fmt: skip
-            axes.set(xscale="log", yscale="log", title=title if line is grid[0] else "")
+            axes.set(xscale="log", yscale="log", title="" if place else title)
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
             axes.yaxis.set_minor_locator(NullLocator())

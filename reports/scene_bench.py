@@ -76,7 +76,7 @@ def measure_scene(
         records += image_errors(shown[0], truth[0], noise[0], lit[0], image, floor).records(subject)
         records.append(_colour(subject, shot, answers))
         own = np.asarray(shown @ np.array(LUMINANCE))
-        strange = [method.strange(cloth.queries) for cloth in shot.cloths]
+        strange = [method.strange(cloth.fabric, cloth.queries) for cloth in shot.cloths]
         frames = len(truth)
         records += [
             subject.of("flicker", flicker(own[:, still], light[0][:, still], 0.0, light[1][:, still]), frames),

@@ -56,7 +56,7 @@ class Cloth:
     mean, standard_error : float32 (M, 4)
         The truth's answers.
     stand_in : float32 (M, 4)
-        What quadrature answers where light or viewer is behind the cloth: for methods that do not know that. 0
+        What quadrature answers where light or viewer is behind the cloth, for methods that do not know that; 0
         elsewhere.
     """
 
@@ -144,14 +144,15 @@ class Shot:
     def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
         """Return a method's components for every cloth; random methods draw anew in every frame.
 
-        What falls back is answered once for all methods.
+        What falls back because of light or viewer behind the cloth was answered once for all methods.
         """
         found = []
         for cloth in self.cloths:
             method.prepare(cloth.fabric)
-            values, strange = cloth.stand_in.copy(), method.strange(cloth.queries)
+            values = cloth.stand_in.copy()
+            answered = method.strange(cloth.fabric, cloth.queries) & behind(cloth.queries)
             for frame in range(len(self.base)):
-                rows = np.flatnonzero((cloth.frame == frame) & ~strange)
+                rows = np.flatnonzero((cloth.frame == frame) & ~answered)
                 if rows.size:
                     own = int(fingerprint([self.name, cloth.fabric.name, frame, seed]), 16)
                     values[rows] = method.predict(cloth.fabric, cloth.queries.take(rows), own)
@@ -214,11 +215,15 @@ def read_shot(path: Path) -> Shot:
 
 def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
     """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
-    result = np.zeros((len(queries.u), 4), np.float32)
-    behind = (queries.wi[:, 2] < 0.0) | (queries.wo[:, 2] < 0.0)
-    if behind.any():
-        result[behind] = estimate(fabric, queries.take(behind), QUADRATURE, seed).mean
+    result, rows = np.zeros((len(queries.u), 4), np.float32), behind(queries)
+    if rows.any():
+        result[rows] = estimate(fabric, queries.take(rows), QUADRATURE, seed).mean
     return result
+
+
+def behind(queries: Queries) -> npt.NDArray[np.bool_]:
+    """Say of which queries light or viewer is behind the cloth, (M,)."""
+    return np.asarray((queries.wi[:, 2] < 0.0) | (queries.wo[:, 2] < 0.0))
 
 
 def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:

@@ -75,6 +75,14 @@ class Domain(BaseModel):
                     allowed = f"the model {model} was trained on {low:g} to {high:g} only; --extrapolate asks it anyway"
                     raise BadInput(fabric.name, name, value, allowed)
 
+    def knows(self, fabric: Fabric) -> bool:
+        """Tell whether a fabric's yarns lie within those trained on."""
+        try:
+            self.refuse_fabric(fabric, "")
+        except BadInput:
+            return False
+        return True
+
     def refuse_truth(self, truth: TruthOptions, model: str) -> None:
         """Refuse a truth of other physics than the model's own."""
         theirs = truth.model_dump(mode="json")

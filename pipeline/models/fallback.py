@@ -2,9 +2,9 @@
 
 Footprints are ellipses and cloth is curved; many methods know round footprints and flat cloth only, and a renderer that
 had nothing else would ask them so: the ellipse becomes the round footprint of equal area (or of its major axis, which
-blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, though: a query whose
-light or viewer is on a side of the cloth that the method does not know is answered by the truth's `quadrature`, at
-`ERROR`, and never guessed at. How many those are is part of every result.
+blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, nor for yarns unlike those
+that a network was trained on, such as open cloth where it saw solid cloth alone: such a query is answered by the
+truth's `quadrature`, at `ERROR`, and never guessed at. How many those are is part of every result.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.models.domain import Domain
 from pipeline.models.method import Method
 from pipeline.models.options.base import RoundFootprint
 from pipeline.truth.estimator import estimate
@@ -56,7 +57,7 @@ class Fallback:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries of any kind, float32 (N, 4)."""
-        strange = self.strange(queries)
+        strange = self.strange(fabric, queries)
         if not strange.any():
             return self._method.predict(fabric, self._nearest(queries), seed)
         result = np.empty((len(strange), 4), np.float32)
@@ -69,8 +70,11 @@ class Fallback:
         """Return the method's bytes; the quadrature needs none that the fabric itself does not."""
         return self._method.bytes_stored(fabric)
 
-    def strange(self, queries: Queries) -> npt.NDArray[np.bool_]:
-        """Say which queries are not the method's but the quadrature's, (N,)."""
+    def strange(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+        """Say which queries about a fabric are not the method's but the quadrature's, (N,)."""
+        domain: Domain | None = getattr(self._method, "domain", None)
+        if domain is not None and not domain.knows(fabric):
+            return np.ones(len(queries.u), np.bool_)
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
         unknown = queries.wo[:, 2] < 0.0
         return unknown if "behind" in self._kinds else unknown | (queries.wi[:, 2] < 0.0)

@@ -1,17 +1,22 @@
 """A method for any query: nearest forms where there are any, quadrature where there are none."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from pipeline.models.fallback import Fallback
+import pipeline.models
+from pipeline.models.fallback import QUADRATURE, Fallback
 from pipeline.models.options import PointSampledOptions
-from pipeline.models.registry import load_methods
+from pipeline.models.registry import load_methods, load_model
 from pipeline.models.sums import Sums
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
+
+PRETRAINED = Path(pipeline.models.__file__).parent / "pretrained" / "selvage"
 
 
 class Seen:
@@ -74,7 +79,7 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     fabric, queries = load_fabric("voile"), mixed()
     method = Seen()
     fallback = Fallback(method, ())
-    strange = fallback.strange(queries)
+    strange = fallback.strange(fabric, queries)
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
@@ -85,6 +90,17 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     size = np.linalg.norm(reference.mean, axis=1)
     assert np.median(wrong / size) < 0.1
     assert wrong.sum() < 0.1 * size.sum()
+
+
+def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
+    (selvage,) = load_model(PRETRAINED)
+    fallback = Fallback(selvage, ())
+    denim = load_fabric("denim")
+    rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
+    queries = draw_queries(QueryOptions(sigma=(0.5, 1.0)), denim.weave.repeat, 3, 0, 20)
+    assert not fallback.strange(denim, queries).any() and fallback.strange(rough, queries).all()
+    found = fallback.predict(rough, queries)
+    np.testing.assert_array_equal(found, estimate(rough, queries, QUADRATURE, 0).mean)
 
 
 @pytest.mark.parametrize("rows", [0, 7])
