@@ -57,9 +57,6 @@ LONGEST: Final = 0.02
 FEWEST: Final = 512
 """Least queries a fabric in such a call: what a call itself costs must not stand for what a query costs."""
 
-TIMED: Final = 3
-"""Fabrics of each class that are timed, evenly spaced in the order of the recipe."""
-
 COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
 
 _Asked = list[tuple[Fabric, Queries, Answers]]
@@ -74,9 +71,9 @@ def measure_by_size(
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
-    Errors are of all queries of a class. Timed are calls about `TIMED` fabrics that the method covers, on one thread,
-    of as many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds
-    (lower edge of the class, value); its value is that over all classes.
+    Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
+    many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
+    edge of the class, value); its value is that over all classes.
     """
     classes, shares = _classes(manifest, folder)
     methods = [one for one in methods if any(one.covers(cloth) for asked in classes.values() for cloth, _, _ in asked)]
@@ -88,8 +85,8 @@ def measure_by_size(
             own = [one for one in asked if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
-            timed = [(cloth, queries) for cloth, queries, _ in own[:: max(1, len(own) // TIMED)][:TIMED]]
-            contenders.append(affordable(Contender(method.predict, timed), LONGEST, FEWEST))
+            asked_of = [(cloth, queries) for cloth, queries, _ in own]
+            contenders.append(affordable(Contender(method.predict, asked_of), LONGEST, FEWEST))
             for name, error in _errors(method, own, options.seed):
                 errors.setdefault((index, name), []).append((low, error))
         timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
