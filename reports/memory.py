@@ -14,8 +14,8 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-UNSURE: Final = 4_000_000
-"""Bytes by which an answer may be wrong."""
+UNSURE: Final = 16_000_000
+"""Bytes by which an answer may be wrong: 10 MB were seen."""
 
 _RESET_LARGEST = "5"  # see proc(5), clear_refs
 

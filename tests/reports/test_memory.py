@@ -11,7 +11,7 @@ needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tel
 
 
 @needs_linux
-@pytest.mark.parametrize("size", [16, 64])
+@pytest.mark.parametrize("size", [64, 256])
 def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(size):
     """Three arrays of which two live together: twice the size of one, within a tenth and what is stated as unsure."""
 
@@ -27,7 +27,7 @@ def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(siz
 @needs_linux
 def test_torch_is_counted_too():
     torch = pytest.importorskip("torch")
-    assert peak_memory(lambda: torch.ones(32 * MB, dtype=torch.uint8)) == pytest.approx(32 * MB, rel=0.1)
+    assert peak_memory(lambda: torch.ones(32 * MB, dtype=torch.uint8)) == pytest.approx(32 * MB, abs=UNSURE)
 
 
 def test_a_system_that_does_not_tell_gives_none(monkeypatch):
