@@ -120,13 +120,14 @@ def _questions(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     """Cut every fabric's splits into shards, each with the role of its fabric."""
     rows = recipe.dataset.rows
     named = {"train": rows.train, "validation": rows.validation, "test": rows.test}
-    if recipe.models and not any(model.learns for model in recipe.models):
+    idle = bool(recipe.models) and not any(model.learns for model in recipe.models)
+    if idle:
         named = {"test": rows.test}
     # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
     unseen = named if any(model.of_one_material for model in recipe.models) else {"test": rows.test}
     for role, fabrics, splits in (
         ("seen", recipe.seen, named),
-        ("population", recipe.population, {"train": rows.population}),
+        ("population", recipe.population, {} if idle else {"train": rows.population}),
         ("unseen", recipe.unseen, unseen),
     ):
         for fabric in fabrics:

@@ -203,6 +203,7 @@ def _choice_table(found: Iterable[Any]) -> Table:
     for name in ("method", "error", "ms a frame", "not its own", ""):
         table.add_column(name, justify="left" if name in ("method", "") else "right")
     for row in found:
-        cells = [f"{100 * row.error:.2g} %", f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known]
+        error = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"
+        cells = [error, f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known]
         table.add_row(display(row.method, row.setting), *cells, style="bold" if row.front else "")
     return table

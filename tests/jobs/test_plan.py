@@ -1,3 +1,5 @@
+import dataclasses
+
 import pytest
 
 from jobs.plan import plan
@@ -228,3 +230,12 @@ def test_no_two_tasks_write_one_file(tasks):
 def test_the_full_plan_is_paper_sized():
     tasks = plan(load_recipe("full"))
     assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
+
+
+def test_rows_that_nobody_learns_from_are_not_drawn():
+    quick = load_recipe("quick")
+    idle = dataclasses.replace(quick, models=tuple(m for m in quick.models if not m.learns))
+    drawn = {task.setting["question"]["split"] for task in plan(idle) if task.stage == "generate"}
+    assert drawn == {"test"}
+    every = {task.setting["question"]["split"] for task in plan(quick) if task.stage == "generate"}
+    assert every == {"train", "validation", "test"}
