@@ -26,6 +26,7 @@ from pipeline.truth.query import Queries
 from pipeline.truth.replicates import REPLICATES, query_scene, ratios
 from pipeline.truth.slab import reflection, transmission
 from pipeline.truth.verdict import ROUNDING, Floats, Invariant, exact, largest, quotient, worst
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.surface import GAP as NO_YARN
 from weaves.surface import surface_at
@@ -278,7 +279,10 @@ def translation(fabric: Fabric) -> list[Invariant]:
 
 
 def agreement(fabric: Fabric) -> list[Invariant]:
-    """Test that all estimators give the same answers, each compared with one of them that takes more points."""
+    """Test that all estimators give the same answers, each compared with one of them that takes more points.
+
+    One that does not know the cloth, as `table` does not a large irregular draft, is left out.
+    """
     rng = np.random.default_rng(_SEED + 8)
     rows, reference = 24, "owen"
     sizes = np.exp(rng.uniform(np.log(0.5), np.log(8.0), rows))
@@ -286,7 +290,10 @@ def agreement(fabric: Fabric) -> list[Invariant]:
     best = estimate(fabric, queries, _fixed(32_768, estimator=reference), 8)
     found = []
     for name in ESTIMATORS:
-        answers = estimate(fabric, queries, _fixed(8192, estimator=name), 9)
+        try:
+            answers = estimate(fabric, queries, _fixed(8192, estimator=name), 9)
+        except BadInput:
+            continue
         seen = best.mean > 1e-2 * best.mean.max(axis=1, keepdims=True)
         spread = np.hypot(answers.standard_error, best.standard_error)[seen] / best.mean[seen]
         found.append(worst(f"{name} / {reference}", answers.mean[seen] / best.mean[seen], 1.0, spread, 15))
