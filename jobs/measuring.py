@@ -122,9 +122,10 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     manifest = Manifest.load(folder)
     asked = [(model["options"], model["folders"], out) for model in task.setting["models"]]
     provenance = Provenance(dataset=manifest.fingerprint)
-    methods = [one for ask in asked for one in _methods(*ask)]
-    others = [one for ask in asked for one in _variants(_methods(*ask), ask[1], options)]
-    records = measure_timing(methods + others, manifest, folder, options, provenance)
+    loaded = [(_methods(*ask), ask[1]) for ask in asked]
+    methods = [one for found, _ in loaded for one in found]
+    variants = [one for found, folders in loaded for one in _variants(found, folders, options)]
+    records = measure_timing(methods + variants, manifest, folder, options, provenance)
     progress(0.6)
     records += [record for one in methods for record in _not_run(one, options, provenance)]
     records += measure_by_size(methods, manifest, folder, options, provenance)

@@ -131,11 +131,7 @@ def _left(model: ModelRecipe, requirement: Requirement, fabrics: Mapping[str, Fa
     """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
     if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.fabrics}:
         return None
-    return (
-        requirement.viewer_behind
-        if "behind" in model.options.kinds
-        else max(requirement.behind, requirement.viewer_behind)
-    )
+    return requirement.viewer_behind if "behind" in model.options.kinds else requirement.not_in_front
 
 
 def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:

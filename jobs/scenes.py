@@ -70,7 +70,8 @@ def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, tr
         "frames": frames.id,
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in trainings],
-        "bench": bench.model_dump(mode="json", include={"scenes", "picture_counts", "bounds"}),
+        "bench": bench.model_dump(mode="json", include={"picture_counts"}),
+        "scenes": bench.scenes.model_dump(mode="json", exclude={"names"}),
     }
     stem = f"records/{options.name}-{scene}-{identity('bench', spec)[:8]}"
     shown = [f"k = {knob}" for knob in options.knobs if knob in bench.picture_counts] if options.knobs else [""]
@@ -105,7 +106,8 @@ def _timing_task(
         "measure": "time of a frame",
         "version": BENCH_VERSION,
         "frames": frames.id,
-        "options": bench.model_dump(mode="json", include={"scenes", "timing_repeats", "warm_up", "bounds"}),
+        "options": bench.model_dump(mode="json", include={"timing_repeats", "warm_up"}),
+        "scenes": bench.scenes.model_dump(mode="json", include={"seed", "footprint"}),
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model, _ in entries],
         "trainings": [task.id for _, tasks in entries for task in tasks],
     }

@@ -118,9 +118,8 @@ def measure_timing(
     list of Record
         For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
         thread, where the system tells (`reports.memory`); `prepare_time`, the time until a fabric never seen before can
-        be asked about, where any fabric can be. Then `time` for each method and number of threads, the truth last (on
-        one thread, about the first fabric), with every reading as `samples` and the queries a fabric as `note`
-        (`reports.timing.affordable`).
+        be asked about, where any fabric can be. Then `time` for each method and number of threads, the truth last, with
+        every reading as `samples` and the queries a fabric as `note` (`reports.timing.affordable`).
     """
     asked = []
     for name in manifest.names("seen", "unseen"):
@@ -142,19 +141,17 @@ def measure_timing(
         memory = peak_memory(partial(method.predict, *covered[0]))
         records += [subject.of("peak_memory", memory, 3, unit="B")] if memory is not None else []
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
-    # One fabric and many queries: the truth tabulates a cloth anew in every call.
-    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), asked[:1]), fewest=1024)
+    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), asked))
     entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
     return records + _times(entries, options)
 
 
 def _times(entries: Sequence[tuple[Record, Contender]], options: BenchOptions) -> list[Record]:
     """Return the times of all contenders on every number of threads, all of them in turns."""
-    counts = thread_counts(options.threads)
     runs = [
         (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
         for subject, contender in entries
-        for threads in (counts[:1] if subject.method == TRUTH else counts)
+        for threads in thread_counts(options.threads)
     ]
     timings = time_side_by_side([contender for _, contender in runs], options.timing_repeats, options.warm_up)
     records = []

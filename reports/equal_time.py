@@ -25,7 +25,7 @@ import pandas as pd
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.query import Answers, Queries
-from reports.metrics import colour_error
+from reports.metrics import COLOUR_WEIGHTS, colour_error
 from reports.options import BenchOptions
 from reports.record import Metric, Provenance, Record
 from reports.summary import rows
@@ -45,7 +45,7 @@ SIZES: Final = ("below .1", ".1 to .3", ".3 to 1", "1 to 3", "above 3")
 """Names of the classes."""
 
 MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
-    "colour": ("size_colour", np.array([[0.3], [0.3], [0.5], [0.5]])),
+    "colour": ("size_colour", COLOUR_WEIGHTS),
     "specular": ("size_specular", np.array([[1.0], [1.0], [0.0], [0.0]])),
     "diffuse": ("size_diffuse", np.array([[0.0], [0.0], [1.0], [1.0]])),
 }

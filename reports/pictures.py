@@ -6,6 +6,7 @@ standard error of each colour beside them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -40,7 +41,7 @@ def render_truth(fabric: Fabric, scene: View, options: BenchOptions, path: Path)
     answers = estimate(fabric, gbuffer.queries(fabric.weave.repeat), options.truth, seed)
     noise = compose(gbuffer, colour_noise(answers, colours(fabric)))
     picture = compose(gbuffer, shade(fabric, answers.mean))
-    _write(path, gbuffer, picture, {"fabric": fabric.name, "scene": scene, "method": TRUTH}, noise)
+    write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)
 
 
 def render_method(
@@ -68,8 +69,8 @@ def render_method(
     seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)
     method.prepare(fabric)
     picture = compose(gbuffer, shade(fabric, method.predict(fabric, gbuffer.queries(fabric.weave.repeat), seed)))
-    about = {"fabric": fabric.name, "scene": scene, "method": method.name, "setting": method.setting}
-    _write(path, gbuffer, picture, about)
+    about = {**_about(fabric, scene, gbuffer), "method": method.name, "setting": method.setting}
+    write_picture(path, picture, gbuffer.mask, about)
     reference = read_exr(truth)
     lit = gbuffer.lit
     error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit], resamples=0)
@@ -84,15 +85,20 @@ def render_method(
     return subject.of_error(error)
 
 
-def _write(
+def write_picture(
     path: Path,
-    gbuffer: GBuffer,
-    picture: npt.NDArray[np.float32],
-    about: dict[str, str],
-    noise: npt.NDArray[np.float32] | None = None,
+    picture: npt.NDArray[np.floating],
+    mask: npt.NDArray[np.bool_],
+    about: Mapping[str, str | float],
+    noise: npt.NDArray[np.floating] | None = None,
 ) -> None:
+    """Write a picture (H, W, 3) as an OpenEXR: A = 1 where `mask` is, with the standard error if known."""
     channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
-    channels["A"] = gbuffer.mask.astype(np.float32)
+    channels["A"] = mask.astype(np.float32)
     if noise is not None:
         channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
-    write_exr(path, channels, {**about, "irradiance": float(gbuffer.irradiance.max(initial=0.0))})
+    write_exr(path, channels, dict(about))
+
+
+def _about(fabric: Fabric, scene: View, gbuffer: GBuffer) -> dict[str, str | float]:
+    return {"fabric": fabric.name, "scene": scene, "irradiance": float(gbuffer.irradiance.max(initial=0.0))}

@@ -17,11 +17,10 @@ import numpy.typing as npt
 
 from pipeline.models.fallback import Fallback
 from reports.aliasing import excess_energy, flicker
-from reports.exr import write_exr
 from reports.image_error import image_errors, noise_floor
 from reports.metrics import COLOUR_WEIGHTS, squared_error
 from reports.options import BenchOptions
-from reports.pictures import ERROR, RGB
+from reports.pictures import write_picture
 from reports.record import TRUTH, Provenance, Record
 from reports.scene_frames import Shot
 from reports.timing import Contender, affordable, time_side_by_side
@@ -33,12 +32,11 @@ if TYPE_CHECKING:
 LONGEST: Final = 0.01
 """Seconds of a timed call."""
 
-Floats = npt.NDArray[np.float64]
-
 
 def write_truth(shot: Shot, path: Path) -> None:
     """Write the truth's first frame and its standard error as an OpenEXR."""
-    _write(path, shot.pictures()[0], {"scene": shot.name, "method": TRUTH}, shot.noise()[0])
+    whole = np.ones(shot.base.shape[1:3], np.bool_)
+    write_picture(path, shot.pictures()[0], whole, {"scene": shot.name, "method": TRUTH}, shot.noise()[0])
 
 
 def measure_scene(
@@ -71,7 +69,7 @@ def measure_scene(
         shown = shot.pictures(answers)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            _write(pictures[method.setting], shown[0], about)
+            write_picture(pictures[method.setting], shown[0], np.ones(lit[0].shape, np.bool_), about)
         subject = _subject(method, shot, provenance)
         records += image_errors(shown[0], truth[0], noise[0], lit[0], image, floor).records(subject)
         records.append(_colour(subject, shot, answers))
@@ -129,11 +127,3 @@ def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Recor
     return Record(
         method=method.name, setting=method.setting, scene=shot.name, threads=1, provenance=provenance or Provenance()
     )
-
-
-def _write(path: Path, picture: Floats, about: Mapping[str, str], noise: Floats | None = None) -> None:
-    channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
-    channels["A"] = np.ones(picture.shape[:2], np.float32)
-    if noise is not None:
-        channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
-    write_exr(path, channels, dict(about))

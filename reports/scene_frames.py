@@ -40,7 +40,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Cloth:
+class Questions:
     """What is asked about one cloth over all F frames: M questions.
 
     Attributes
@@ -78,11 +78,11 @@ class Cloth:
         squared = np.square(self.standard_error.astype(np.float64))
         return np.asarray(self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(self._colours()))))
 
-    def of_frame(self, frame: int) -> Cloth:
+    def of_frame(self, frame: int) -> Questions:
         """Return the questions of one frame."""
         rows = np.flatnonzero(self.frame == frame)
         parts = (getattr(self, name)[rows] for name in _COLUMNS)
-        return Cloth(self.fabric, self.queries.take(rows), *parts)
+        return Questions(self.fabric, self.queries.take(rows), *parts)
 
     def _colours(self) -> Floats:
         """Return the colour of each component of each question, (M, 4, 3): transmitted light has its own."""
@@ -100,13 +100,13 @@ class Shot:
         Of the scene.
     base : float32 (F, H, W, 3)
         Linear RGB without the light that the cloth scatters.
-    cloths : list of Cloth
+    cloths : list of Questions
         In the order of the scene.
     """
 
     name: str
     base: npt.NDArray[np.float32]
-    cloths: list[Cloth]
+    cloths: list[Questions]
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:
@@ -150,7 +150,7 @@ class Shot:
         for cloth in self.cloths:
             method.prepare(cloth.fabric)
             values = cloth.stand_in.copy()
-            answered = method.strange(cloth.fabric, cloth.queries) & behind(cloth.queries)
+            answered = method.strange(cloth.fabric, cloth.queries) & cloth.queries.behind
             for frame in range(len(self.base)):
                 rows = np.flatnonzero((cloth.frame == frame) & ~answered)
                 if rows.size:
@@ -209,21 +209,16 @@ def read_shot(path: Path) -> Shot:
         for key, fabric in about["cloths"].items():
             queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
             rest = (file[f"{key}.{column}"] for column in _COLUMNS)
-            cloths.append(Cloth(Fabric.model_validate(fabric), queries, *rest))
+            cloths.append(Questions(Fabric.model_validate(fabric), queries, *rest))
         return Shot(about["name"], file["base"], cloths)
 
 
 def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
     """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
-    result, rows = np.zeros((len(queries.u), 4), np.float32), behind(queries)
+    result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
         result[rows] = estimate(fabric, queries.take(rows), QUADRATURE, seed).mean
     return result
-
-
-def behind(queries: Queries) -> npt.NDArray[np.bool_]:
-    """Say of which queries light or viewer is behind the cloth, (M,)."""
-    return np.asarray((queries.wi[:, 2] < 0.0) | (queries.wo[:, 2] < 0.0))
 
 
 def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:

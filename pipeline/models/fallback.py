@@ -76,8 +76,7 @@ class Fallback:
         if domain is not None and not domain.knows(fabric):
             return np.ones(len(queries.u), np.bool_)
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
-        unknown = queries.wo[:, 2] < 0.0
-        return unknown if "behind" in self._kinds else unknown | (queries.wi[:, 2] < 0.0)
+        return queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

@@ -8,7 +8,6 @@ falls back to quadrature (`pipeline.models.fallback`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -51,6 +50,8 @@ class Requirement(BaseModel):
     """Share of the questions with light from the other side of the cloth."""
     viewer_behind: float = Field(ge=0, le=1)
     """Share of the questions about the back of the cloth."""
+    not_in_front: float = Field(ge=0, le=1)
+    """Share of the questions with light or viewer behind the cloth."""
     sizes: dict[str, float]
     """Share of the questions in classes of footprints, by the names that `of` was given."""
 
@@ -108,6 +109,7 @@ class Requirement(BaseModel):
             curved=float(bent.size / total),
             behind=float((queries.wi[:, 2] * queries.wo[:, 2] < 0).mean()),
             viewer_behind=float((queries.wo[:, 2] < 0).mean()),
+            not_in_front=float(queries.behind.mean()),
             sizes={name: float((classes == index).mean()) for index, name in enumerate(names)},
         )
 
@@ -133,4 +135,4 @@ def _steepest(directions: npt.NDArray[np.float32], margin: float) -> float:
     angles = np.degrees(np.arccos(np.clip(np.abs(directions[:, 2].astype(np.float64)), 0.0, 1.0)))
     largest = _range(angles)[1]
     room = max(1.0, (margin - 1.0) * (90.0 - largest))
-    return float(min(largest + room, _STEEPEST, math.nextafter(90.0, 0.0)))
+    return min(largest + room, _STEEPEST)

@@ -105,7 +105,7 @@ def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
 
 
 _TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}
-_KEPT: Final = 8
+_KEPT: Final = 32  # of 1 to 5 MB each: those of a benchmark that asks about its cloths in turn
 _BUILDING: Final = Lock()
 
 

@@ -58,6 +58,11 @@ class Queries(NamedTuple):
         flat = np.zeros_like(sigma)
         return cls(u, v, sigma, wi, wo, sigma, flat, flat)
 
+    @property
+    def behind(self) -> npt.NDArray[np.bool_]:
+        """Which queries have light or viewer behind the cloth, (N,)."""
+        return np.asarray((self.wi[:, 2] < 0.0) | (self.wo[:, 2] < 0.0))
+
     def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Queries:
         """Return the queries at `index`."""
         return Queries(*(column[index] for column in self))

@@ -2,11 +2,9 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from reports.equal_time import EDGES, MEASURES, SIZES, WHOLE, equal_time_table, error_at, measure_by_size, size_table
-from reports.metrics import COLOUR_WEIGHTS
 from reports.record import Record
 
 
@@ -56,7 +54,6 @@ def test_errors_are_those_of_the_class_alone(dataset, points, options):
     assert len(SIZES) == len(EDGES) - 1
     by = {(r.metric, r.setting): r for r in found}
     assert {r.metric for r in found} == {"size_time", *(metric for metric, _ in MEASURES.values())}
-    np.testing.assert_array_equal(MEASURES["colour"][1], COLOUR_WEIGHTS)
     # More points, less error, in every class; a query of 16 points takes longer than one of 1.
     few, many = by["size_colour", "k = 1"], by["size_colour", "k = 16"]
     assert all(a > b for (_, a), (_, b) in zip(few.curve, many.curve, strict=True))
