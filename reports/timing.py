@@ -154,11 +154,9 @@ def milliseconds(action: Callable[[], object]) -> float:
 
 
 def set_threads(threads: int) -> None:
-    """Tell torch and numba how many threads they may use, if a method has loaded them."""
+    """Tell torch how many threads it may use, if a method has loaded it; kernels have one thread each."""
     if (torch := sys.modules.get("torch")) is not None:
         torch.set_num_threads(threads)
-    if (numba := sys.modules.get("numba")) is not None:
-        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
 
 
 def synchronise() -> None:
