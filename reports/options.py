@@ -14,7 +14,7 @@ from pipeline.models.options.base import RoundFootprint
 from pipeline.scenes.options import SceneOptions, View, ViewOptions
 from pipeline.truth.options import TruthOptions
 
-VERSION: Final = 2
+VERSION: Final = 3
 """Version of the measurements' numbers."""
 
 LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
@@ -123,9 +123,9 @@ class SceneBenchOptions(BaseModel):
     """Frames of the camera's way, from the first on, for aliasing; pictures are compared at the first."""
     options: SceneOptions = SceneOptions(environment_directions=8)
     """How scenes become queries."""
-    truth: TruthOptions = TruthOptions(relative_error=0.03, min_count=128, max_count=512)
+    truth: TruthOptions = TruthOptions(estimator="elliptic", relative_error=0.03, min_count=128, max_count=512)
     """How true the first frame is."""
-    frame_truth: TruthOptions = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+    frame_truth: TruthOptions = TruthOptions(estimator="elliptic", relative_error=0.1, min_count=64, max_count=128)
     """How true the other frames are."""
     footprint: RoundFootprint = "geometric_mean"
     """What stands for an ellipse where a method knows round footprints only."""

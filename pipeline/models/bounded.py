@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from pipeline.models.method import CHUNK, Method
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.plain import refuse_other
 from pipeline.models.selvage import Selvage
-from pipeline.models.sums import refuse
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.features import read_queries
 from pipeline.truth.sums.table import tabulate
@@ -54,7 +54,7 @@ class Bounded:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the sums do not know."""
-        refuse(queries, self.name)
+        refuse_other(queries, self.name, stretch=True)
         result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)

@@ -101,7 +101,7 @@ class HorizonSampled:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4), with the numbers named by `seed`. BadInput if they are not plain."""
-        refuse_other(queries, self.name)
+        refuse_other(queries, self.name, stretch=True)
         return self._samplers.of(fabric).sample(queries, self.count, self.sequence == "r2", seed)
 
     def bytes_stored(self, fabric: Fabric) -> int:

@@ -47,7 +47,7 @@ class Quadrature:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
-        refuse_other(queries, self.name)
+        refuse_other(queries, self.name, stretch=True)
         return self._rules.of(fabric).answer(queries)
 
     def bytes_stored(self, fabric: Fabric) -> int:

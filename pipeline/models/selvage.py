@@ -33,8 +33,8 @@ from pipeline.models.method import CHUNK, Batch
 from pipeline.models.options import QuadratureOptions, SelvageOptions
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
+from pipeline.models.plain import refuse_other
 from pipeline.models.quadrature import Quadrature
-from pipeline.models.sums import refuse
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.features import (
@@ -238,8 +238,9 @@ class Selvage:
 
     def _refuse(self, queries: Queries) -> None:
         if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-        refuse(queries, self.name)
+            # The sums know footprints of any shape; what the network corrects is in their nodes.
+            self.domain.refuse(queries._replace(sigma_minor=queries.sigma), self.name)
+        refuse_other(queries, self.name, stretch=True)
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the sums and the network."""

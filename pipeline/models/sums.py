@@ -16,25 +16,11 @@ import numpy.typing as npt
 from pipeline.models.method import CHUNK
 from pipeline.models.options import SumsOptions
 from pipeline.models.per_fabric import PerFabric
+from pipeline.models.plain import refuse_other
 from pipeline.truth.query import Queries
-from pipeline.truth.sums.features import along_axes, read_queries
+from pipeline.truth.sums.features import read_queries
 from pipeline.truth.sums.table import tabulate
-from weaves.errors import BadInput
 from weaves.fabric import Fabric
-
-
-def refuse(queries: Queries, model: str) -> None:
-    """Refuse what the sums do not know with a BadInput that names the first row and column."""
-    for rows, column, value, allowed in (
-        (queries.wo[:, 2] < 0, "wo", queries.wo, "viewers in front of the cloth"),
-        (queries.wi[:, 2] < 0, "wi", queries.wi, "light from the viewer's side"),
-        (queries.curvature > 0, "curvature", queries.curvature, "flat cloth (curvature = 0)"),
-        (~along_axes(queries), "angle", queries.angle, "footprints that are round or lie along the yarns"),
-    ):
-        if rows.any():
-            row = int(np.flatnonzero(rows)[0])
-            where = f"{int(rows.sum())} rows; first row {row}: {column}"
-            raise BadInput("queries", where, value[row].tolist(), f"the model {model} knows {allowed} only")
 
 
 class Sums:
@@ -60,7 +46,7 @@ class Sums:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries the sums do not know."""
-        refuse(queries, self.name)
+        refuse_other(queries, self.name, stretch=True)
         table = self._tables.of(fabric)
         result = np.empty((len(queries.u), 4), np.float32)
         for start in range(0, len(result), CHUNK):

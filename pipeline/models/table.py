@@ -51,7 +51,7 @@ class Tabulated:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries that are not plain."""
-        refuse_other(queries, self.name)
+        refuse_other(queries, self.name, stretch=True)
         model, table = self._tables.of(fabric)
         rows = np.arange(len(queries.u))
         # An error without bound: nothing is sampled again.

@@ -2,8 +2,9 @@
 
 `auto` asks a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a query
 and samples its own doubtful nodes where the error it states is above the one asked for (nodes, refine). What is still
-above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, footprints at an
-angle, cloths of more than `_MOST_CELLS` different cells, and models other than the default.
+above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, cloths of more
+than `_MOST_CELLS` different cells, and models other than the default. Footprints at an angle, which the table takes as
+mixtures (oblique), are `auto`'s to sample: the errors that a table states were fitted to footprints along the axes.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy.typing as npt
 from pipeline.truth.cloth import Columns, Model, Raw
 from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.nodes import sum_rows
+from pipeline.truth.oblique import FINE_LINE, axes
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.replicates import OWEN, sample_rows
 from pipeline.truth.table import NODES, WIDE, Table, different_cells, tabulate
@@ -31,9 +33,27 @@ _STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
 
 def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
     """Answer each query by the first that states the error asked for: a coarse table, a fine one, sampling."""
+    return _first_good(tabulated(model, columns) & _axial(model, columns), model, columns, index, options, seed)
+
+
+def elliptic_rows(
+    model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
+) -> Raw:
+    """Answer as `auto_rows` does, footprints at an angle by the tables too."""
+    return _first_good(tabulated(model, columns), model, columns, index, options, seed)
+
+
+def _first_good(
+    known: npt.NDArray[np.bool_],
+    model: Model,
+    columns: Columns,
+    index: npt.NDArray[np.int64],
+    options: TruthOptions,
+    seed: int,
+) -> Raw:
     rows = len(index)
     means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
-    known, wide = _tabulated(model, columns), _wide(columns)
+    wide = _wide(columns)
     left = np.ones(rows, np.bool_)
     for coarse in (True, False):
         asked = np.flatnonzero(known & left & (wide | (not coarse)))
@@ -69,11 +89,11 @@ def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opti
 
 def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
     """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever they state."""
-    known, wide = _tabulated(model, columns), _wide(columns)
+    known, wide = tabulated(model, columns), _wide(columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
-        allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints along the axes of at least "
-        allowed += f"{_SMALLEST:.3g} yarn spacings, and the default frame, geometry, shadows and variation: take auto"
+        allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints of at least {_SMALLEST:.3g} yarn "
+        allowed += "spacings and not too thin, and the default frame, geometry, shadows and variation: take auto"
         raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
     rows = len(index)
     means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
@@ -91,17 +111,26 @@ def _wide(columns: Columns) -> npt.NDArray[np.bool_]:
     return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
 
 
-def _tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
-    """Say which queries the table knows of."""
+def tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say which queries the table knows of, (N,)."""
     choices = model.choices
     other = choices.macro or choices.linear or not choices.shadows or model.varied
     if other or different_cells(model.front) > _MOST_CELLS:
         return np.zeros(len(columns.u), np.bool_)
+    known = (np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST) & (columns.curvature == 0.0)
+    if (oblique := ~_axial(model, columns)).any():
+        x, y, correlation = np.abs(axes(columns.sigma, columns.sigma_minor, columns.angle))
+        blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= _SMALLEST
+        known &= ~oblique | (blurred & (correlation <= FINE_LINE.most) & (model.shape == GAUSSIAN))
+    return np.asarray(known)
+
+
+def _axial(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say which footprints are round or lie along the axes."""
     along = columns.angle == 0.0
     if model.shape == GAUSSIAN:
         along |= columns.sigma == columns.sigma_minor
-    wide = np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST
-    return np.asarray(along & wide & (columns.curvature == 0.0))
+    return np.asarray(along)
 
 
 _TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}

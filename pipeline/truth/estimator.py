@@ -1,7 +1,7 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
 `mc`, `jittered`, `r2`, `owen` sample the footprint (replicates); `quadrature` is Gauss-Legendre on every float; `table`
-sums over nodes with horizons, and `auto` takes it where that is good enough (auto).
+sums over nodes with horizons; `auto` takes it where that is good enough (auto), `elliptic` for footprints at an angle too.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth import replicates
-from pipeline.truth.auto import auto_rows, table_rows
+from pipeline.truth.auto import auto_rows, elliptic_rows, table_rows, tabulated
 from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature import quadrature_rows
@@ -48,6 +48,7 @@ ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "quadrature": quadrature_rows,
     "table": table_rows,
     "auto": auto_rows,
+    "elliptic": elliptic_rows,
 }
 """Every estimator by its name in `TruthOptions.estimator`."""
 
@@ -86,3 +87,13 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     return Answers(
         single_mean[:, :4], single_error[:, :4], count.astype(np.int32), single_mean[:, 4], single_error[:, 4]
     )
+
+
+def known_to_table(fabric: Fabric, queries: Queries, options: TruthOptions) -> npt.NDArray[np.bool_]:
+    """Say which queries the estimator `table` answers with these options, (N,)."""
+    known = np.zeros(len(queries.u), np.bool_)
+    for behind in (False, True):
+        index = np.flatnonzero((queries.wo[:, 2] < 0) == behind)
+        if index.size:
+            known[index] = tabulated(model_of(fabric, options, behind), columns_of(queries.take(index), behind))
+    return known

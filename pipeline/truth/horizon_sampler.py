@@ -36,7 +36,8 @@ from pipeline.truth.flat_points import (
 )  # fmt: skip
 from pipeline.truth.footprint import EVENLY
 from pipeline.truth.horizon_map import HorizonMap, horizon_map, locate
-from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.kernel import fast_kernel, inlined_fast_kernel, kernel
+from pipeline.truth.oblique import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.sequences import derive
@@ -69,9 +70,11 @@ class HorizonSampler:
         self.map = horizon_map(model.front, model.back, grid, azimuths)
 
     def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> npt.NDArray[np.float32]:
-        """Return the components from `count` points a query, (N, 4); queries are round, flat and lit from the front."""
-        u, v, sigma, wi, wo = (np.ascontiguousarray(column, np.float32) for column in queries[:5])
-        return _sample(self.map, u, v, sigma, wi, wo, count, r2, np.uint64(seed))
+        """Return the components from `count` points a query, (N, 4); queries are flat and lit from the front."""
+        u, v, wi, wo = (
+            np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
+        )
+        return _sample(self.map, u, v, *deviations(queries), wi, wo, count, r2, np.uint64(seed))
 
     def bytes_stored(self) -> int:
         """Return the bytes of the map."""
@@ -83,7 +86,9 @@ def _sample(
     table: HorizonMap,
     u: Single,
     v: Single,
-    sigma: Single,
+    deviation_x: Single,
+    deviation_y: Single,
+    correlation: Single,
     wi: Single,
     wo: Single,
     count: int,
@@ -109,8 +114,14 @@ def _sample(
             x = np.float32(u[row] - ends * np.floor(np.float64(u[row]) / ends))
             y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
             seeds = np.uint32(key & _MASK), np.uint32(key >> np.uint64(32))
-            _place(at_x, first, count, x, sigma[row], np.float32(ends), seeds[0], _R2_FIRST, r2)
-            _place(at_y, first, count, y, sigma[row], np.float32(picks), seeds[1], _R2_SECOND, r2)
+            dx, dy, oblique = deviation_x[row], deviation_y[row], correlation[row]
+            if oblique == _0:
+                _place(at_x, first, count, x, dx, np.float32(ends), seeds[0], _R2_FIRST, r2)
+                _place(at_y, first, count, y, dy, np.float32(picks), seeds[1], _R2_SECOND, r2)
+            else:
+                _place_obliquely(
+                    at_x, at_y, first, count, x, y, dx, dy, oblique, np.float32(ends), np.float32(picks), seeds, r2
+                )
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, row - begin)
         fill_lanes(lanes, places, values, shared, end - begin, count)
         total = (end - begin) * count
@@ -145,20 +156,55 @@ def _place(
 ) -> None:
     """Write `count` positions in [0, repeat] on one axis, from `first` on."""
     even = sigma >= np.float32(EVENLY) * repeat
-    inverse = _1 / repeat
     # A slice: an index that might be negative would keep the loop from vector units.
     here = out[first : first + count]
     for k in range(len(here)):
-        index = np.uint32(k)
-        bits = np.uint32(seed + index * (step if r2 else _WEYL))
-        if not r2:
-            bits = np.uint32((bits ^ (bits >> _S16)) * _MIX_1)
-            bits = np.uint32((bits ^ (bits >> _S15)) * _MIX_2)
-            bits = np.uint32(bits ^ (bits >> _S16))
-        number = (np.float32(np.int32(bits >> _S9)) + _HALF) * _UNIT
-        x = number * repeat if even else centre + sigma * _normal(number)
-        x = x - repeat * np.floor(x * inverse)
-        here[k] = min(max(x, _0), repeat)
+        number = _number(seed, np.uint32(k), step, r2)
+        here[k] = _wrapped(number * repeat if even else centre + sigma * _normal(number), repeat)
+
+
+@fast_kernel
+def _place_obliquely(
+    out_x: Single,
+    out_y: Single,
+    first: int,
+    count: int,
+    x: np.float32,
+    y: np.float32,
+    deviation_x: np.float32,
+    deviation_y: np.float32,
+    correlation: np.float32,
+    ends: np.float32,
+    picks: np.float32,
+    seeds: tuple[np.uint32, np.uint32],
+    r2: bool,
+) -> None:
+    """Write `count` positions of a footprint at an angle to the axes, from `first` on."""
+    own = np.sqrt(_1 - correlation * correlation)
+    here_x, here_y = out_x[first : first + count], out_y[first : first + count]
+    for k in range(len(here_x)):
+        a = _normal(_number(seeds[0], np.uint32(k), _R2_FIRST, r2))
+        b = _normal(_number(seeds[1], np.uint32(k), _R2_SECOND, r2))
+        here_x[k] = _wrapped(x + deviation_x * a, ends)
+        here_y[k] = _wrapped(y + deviation_y * (correlation * a + own * b), picks)
+
+
+@inlined_fast_kernel
+def _number(seed: np.uint32, index: np.uint32, step: np.uint32, r2: bool) -> np.float32:
+    """Return the number of a point on one axis, in (0, 1)."""
+    bits = np.uint32(seed + index * (step if r2 else _WEYL))
+    if not r2:
+        bits = np.uint32((bits ^ (bits >> _S16)) * _MIX_1)
+        bits = np.uint32((bits ^ (bits >> _S15)) * _MIX_2)
+        bits = np.uint32(bits ^ (bits >> _S16))
+    return (np.float32(np.int32(bits >> _S9)) + _HALF) * _UNIT
+
+
+@inlined_fast_kernel
+def _wrapped(x: np.float32, repeat: np.float32) -> np.float32:
+    """Return a position in [0, repeat]."""
+    x = x - repeat * np.floor(x * (_1 / repeat))
+    return min(max(x, _0), repeat)
 
 
 _LN2 = np.float32(0.6931471805599453)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "table", "auto"]
+EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "table", "auto", "elliptic"]
 
 
 class Variation(BaseModel):

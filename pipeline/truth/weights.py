@@ -10,9 +10,10 @@ import numpy.typing as npt
 from pipeline.truth.cloth import Columns
 from pipeline.truth.footprint import interval_masses
 from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.oblique import FINE_LINE, along_axes, line_points
 from pipeline.truth.table import COLUMNS, KIND_X, KIND_Y, ROWS, START, Single, Table
 
-_0 = np.float32(0.0)
+_0, _1 = np.float32(0.0), np.float32(1.0)
 
 
 @kernel
@@ -23,18 +24,49 @@ def fill_weights(
     row: int,
     scratch: Single,
     touched: npt.NDArray[np.bool_],
+    line: Single,
     weight: Single,
 ) -> None:
     """Write the share of a footprint that falls on each node and its copies.
 
-    `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any.
+    `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any;
+    `line` (2, FINE_LINE.points) is for points of a footprint at an angle (oblique).
     """
     weight[:] = _0
+    u, v, sigma_x, sigma_y = columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row]
+    if columns.angle[row] == 0.0:
+        _add(table, shape, u, v, sigma_x, sigma_y, _1, scratch, touched, weight)
+        return
+    sigma_x, sigma_y, correlation = along_axes(sigma_x, sigma_y, columns.angle[row])
+    blur, shift = math.sqrt(1.0 - abs(correlation)), math.sqrt(abs(correlation))
+    shift_x, shift_y = shift * sigma_x, math.copysign(shift, correlation) * sigma_y
+    for point in range(line_points(correlation, FINE_LINE, line[0], line[1])):
+        z = line[0, point]
+        _add(
+            table, shape, u + z * shift_x, v + z * shift_y, blur * sigma_x, blur * sigma_y, line[1, point], scratch,
+            touched, weight,
+        )  # fmt: skip
+
+
+@kernel
+def _add(
+    table: Table,
+    shape: int,
+    u: float,
+    v: float,
+    sigma_x: float,
+    sigma_y: float,
+    share: np.float32,
+    scratch: Single,
+    touched: npt.NDArray[np.bool_],
+    weight: Single,
+) -> None:
+    """Add `share` of a footprint along the axes."""
     kinds, ends, picks = len(table.edges), table.repeat[0], table.repeat[1]
     for axis in range(2):
-        centre, sigma, cells = columns.u[row], columns.sigma[row], ends
+        centre, sigma, cells = u, sigma_x, ends
         if axis == 1:
-            centre, sigma, cells = columns.v[row], columns.sigma_minor[row], picks
+            centre, sigma, cells = v, sigma_y, picks
         centre -= math.floor(centre / cells) * cells
         for cell in range(cells):
             for kind in range(kinds):
@@ -48,18 +80,18 @@ def fill_weights(
             end, pick = table.copies[p, c, 0], table.copies[p, c, 1]
             if touched[0, end, piece[KIND_X]] and touched[1, pick, piece[KIND_Y]]:
                 along_x, along_y = scratch[0, end, piece[KIND_X]], scratch[1, pick, piece[KIND_Y]]
-                _add_product(along_x[:across], along_y[:lines], weight[start : start + across * lines])
+                _add_product(along_x[:across], along_y[:lines], share, weight[start : start + across * lines])
 
 
 @fast_kernel
-def _add_product(along_x: Single, along_y: Single, weight: Single) -> None:
-    """Add the products of the shares along x and along y to the nodes of a grid."""
+def _add_product(along_x: Single, along_y: Single, share: np.float32, weight: Single) -> None:
+    """Add `share` of the products of the shares along x and along y to the nodes of a grid."""
     across = len(along_x)
     for j in range(len(along_y)):
         if along_y[j] > _0:
-            line = weight[j * across : (j + 1) * across]
+            line, factor = weight[j * across : (j + 1) * across], share * along_y[j]
             for i in range(across):
-                line[i] += along_y[j] * along_x[i]
+                line[i] += factor * along_x[i]
 
 
 @fast_kernel

@@ -48,5 +48,5 @@ class PointSampledOptions(Options):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """All, with exact visibility."""
-        return frozenset({"behind", "stretch", "curvature"} if self.visibility == "exact" else ())
+        """All, with exact visibility; without, footprints of any shape."""
+        return frozenset({"behind", "stretch", "curvature"} if self.visibility == "exact" else {"stretch"})

@@ -38,3 +38,8 @@ class QuadratureOptions(Options):
     def knobs(self) -> tuple[int, ...]:
         """The numbers of nodes."""
         return tuple(self.nodes)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape."""
+        return frozenset({"stretch"})

@@ -12,6 +12,7 @@ from pipeline.models.options.base import Name, Options, Weight
 class SelvageOptions(Options):
     """Sums over few nodes, corrected by a small network: one for many fabrics and scales; own design."""
 
+    version: ClassVar[int] = 2
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
 
     model: Literal["selvage"] = "selvage"
@@ -53,3 +54,8 @@ class SelvageOptions(Options):
         if not 0 < self.seam[0] < self.seam[1]:
             raise ValueError(f"seam must be [low, high] with 0 < low < high, got {list(self.seam)}")
         return self
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape: what an ellipse weighs is the sums' business, not the network's."""
+        return frozenset({"stretch"})

@@ -19,3 +19,8 @@ class SumsOptions(Options):
     """Name in tables."""
     footprint: Literal["gaussian"] = "gaussian"
     """Kernel of the sums; must be the kernel of the truth."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape."""
+        return frozenset({"stretch"})

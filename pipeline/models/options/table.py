@@ -32,3 +32,8 @@ class TableOptions(Options):
     def knobs(self) -> tuple[int, ...]:
         """The numbers of nodes."""
         return tuple(self.nodes)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape."""
+        return frozenset({"stretch"})

@@ -55,6 +55,7 @@ from pipeline.truth.gauss.placed import BANDS, REACH, place_nodes
 from pipeline.truth.gauss.weights import even_densities, product_weights
 from pipeline.truth.horizon_map import HorizonMap, horizon_map, locate
 from pipeline.truth.kernel import fast_kernel, kernel
+from pipeline.truth.oblique import COARSE_LINE, deviations, line_points
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import HIDDEN_SHARE, Queries
 from pipeline.truth.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
@@ -62,6 +63,7 @@ from pipeline.truth.table import Single
 from weaves.fabric import Fabric
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_POINTS = COARSE_LINE.points
 
 
 class GaussQuadrature:
@@ -90,14 +92,17 @@ class GaussQuadrature:
         azimuths: int = 32,
     ) -> None:
         model = model_of(fabric, TruthOptions())
-        self.shadows, self.soft, self.along = shadows, soft, along
+        self.shadows, self.soft, self.across, self.along = shadows, soft, across, along
         self.map = horizon_map(model.front, model.back, grid, azimuths)
         self.nodes = gauss_nodes(model.front, self.map, across, along)
 
     def answer(self, queries: Queries) -> npt.NDArray[np.float32]:
-        """Return the components (N, 4); queries are round, flat and lit from the front."""
-        u, v, sigma, wi, wo = (np.ascontiguousarray(column, np.float32) for column in queries[:5])
-        return _answer(self.map, self.nodes, u, v, sigma, wi, wo, self.along, self.shadows, self.soft)
+        """Return the components (N, 4); queries are flat and lit from the front."""
+        u, v, wi, wo = (
+            np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
+        )
+        footprints, finest = deviations(queries), np.float32(min(NARROW, 1.0 / self.across))
+        return _answer(self.map, self.nodes, u, v, *footprints, wi, wo, self.along, finest, self.shadows, self.soft)
 
     def bytes_stored(self) -> int:
         """Return the bytes of map and nodes."""
@@ -110,10 +115,13 @@ def _answer(
     fixed: GaussNodes,
     u: Single,
     v: Single,
-    sigma: Single,
+    deviation_x: Single,
+    deviation_y: Single,
+    correlation: Single,
     wi: Single,
     wo: Single,
     along: int,
+    finest: np.float32,
     shadows: bool,
     soft: bool,
 ) -> npt.NDArray[np.float32]:
@@ -131,6 +139,7 @@ def _answer(
     touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
     cells = np.zeros(max(ends, picks), np.uint32)
     line = np.zeros((4, most), np.float32)
+    line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
     # Rows of the fixed nodes, taken once: counting references to slices would cost more than few nodes do.
     ix, iy, iz, ox, oy, oz, size = wide[IX], wide[IY], wide[IZ], wide[OX], wide[OY], wide[OZ], wide[SIZE]
     sine, distance, curvature, limit = wide[SINE], wide[DISTANCE], wide[CURVATURE], wide[LIMIT]
@@ -141,18 +150,27 @@ def _answer(
     mean, steepness, evenly = fixed.mean, fixed.steepness, fixed.evenly
     azimuths, sharpness = table.azimuths, np.float32(1.0 if soft else 1e9)
     for row in range(rows):
-        s = sigma[row]
+        dx, dy, oblique = deviation_x[row], deviation_y[row], correlation[row]
+        # Narrow footprints that are not round count as round ones of the same area.
+        s = dx if dx == dy and oblique == _0 else np.sqrt(dx * dy * np.sqrt(_1 - oblique * oblique))
         x = np.float32(u[row] - ends * np.floor(np.float64(u[row]) / ends))
         y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
         if s >= np.float32(NARROW):
             weight = own_weight
-            even_x, even_y = s >= np.float32(EVENLY * ends), s >= np.float32(EVENLY * picks)
+            blur, line_x = np.sqrt(_1 - abs(oblique)), np.sqrt(abs(oblique)) * dx
+            line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+            # Of a footprint that is not round an axis may be narrower than the nodes are apart.
+            blur_x, blur_y = max(blur * dx, finest), max(blur * dy, finest)
+            even_x, even_y = blur_x >= np.float32(EVENLY * ends), blur_y >= np.float32(EVENLY * picks)
             if even_x and even_y:
                 weight = evenly
             else:
-                _densities(positions, weights, x, s, even_x, of_x, touched_x, cells)
-                _densities(positions, weights, y, s, even_y, of_y, touched_y, cells)
-                product_weights(pieces, copies, of_x, of_y, touched_x, touched_y, weight)
+                weight[:] = _0
+                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                    z, share = line_places[point], line_shares[point]
+                    _densities(positions, weights, x + z * line_x, blur_x, even_x, of_x, touched_x, cells)
+                    _densities(positions, weights, y + z * line_y, blur_y, even_y, of_y, touched_y, cells)
+                    product_weights(pieces, copies, of_x, of_y, touched_x, touched_y, share, weight)
             ix[:], iy[:], iz[:], ox[:], oy[:], oz[:] = (
                 wi[row, 0],
                 wi[row, 1],

@@ -1,7 +1,7 @@
 """Which share of a wide footprint falls on each fixed node.
 
 The weight of a node is the Gaussian there, summed over all cells alike and over all images of the repeat: products of
-one sum an axis.
+one sum an axis, or a mixture of these where a footprint lies at an angle (oblique).
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ import numpy.typing as npt
 from pipeline.truth.gauss.nodes import COPIES, COPY, COUNT_X, COUNT_Y, FIRST, RULE_X, RULE_Y
 from pipeline.truth.kernel import fast_kernel
 from pipeline.truth.table import Index, Single
-
-_0 = np.float32(0.0)
 
 
 @fast_kernel
@@ -34,10 +32,10 @@ def product_weights(
     of_y: Single,
     touched_x: npt.NDArray[np.bool_],
     touched_y: npt.NDArray[np.bool_],
+    share: np.float32,
     weight: Single,
 ) -> None:
-    """Write each node's weight: products of both axes, summed over the cells that are alike."""
-    weight[:] = _0
+    """Add `share` times each node's weight: products of both axes, summed over the cells that are alike."""
     for p in range(len(pieces)):
         first, nx, ny = pieces[p, FIRST], pieces[p, COUNT_X], pieces[p, COUNT_Y]
         for c in range(pieces[p, COPY], pieces[p, COPY] + pieces[p, COPIES]):
@@ -45,6 +43,6 @@ def product_weights(
             if touched_x[end] and touched_y[pick]:
                 along_x, along_y = of_x[end, pieces[p, RULE_X]], of_y[pick, pieces[p, RULE_Y]]
                 for j in range(ny):
-                    line = weight[first + j * nx : first + (j + 1) * nx]
+                    line, factor = weight[first + j * nx : first + (j + 1) * nx], share * along_y[j]
                     for i in range(len(line)):
-                        line[i] += along_y[j] * along_x[i]
+                        line[i] += factor * along_x[i]

@@ -25,10 +25,10 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.truth.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
 from pipeline.truth.kernel import fast_kernel
+from pipeline.truth.oblique import deviations
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.shade import (
     AREA,
@@ -156,12 +156,6 @@ def cloth_features(table: Table) -> Single:
     return np.ascontiguousarray(np.stack(by_family), np.float32).ravel()
 
 
-def along_axes(queries: Queries) -> npt.NDArray[np.bool_]:
-    """Say which footprints are round or lie along the axes: those that the sums know, (N,)."""
-    found = np.asarray(queries.sigma == queries.sigma_minor)
-    return found if found.all() else found | (np.abs(np.sin(2.0 * queries.angle.astype(np.float64))) < 1e-6)
-
-
 def read_queries(table: Table, queries: Queries) -> Reading:
     """Read N queries about flat cloth, light and viewer in front.
 
@@ -170,18 +164,17 @@ def read_queries(table: Table, queries: Queries) -> Reading:
     table : Table
         The cloth.
     queries : Queries
-        Footprints along the axes.
+        Footprints of any kind.
     """
-    across = np.abs(np.sin(queries.angle)) > 0.5  # the first axis lies along y
     # A thousandth of a yarn is a point: smaller footprints would fall between the digits of a place.
-    size, minor = (np.maximum(deviation, _SMALLEST) for deviation in (queries.sigma, queries.sigma_minor))
-    first, second = np.where(across, minor, size), np.where(across, size, minor)
-    u, v, x, y, wi, wo = (
+    footprints = deviations(queries, _SMALLEST)
+    size = np.sqrt(np.maximum(queries.sigma, _SMALLEST) * np.maximum(queries.sigma_minor, _SMALLEST))
+    u, v, x, y, correlation, wi, wo = (
         np.ascontiguousarray(column, np.float32)
-        for column in (queries.u, queries.v, first, second, queries.wi, queries.wo)
+        for column in (queries.u, queries.v, *footprints, queries.wi, queries.wo)
     )
-    found, gaps = sum_queries(table, u, v, x, y, wi, wo)
+    found, gaps = sum_queries(table, u, v, x, y, correlation, wi, wo)
     reading = Reading(*(np.empty((len(u), width), np.float32) for width in (FEATURES, 4, 4)))
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
-    _assemble(found, gaps, np.sqrt(x * y), wi, wo, cloth_features(table), twists, *reading)
+    _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, *reading)
     return reading

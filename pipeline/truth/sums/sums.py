@@ -6,6 +6,9 @@ both >= `Table.waves_from`           waves
 the narrower one < `NARROW`,
     the wider one < `LONG`           placed nodes
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
+
+Deviations are those of a footprint's own axes where they are compared. At an angle to the yarns densities are a mixture
+(oblique), waves are exact, and placed nodes take a footprint along the yarns of the same area.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ import numpy as np
 from pipeline.truth.axis_densities import NARROW, axis_densities
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP, RADIUS
 from pipeline.truth.kernel import kernel
+from pipeline.truth.oblique import COARSE_LINE, line_points, narrow_axis
 from pipeline.truth.soft_horizons import sharpness_of_points
 from pipeline.truth.sums.diamond import AZIMUTHS, around
 from pipeline.truth.sums.kinds import COLUMNS
@@ -38,8 +42,9 @@ RESOLVED: Final = 0.12
 # Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
 _MOST_NODES = 3 * _MOST_CELLS * MOST_ACROSS**2
+_POINTS = COARSE_LINE.points
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
-_HALF = np.float32(0.5)
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
 @kernel
@@ -49,6 +54,7 @@ def sum_queries(
     v: Single,
     deviation_x: Single,
     deviation_y: Single,
+    correlation: Single,
     wi: Single,
     wo: Single,
 ) -> tuple[Single, Single]:
@@ -58,8 +64,8 @@ def sum_queries(
     ----------
     table : Table
         The cloth.
-    u, v, deviation_x, deviation_y : float32 (N,)
-        Footprints along the axes, in yarn spacings.
+    u, v, deviation_x, deviation_y, correlation : float32 (N,)
+        Footprints: centre and deviations along the axes in yarn spacings, correlation of the axes.
     wi, wo : float32 (N, 3)
         Directions.
 
@@ -91,6 +97,7 @@ def sum_queries(
     flat_cells = cells.reshape(2, most * LANES)
     line = np.zeros((LINE_ROWS, 8), np.float32)
     stops = np.zeros(2, np.int64)
+    line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
 
     for n in range(count):
         ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
@@ -99,33 +106,41 @@ def sum_queries(
         # Reduced in double precision: single would lose the place of a far centre within the repeat.
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
-        dx, dy = deviation_x[n], deviation_y[n]
-        narrowest, widest = min(dx, dy), max(dx, dy)
-        if narrowest >= NARROW or widest >= LONG:
+        dx, dy, oblique = deviation_x[n], deviation_y[n], correlation[n]
+        narrowest, near_x, near_y = min(dx, dy), dx, dy
+        if oblique != _0:
+            narrowest, blur = np.float32(narrow_axis(dx, dy, oblique)), np.sqrt(np.sqrt(_1 - oblique * oblique))
+            near_x, near_y = blur * dx, blur * dy
+        if min(near_x, near_y) >= NARROW or max(near_x, near_y) >= LONG:
             shares = weight
             if narrowest >= table.uniform:
                 shares = evenly
             elif narrowest >= table.waves_from:
                 wave_weights(
                     table.waves, table.wave_size, table.wave_nodes, evenly, np.float32(x), np.float32(y), dx, dy,
-                    np.float32(ends), np.float32(picks), turns, weight,
+                    oblique, narrowest, np.float32(ends), np.float32(picks), turns, weight,
                 )  # fmt: skip
             else:
                 # Beyond `uniform` an axis is even; the images of a huge footprint are not to be counted.
-                widest_x = np.float32(min(max(dx, RESOLVED), max(table.uniform, LONG)))
-                widest_y = np.float32(min(max(dy, RESOLVED), max(table.uniform, LONG)))
-                across = axis_densities(
-                    table.places, table.weights, COLUMNS, np.float32(x), widest_x, np.float32(REACH), density_x,
-                    touched_x, columns,
-                )  # fmt: skip
-                along = axis_densities(
-                    table.places, table.weights, COLUMNS, np.float32(y), widest_y, np.float32(REACH), density_y,
-                    touched_y, rows,
-                )  # fmt: skip
-                product_weights(
-                    table.kind_starts, table.cell_kinds, table.kinds, density_x, density_y, columns[:across],
-                    rows[:along], ends, lines,
-                )  # fmt: skip
+                blur = np.sqrt(_1 - abs(oblique))
+                widest_x = np.float32(min(max(blur * dx, RESOLVED), max(table.uniform, LONG)))
+                widest_y = np.float32(min(max(blur * dy, RESOLVED), max(table.uniform, LONG)))
+                line_x = np.sqrt(abs(oblique)) * dx
+                line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+                lines[:, :] = _0
+                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                    across = axis_densities(
+                        table.places, table.weights, COLUMNS, np.float32(x + line_places[point] * line_x), widest_x,
+                        np.float32(REACH), density_x, touched_x, columns,
+                    )  # fmt: skip
+                    along = axis_densities(
+                        table.places, table.weights, COLUMNS, np.float32(y + line_places[point] * line_y), widest_y,
+                        np.float32(REACH), density_y, touched_y, rows,
+                    )  # fmt: skip
+                    product_weights(
+                        table.kind_starts, table.cell_kinds, table.kinds, density_x, density_y, columns[:across],
+                        rows[:along], ends, line_shares[point], lines,
+                    )  # fmt: skip
             near_i, near_o = (high_i if turn_i > _HALF else low_i), (high_o if turn_o > _HALF else low_o)
             for family in range(2):
                 a, b = starts[family], starts[family + 1]
@@ -144,9 +159,10 @@ def sum_queries(
                 )
             continue
 
-        # Place nodes in every piece that the footprint touches.
+        # Place nodes in every piece touched; a footprint at an angle counts as one of its area along the axes.
+        dx, dy = near_x, near_y
         stops[:] = 0
-        sharp = sharpness_of_points(widest)
+        sharp = sharpness_of_points(max(dx, dy))
         left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
         for row in range(math.floor(lower), math.floor(upper) + 1):
             for column in range(math.floor(left), math.floor(right) + 1):

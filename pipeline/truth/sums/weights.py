@@ -1,6 +1,7 @@
 """Which share of a wide footprint falls on each fixed node: a sum of waves, or of the Gaussian over all its images.
 
 A Gaussian along the axes is a product: one outer product of densities (axis_densities) for every touched cell and kind.
+One at an angle is a mixture of these (oblique); waves know any.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ REACH: Final = 2.6
 TURN_ROWS: Final = 4
 """Rows of the scratch of `wave_weights`: cosines and sines of whole turns of x, then of y."""
 
-_0, _1 = np.float32(0.0), np.float32(1.0)
+_0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _TURN = np.float32(2.0 * math.pi)
 _DAMPING = np.float32(2.0 * math.pi**2)
 _FAINTEST = np.float32(faintest(1.0) ** 2)
@@ -41,13 +42,14 @@ def wave_weights(
     y: np.float32,
     deviation_x: np.float32,
     deviation_y: np.float32,
+    correlation: np.float32,
+    narrowest: np.float32,
     ends: np.float32,
     picks: np.float32,
     turns: Single,
     weight: Single,
 ) -> None:
     """Write the weights of all nodes as a sum of the waves that are not faint; `turns` is scratch."""
-    narrowest = min(deviation_x, deviation_y)
     last = _FAINTEST / (narrowest * narrowest)
     count = 0
     while count < len(size) and size[count] < last:
@@ -65,7 +67,7 @@ def wave_weights(
     for h in range(count):
         m, n = waves[h, 0], waves[h, 1]
         of_x, of_y = np.float32(m) / ends * deviation_x, np.float32(n) / picks * deviation_y
-        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y))
+        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y + _2 * correlation * of_x * of_y))
         cos_x, sin_x, cos_y, sin_y = turns[0, m], turns[1, m], turns[2, abs(n)], turns[3, abs(n)]
         sin_y = -sin_y if n < 0 else sin_y
         cosine, sine = damping * (cos_x * cos_y - sin_x * sin_y), damping * (sin_x * cos_y + cos_x * sin_y)
@@ -88,10 +90,10 @@ def product_weights(
     columns: npt.NDArray[np.uint32],
     rows: npt.NDArray[np.uint32],
     ends: int,
+    share: np.float32,
     weight: Single,
 ) -> None:
-    """Write the weights of all nodes, (lines, COLUMNS): outer products, summed over all touched cells of each kind."""
-    weight[:, :] = _0
+    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a kind's touched cells."""
     for pick in rows:
         for end in columns:
             cell = pick * np.uint32(ends) + end
@@ -103,6 +105,6 @@ def product_weights(
                     along, across = density_y[pick, kind[RULE_ALONG]], density_x[end, kind[RULE_ACROSS]]
                 start = kind[START] // np.uint32(COLUMNS)
                 for j in range(kind[LINES]):
-                    factor = along[j]
+                    factor = share * along[j]
                     for k in range(COLUMNS):
                         weight[start + j, k] += factor * across[k]

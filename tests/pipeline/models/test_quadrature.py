@@ -58,6 +58,6 @@ def test_it_is_a_method_of_plain_queries():
     assert isinstance(small, Method) and small.covers(fabric)
     assert [small.setting, large.setting] == ["k = 2", "k = 8"]
     assert 0 < small.bytes_stored(fabric) < large.bytes_stored(fabric)
-    queries = draw_queries(QueryOptions(stretch=8.0), fabric.weave.repeat, 1, 0, 8)
-    with pytest.raises(BadInput, match="round footprints"):
+    queries = draw_queries(QueryOptions(curvature=(0.1, 0.2)), fabric.weave.repeat, 1, 0, 8)
+    with pytest.raises(BadInput, match="flat cloth"):
         small.predict(fabric, queries)

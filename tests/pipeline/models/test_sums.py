@@ -27,7 +27,6 @@ def test_it_is_the_sums_in_chunks():
     ("options", "column"),
     [
         ({"behind": 1.0}, "wi"),
-        ({"stretch": 4.0}, "angle"),
         ({"curvature": (0.1, 0.2)}, "curvature"),
     ],
 )

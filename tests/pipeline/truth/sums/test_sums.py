@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
+from pipeline.truth.oblique import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.sums.features import read_queries
@@ -29,7 +30,7 @@ def cloth(name, **changes):
 
 def bare(table, queries):
     """Return the components with nothing hidden; the area of gaps has no other."""
-    columns = (queries.u, queries.v, queries.sigma, queries.sigma_minor, queries.wi, queries.wo)
+    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo)
     found, gaps = sum_queries(table, *columns)
     assert not gaps.any()
     area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)
@@ -88,6 +89,21 @@ def test_footprints_along_the_axes():
         assert relative_error(read_queries(table, asked)[1], truth) < 0.04
     swapped = queries._replace(sigma=queries.sigma_minor, sigma_minor=queries.sigma)
     np.testing.assert_allclose(read_queries(table, turned)[1], read_queries(table, swapped)[1], rtol=1e-5)
+
+
+@pytest.mark.parametrize(("name", "bound"), [("cotton_twill", 0.03), ("silk_charmeuse", 0.045), ("gauze", 0.03)])
+def test_footprints_at_an_angle(name, bound):
+    """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
+    fabric = load_fabric(name)
+    kinds = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
+    queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
+    assert np.abs(deviations(queries)[2]).max() > 0.7
+    table, truth = tabulate(fabric), estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+    size = np.sqrt(queries.sigma * queries.sigma_minor)
+    rounded = queries._replace(sigma=size, sigma_minor=size)
+    wrong = relative_error(read_queries(table, queries)[1], truth)
+    assert wrong < bound
+    assert relative_error(read_queries(table, rounded)[1], truth) > 1.5 * wrong
 
 
 def test_translation_by_repeats_changes_nothing():

@@ -1,0 +1,43 @@
+"""Every method that says it knows footprints of any shape, asked about ellipses at all angles, against the truth."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.models.fallback import Fallback
+from pipeline.models.options import PointSampledOptions, QuadratureOptions, SumsOptions, TableOptions
+from pipeline.models.registry import load_methods
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import load_fabric
+
+COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("options", "bound"),
+    [
+        (SumsOptions(), 0.04),
+        (QuadratureOptions(nodes=[8]), 0.04),
+        (TableOptions(nodes=[16]), 0.025),
+        (PointSampledOptions(counts=[4096], sequence="r2", visibility="horizon"), 0.03),
+        (PointSampledOptions(counts=[4096], sequence="r2"), 0.03),
+    ],
+    ids=["sums", "quadrature", "table", "points, horizons", "points"],
+)
+def test_ellipses_are_answered_as_such(options, bound):
+    """RMSE of the colour over the mean; asked for the round footprint of equal area half as much again at least."""
+    fabric = load_fabric("cotton_twill")
+    kinds = QueryOptions(sigma=(0.25, 0.6), max_angle=60.0, stretch=5.0)
+    queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
+    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ COLOUR
+    (method,) = load_methods(options)
+    assert "stretch" in options.kinds
+    errors = []
+    for known in ({"stretch"}, set()):
+        found = Fallback(method, known).predict(fabric, queries, 3) @ COLOUR
+        errors.append(math.sqrt(np.mean((found - truth) ** 2)) / truth.mean())
+    assert errors[0] < bound
+    assert errors[1] > 1.5 * errors[0]
