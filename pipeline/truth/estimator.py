@@ -1,7 +1,8 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
 `mc`, `jittered`, `r2`, `owen` sample the footprint (replicates); `quadrature` is Gauss-Legendre on every float; `table`
-sums over nodes with horizons; `auto` takes it where that is good enough (auto), `elliptic` for footprints at an angle too.
+sums over nodes with horizons; `auto` takes it where that is good enough, `elliptic` for footprints at an angle too
+(auto).
 """
 
 from __future__ import annotations
