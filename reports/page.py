@@ -16,9 +16,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
 from pipeline.models.options import CLASSES
-from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
+from reports import accuracy, bias, cells, effort, figures, latents, sampling, scene_cells, summary, tiles, truth_cells
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
+from reports.fabric_card import fabric_card
+from reports.numbers import percent, plain, scientific
 from reports.options import BenchOptions
 from reports.record import OF_A_PAGE, TRUTH, Machine, Record, Role, to_table, write_records
 from reports.silhouette import silhouette_table
@@ -243,7 +245,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    fabrics = [cells.fabric_card(fabric, role) for fabric, role in page.fabrics]
+    fabrics = [fabric_card(fabric, role) for fabric, role in page.fabrics]
     measured = _of_the_truth(page.records)
     shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
     strips = _strips(page, tables["pictures"], tables["scenes"])
@@ -269,23 +271,28 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         paths=cells.path_rows(summary.path_table(page.records)),
         edits=cells.edit_rows(page.records),
         shares=[f"t = {share:g}" for share in latents.SHARES],
-        stability=cells.stability_rows(findings),
+        stability=truth_cells.stability_rows(findings),
         extremes=cells.extreme_rows(extremes_table(page.records)),
         extreme_columns=cells.EXTREMES,
-        rates=cells.rate_rows(page.records),
-        accuracies=cells.accuracy_rows(measured["truth_accuracy"]),
-        reference=cells.percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
+        rates=truth_cells.rate_rows(page.records),
+        accuracies=truth_cells.accuracy_rows(measured["truth_accuracy"]),
+        reference=percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         accuracy_count=max((row.count for row in measured["truth_accuracy"]), default=0),
-        biases=cells.bias_rows(measured["truth_bias"]),
-        efforts=cells.effort_rows(measured["truth_effort"]),
-        samplers=cells.sampler_rows(measured["sampler"]),
-        limit=cells.percent(bias.LIMIT),
-        asked=cells.percent(effort.RELATIVE_ERROR),
-        columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT, "sampler": cells.SAMPLERS},
-        titles={name: cells.plain(name) for name in cells.accuracy_rows(measured["truth_accuracy"])},
+        biases=truth_cells.bias_rows(measured["truth_bias"]),
+        efforts=truth_cells.effort_rows(measured["truth_effort"]),
+        samplers=truth_cells.sampler_rows(measured["sampler"]),
+        limit=percent(bias.LIMIT),
+        asked=percent(effort.RELATIVE_ERROR),
+        columns={
+            "accuracy": truth_cells.ACCURACY,
+            "bias": truth_cells.BIAS,
+            "effort": truth_cells.EFFORT,
+            "sampler": truth_cells.SAMPLERS,
+        },
+        titles={name: plain(name) for name in truth_cells.accuracy_rows(measured["truth_accuracy"])},
         strips=[strip for strip in strips if strip.fabric],
-        scenes=cells.scene_rows(tables["scenes"]),
-        scene_columns=cells.SCENE,
+        scenes=scene_cells.scene_rows(tables["scenes"]),
+        scene_columns=scene_cells.SCENE,
         scene_strips={strip.scene: strip for strip in strips if not strip.fabric},
         fabrics=fabrics,
         shown=shown,
@@ -320,7 +327,7 @@ def _strips(page: PageInput, pictures: pd.DataFrame, scenes: pd.DataFrame) -> li
         )
         value = mse.get((file.fabric, file.scene, file.method, file.setting))
         cell = {"stem": _stem(file), "method": file.method, "label": display(file.method, file.setting)}
-        strip.cells.append(cell | {"mse": cells.scientific(value)})
+        strip.cells.append(cell | {"mse": scientific(value)})
     order = {fabric.name: index for index, (fabric, _) in enumerate(page.fabrics)}
     views = {str(name): index for index, name in enumerate((*page.options.views, *page.options.scenes.names))}
     place = len(order)
