@@ -85,7 +85,7 @@ def truth(out: Path) -> None:
     """Measure speed, accuracy, bias and where the time goes; print the tables and write the Records."""
     from rich.console import Console
 
-    from reports import accuracy, bias, cells, effort, throughput
+    from reports import accuracy, bias, effort, throughput, truth_cells
     from reports.record import this_machine, write_records
 
     console = Console()
@@ -107,11 +107,11 @@ def truth(out: Path) -> None:
     records += bias.to_records(biases) + effort.to_records(efforts)
     path = out / TRUTH
     write_records(path, records, this_machine(1))
-    console.print(_columns(("what", "fabric", "rate", "note"), cells.rate_rows(records)))
-    for fabric, rows in cells.accuracy_rows(accuracies).items():
-        console.print(_columns((fabric, *cells.ACCURACY), rows))
-    console.print(_columns(("fabric", *cells.BIAS), cells.bias_rows(biases)))
-    console.print(_columns(("fabric", *cells.EFFORT), cells.effort_rows(efforts)))
+    console.print(_columns(("what", "fabric", "rate", "note"), truth_cells.rate_rows(records)))
+    for fabric, rows in truth_cells.accuracy_rows(accuracies).items():
+        console.print(_columns((fabric, *truth_cells.ACCURACY), rows))
+    console.print(_columns(("fabric", *truth_cells.BIAS), truth_cells.bias_rows(biases)))
+    console.print(_columns(("fabric", *truth_cells.EFFORT), truth_cells.effort_rows(efforts)))
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
 
 
@@ -119,7 +119,7 @@ def sampler(out: Path) -> None:
     """Measure what drawing directions by lobes saves; print the table and write the Records."""
     from rich.console import Console
 
-    from reports import cells, sampling
+    from reports import sampling, truth_cells
     from reports.record import this_machine, write_records
 
     console = Console()
@@ -130,7 +130,7 @@ def sampler(out: Path) -> None:
             status.update(f"the sampler: {one.fabric}, {one.sampler}")
     path = out / SAMPLER
     write_records(path, sampling.to_records(found), this_machine(1))
-    console.print(_columns(("fabric", *cells.SAMPLERS), cells.sampler_rows(found)))
+    console.print(_columns(("fabric", *truth_cells.SAMPLERS), truth_cells.sampler_rows(found)))
     console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
 
 
@@ -152,7 +152,7 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
     """Show findings: worst error, limit, the textbook's error, what cannot be, and where what does not hold fails."""
     from rich.table import Table
 
-    from reports.cells import stability_rows
+    from reports.truth_cells import stability_rows
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
     for name in ("expression", "corner", "worst", "limit", "textbook", "NaN", "< 0", ""):

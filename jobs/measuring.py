@@ -25,7 +25,7 @@ from reports.frames import measure_aliasing, measure_truth_frames, render_frames
 from reports.furnace import measure_furnace
 from reports.latents import measure_edits, measure_paths, pairs
 from reports.options import EXTREME_PRECISIONS, BenchOptions
-from reports.page import ModelNote, PageInput, PictureFile, write_page
+from reports.page import ModelNote, PageInput, write_page
 from reports.pictures import render_method, render_truth
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from reports.scene_bench import measure_scene, time_scene, write_truth
@@ -33,6 +33,7 @@ from reports.scene_frames import read_shot, shoot
 from reports.silhouette import measure_silhouette, render_edge
 from reports.stability_methods import TRUTH as EXTREMES_TRUTH
 from reports.stability_methods import lustrous, measure_extremes
+from reports.strips import PictureFile
 from reports.timing import thread_counts
 from weaves.fabric import Fabric
 

@@ -13,6 +13,7 @@ from pipeline.fingerprint import file_sha256
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.options import VERSION as SCENE_VERSION
 from pipeline.shards.version import VERSION as TRUTH_VERSION
+from reports.options import SCENE_BENCH_VERSION
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import load_fabric
 
@@ -41,11 +42,11 @@ def _frames_task(recipe: Recipe, name: str) -> Task:
     source = file_sha256(scene.source) if isinstance(scene.source, Path) else name
     fabrics = {key: cloth.fabric or key for key, cloth in scene.cloths.items()}
     spec = {
-        "versions": [TRUTH_VERSION, BENCH_VERSION, SCENE_VERSION],
+        "versions": [TRUTH_VERSION, BENCH_VERSION, SCENE_VERSION, SCENE_BENCH_VERSION],
         "source": source,
         "scene": scene.model_dump(mode="json", exclude={"source"}),
         "fabrics": {key: load_fabric(fabric).model_dump(mode="json") for key, fabric in fabrics.items()},
-        "options": options.model_dump(mode="json", exclude={"names", "footprint", "image"}),
+        "options": options.model_dump(mode="json", exclude={"names", "footprint", "image", "display"}),
     }
     stem = f"records/scene-{scene.name}-{identity('bench', spec)[:8]}"
     questions = options.size[0] * options.size[1] * _LIGHTS
@@ -66,7 +67,7 @@ def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, tr
     """Return the measurements of all settings of a model on a scene."""
     options, bench, scene = model.options, recipe.bench, load_scene(name).name
     spec = {
-        "measure": [BENCH_VERSION, options.version],
+        "measure": [BENCH_VERSION, SCENE_BENCH_VERSION, options.version],
         "frames": frames.id,
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in trainings],
@@ -85,7 +86,7 @@ def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, tr
         (f"{stem}.json", f"{stem}.machine.json", *pictures.values()),
         (frames.id, *(training.id for training in trainings)),
         cost=1.0 + questions * options.seconds[1] * (sum(options.knobs) or 1),
-        size=len(shown) * bench.scenes.size[0] * bench.scenes.size[1] * 12,
+        size=len(shown) * bench.scenes.size[0] * bench.scenes.size[1] * (26 + 6 * bench.scenes.frames),
         setting={
             "make": "scene",
             "scene": scene,

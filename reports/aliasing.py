@@ -64,6 +64,13 @@ def temporal_variance(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> floa
     return float(variance - np.square(np.asarray(noise, np.float64)).mean())
 
 
+def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Floats:
+    """Return the variance over frames of each pixel, less the variance that noise adds."""
+    values = np.asarray(frames, np.float64)
+    squared = np.broadcast_to(np.square(np.asarray(noise, np.float64)), values.shape)
+    return np.asarray(np.var(values, axis=0, ddof=1) - squared.mean(axis=0))
+
+
 def excess_energy(
     frames: npt.ArrayLike,
     truth: npt.ArrayLike,

@@ -1,20 +1,18 @@
-"""Where a picture differs from the truth's: maps as OpenEXR, and as tiles of a page.
+"""Where a picture differs from the truth's: maps as layers of its OpenEXR, and as tiles of a page.
 
-Channels: A (1 where a pixel counts), `relative.R`, `.G`, `.B` and `.Y` (signed, as shares), `flip_ldr`, `flip_hdr`,
+Channels: `lit` (1 where a pixel counts), `relative.R`, `.G`, `.B` and `.Y` (signed, as shares), `flip_ldr`, `flip_hdr`,
 `delta_e`, `ssim`, `square`; `reports.image_error` defines them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 
-from reports.exr import Exr, write_exr
+from reports.exr import Exr
 from reports.image_error import ImageErrors
 from reports.metrics import relative_weight
 from reports.tiles import png
@@ -26,15 +24,10 @@ RELATIVE_RANGE: Final = 0.5
 """Relative difference that is shown in full colour."""
 
 
-def write_differences(
-    path: Path,
-    picture: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    errors: ImageErrors,
-    epsilon: float = 0.01,
-    about: Mapping[str, str | int | float] | None = None,
-) -> None:
-    """Write the maps of a picture's errors to `path`, whole or not at all.
+def difference_maps(
+    picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors, epsilon: float = 0.01
+) -> dict[str, npt.NDArray[Any]]:
+    """Return all maps of a picture's errors, (H, W) by channel.
 
     Parameters
     ----------
@@ -42,11 +35,8 @@ def write_differences(
         What `errors` was measured on, by `reports.image_error.image_errors`.
     epsilon : float
         As in `relative_differences`.
-    about : mapping, optional
-        Metadata.
     """
-    relative = relative_differences(picture, truth, errors.mask, epsilon)
-    write_exr(path, {"A": errors.mask, **relative, **errors.maps}, about)
+    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask, epsilon), **errors.maps}
 
 
 def relative_differences(
@@ -79,5 +69,5 @@ def flip_tile(differences: Exr, channel: str = "flip_ldr") -> bytes:
 def _tile(colours: str, share: npt.NDArray[np.float32], differences: Exr) -> bytes:
     """Return a map in colours, clear where nothing counts."""
     rgba = np.array(mpl.colormaps[colours](share, bytes=True))
-    rgba[differences.channels["A"] == 0] = 0
+    rgba[differences.channels["lit"] == 0] = 0
     return png(rgba)

@@ -1,5 +1,7 @@
 """The plots of a page, one function each: `plot(scheme, data) -> Figure`, drawn by `reports.style.render`.
 
+Those of fronts, a fault against a cost, are in `reports.front_figures`.
+
 A method has one colour and one mark everywhere; its knobs stand under each other, or on one curve. Filled marks are
 fabrics seen in training, open ones unseen.
 """
@@ -7,26 +9,21 @@ fabrics seen in training, open ones unseen.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 
 from reports.aliasing import HALF_NYQUIST
-from reports.equal_time import SIZES
 from reports.record import TRUTH
-from reports.style import Scheme, display, new_figure
-from reports.summary import BASELINE, PAPER, of_baseline, rows
+from reports.style import NARROWEST, Scheme, display, new_figure
+from reports.summary import BASELINE, rows
 
 _ROLES: Final = ("seen", "unseen")
-_NARROWEST: Final = 8.6  # inches: the page shows every plot as wide as its column
-_LEGEND_COLUMNS: Final = 5
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
 
 
@@ -42,9 +39,7 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     """
     roles = [role for role in _ROLES if role in set(table["role"])]
     places = _places(table)
-    figure, panels = new_figure(
-        max(4.6 * len(roles), _NARROWEST), 1.1 + 0.28 * _height(places), len(roles), sharey=True
-    )
+    figure, panels = new_figure(max(4.6 * len(roles), NARROWEST), 1.1 + 0.28 * _height(places), len(roles), sharey=True)
     colours = scheme.colours(table["method"])
     for axes, role in zip(panels, roles, strict=True):
         for (method, setting), row in places.items():
@@ -70,114 +65,6 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
         axes.set(title=f"{role.capitalize()} fabrics", xlabel="MSE, linear RGB", xscale="log")
         axes.grid(axis="y", visible=False)
     _name_rows(panels[0], places, above=0.5)
-    return figure
-
-
-def error_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
-    """Draw the colour's error against the time of a query, both logarithmic; a method's knobs are one curve.
-
-    The broad band is the front: what nothing beats on both. The arrow is the paper's own ratio, from our 2 points: 4.1
-    times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time.
-
-    Parameters
-    ----------
-    table : DataFrame
-        From `tradeoff.tradeoff_table`.
-    """
-    table = table[table["error"].notna()]
-    roles = [role for role in _ROLES if role in set(table["role"])]
-    colours = scheme.colours(table["method"])
-    height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
-    figure, panels = new_figure(max(4.9 * len(roles), _NARROWEST), height, len(roles), sharey=True)
-    for axes, role in zip(panels, roles, strict=True):
-        found = table[table["role"] == role]
-        best = found[found["front"]].sort_values("ns")
-        axes.plot(best["ns"], best["error"], color=scheme.line, linewidth=7, zorder=1, solid_capstyle="round")
-        for method, knobs in found.groupby("method", sort=False):
-            _knob_curve(axes, scheme, str(method), knobs, colours[str(method)], role)
-        for row in rows(found[of_baseline(found)]):
-            _paper_arrow(axes, scheme, row.ns, row.error)
-        axes.set(
-            title=f"{role.capitalize()} fabrics", xlabel="time of a query, ns (one process, side by side)",
-            xscale="log", yscale="log",
-        )  # fmt: skip
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.margins(0.12)
-    panels[0].set_ylabel("relative RMSE of the colour")
-    # One legend for all panels: names at the marks would cover each other.
-    handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
-    if of_baseline(table).any():
-        lower, faster = PAPER
-        step = f"the paper: {math.sqrt(lower):.1f}× lower at {faster}× the time"
-        handles.append(Line2D([], [], color=scheme.muted, linestyle=(0, (3, 2)), label=step))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
-    return figure
-
-
-def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
-    """Draw error against time for each size of footprints: colour above, its specular part below.
-
-    Parameters
-    ----------
-    table : DataFrame
-        From `equal_time.size_table`.
-    """
-    table = table.rename(columns={"ns": "time", "size": "panel"})
-    panels = {size: f"sigma {size}" for size in SIZES if size in set(table["panel"])}
-    measures = {name: f"relative RMSE, {name}" for name in ("colour", "specular")}
-    return _against_time(scheme, table, panels, measures, "time of a query, ns", lambda value: f"{100 * value:.3g} %")
-
-
-def scenes(scheme: Scheme, table: pd.DataFrame) -> Figure:
-    """Draw MSE, HDR-FLIP and flicker of every method against the time of a frame, a column a scene.
-
-    Parameters
-    ----------
-    table : DataFrame
-        From `summary.scene_table`.
-    """
-    table = table.rename(columns={"frame_time": "time", "scene": "panel"})
-    panels = {name: name for name in dict.fromkeys(table["panel"])}
-    measures = {"mse": "MSE", "flip_hdr": "HDR-FLIP", "flicker": "flicker"}
-    return _against_time(scheme, table, panels, measures, "time of a frame, ms", lambda value: f"{value:.3g}")
-
-
-def _against_time(
-    scheme: Scheme,
-    table: pd.DataFrame,
-    panels: Mapping[str, str],
-    measures: Mapping[str, str],
-    axis: str,
-    worded: Callable[[float], str],
-) -> Figure:
-    """Draw measures (a line each) against `time` in panels (a column each), all logarithmic; knobs are one curve."""
-    colours = scheme.colours(table["method"])
-    height = 0.6 + 2.4 * len(measures) + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
-    width = max(2.3 * len(panels), _NARROWEST)
-    figure, flat = new_figure(width, height, len(panels), sharey=True, lines=len(measures))
-    grid = np.asarray(flat).reshape(len(measures), len(panels))
-    for place, ((measure, label), line) in enumerate(zip(measures.items(), grid, strict=True)):
-        for axes, (panel, title) in zip(line, panels.items(), strict=True):
-            # What is nothing, or less than the truth has, cannot be drawn.
-            found = table[(table["panel"] == panel) & (table[measure] > 0) & table["time"].notna()]
-            for method, knobs in found.groupby("method", sort=False):
-                knobs = knobs.sort_values("time")
-                axes.plot(
-                    knobs["time"], knobs[measure], color=colours[str(method)], marker=scheme.marker(str(method)),
-                    markersize=4.5, linewidth=1.1,
-                )  # fmt: skip
-            axes.set(xscale="log", yscale="log", title="" if place else title)
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
-            axes.yaxis.set_minor_locator(NullLocator())
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-            axes.xaxis.set_minor_formatter(NullFormatter())
-        line[0].set_ylabel(label)
-    grid[-1, len(panels) // 2].set_xlabel(axis)
-    handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
     return figure
 
 
@@ -327,36 +214,8 @@ def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: str, **
     )
 
 
-def _knob_curve(axes: Axes, scheme: Scheme, method: str, knobs: pd.DataFrame, colour: str, role: str) -> None:
-    """Draw a method's knobs as one curve; the first and the last are numbered, and so is the baseline."""
-    face = colour if role == "seen" else scheme.ground
-    axes.plot(
-        knobs["ns"], knobs["error"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
-        markeredgewidth=1.6, linewidth=1.3, zorder=3,
-    )  # fmt: skip
-    ends = {knobs["setting"].iloc[0], knobs["setting"].iloc[-1]}
-    for row in rows(knobs[knobs["setting"].isin(ends) | of_baseline(knobs)]):
-        if row.setting:
-            axes.annotate(
-                row.setting.removeprefix("k = "), (row.ns, row.error), xytext=(-7, -5), textcoords="offset points",
-                ha="right", va="top", fontsize=8, color=colour, zorder=4,
-                path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)],
-            )  # fmt: skip
-
-
 def _bounds(value: float, low: float, high: float) -> list[list[float]]:
     return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
-
-
-def _paper_arrow(axes: Axes, scheme: Scheme, time: float, error: float) -> None:
-    """Draw what the paper's ratios would mean from here."""
-    lower, faster = PAPER
-    target = (time * faster, error / math.sqrt(lower))
-    axes.scatter(*target, alpha=0.0)  # an arrow alone does not widen the axes
-    axes.annotate(
-        "", target, xytext=(time, error), zorder=5,
-        arrowprops={"arrowstyle": "-|>", "color": scheme.muted, "linestyle": (0, (3, 2)), "shrinkA": 6, "shrinkB": 0},
-    )  # fmt: skip
 
 
 def _nanoseconds(value: float) -> str:

@@ -14,10 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from reports.tiles import EXPOSURE, encoded, png
+from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 
 GAP: Final = 2
 """Clear pixels between frames."""
+SHOWN: Final = 6
+"""Frames of a strip, if there are as many."""
+
+LARGEST: Final = (40, 96)
+"""Height and width of the largest crop that `liveliest` chooses, in pixels."""
 
 Bytes8 = npt.NDArray[np.uint8]
 
@@ -32,7 +38,7 @@ class Crop(NamedTuple):
 
 
 def filmstrip(
-    rows: Mapping[str, npt.ArrayLike], crop: Crop | None = None, count: int = 6, exposure: float = EXPOSURE
+    rows: Mapping[str, npt.ArrayLike], crop: Crop | None = None, count: int = SHOWN, exposure: float = EXPOSURE
 ) -> bytes:
     """Return frames side by side as PNG bytes, without words.
 
@@ -60,6 +66,22 @@ def filmstrip(
     width = max(strip.shape[1] for strip in strips)
     lines = [np.pad(strip, ((0, GAP), (0, width - strip.shape[1]), (0, 0))) for strip in strips]
     return png(np.concatenate(lines)[:-GAP])
+
+
+def liveliest(rows: Mapping[str, npt.ArrayLike], largest: tuple[int, int] = LARGEST) -> Crop:
+    """Return the rectangle of at most `largest` (height, width) pixels in which most changes from frame to frame.
+
+    The rectangle, of all that lie an eighth of it apart, with the largest sum of the luminance's variance over frames,
+    summed over all films: `rows` as in `filmstrip`, in colour. Of equal ones the topmost, then the leftmost.
+    """
+    change = np.sum([np.var(np.asarray(frames) @ np.array(LUMINANCE), axis=0) for frames in rows.values()], axis=0)
+    height, width = (min(sides) for sides in zip(change.shape, largest, strict=True))
+    tops, lefts = (
+        range(0, whole - side + 1, max(1, side // 8)) for whole, side in zip(change.shape, (height, width), strict=True)
+    )
+    found = {(top, left): change[top : top + height, left : left + width].sum() for top in tops for left in lefts}
+    top, left = max(found, key=lambda place: found[place])
+    return Crop(top, left, height, width)
 
 
 def _crop(films: Mapping[str, npt.NDArray[np.floating]], crop: Crop | None) -> Crop:

@@ -29,6 +29,10 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
 
 
+SCENE_BENCH_VERSION: Final = 1
+"""Version of what is measured and written on scenes (`reports.scene_frames`, `reports.scene_bench`), beside `VERSION`;
+their tasks have no number of it before 1."""
+
 EXTREMES_VERSION: Final = 1
 """Version of the numbers of `reports.stability_methods`, which have tasks of their own."""
 
@@ -131,6 +135,8 @@ class SceneBenchOptions(BaseModel):
     """What stands for an ellipse where a method knows round footprints only."""
     image: ImageOptions = ImageOptions()
     """How pictures are compared."""
+    display: DisplayOptions = DisplayOptions()
+    """On which FovVideoVDP looks at the frames, where it is installed."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Of the truth's points and of the points of random methods."""
 

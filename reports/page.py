@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +16,33 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.atomic import atomic_write
 from pipeline.models.options import CLASSES
-from reports import accuracy, bias, cells, effort, figures, latents, sampling, summary, tiles
+from reports import (
+    accuracy,
+    bias,
+    cells,
+    differences,
+    effort,
+    figures,
+    front_figures,
+    latents,
+    sampling,
+    scene_cells,
+    summary,
+    tiles,
+    truth_cells,
+)
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
+from reports.fabric_card import fabric_card
+from reports.film import film
+from reports.filmstrip import SHOWN, filmstrip, liveliest
+from reports.numbers import percent, plain
 from reports.options import BenchOptions
 from reports.record import OF_A_PAGE, TRUTH, Machine, Record, Role, to_table, write_records
 from reports.silhouette import silhouette_table
 from reports.stability import Finding, from_records
 from reports.stability_methods import extremes_table
+from reports.strips import PictureFile, films, strips
 from reports.style import DARK, LIGHT, Scheme, display, render
 from reports.tradeoff import tradeoff_table
 from reports.wording import (
@@ -35,22 +54,11 @@ from reports.wording import (
     headline,
     lacking,
     learnt,
+    least_flicker_sentences,
+    scene_sentences,
+    unseen_by_eye,
 )
 from weaves.fabric import Fabric
-
-
-@dataclass(frozen=True)
-class PictureFile:
-    """A picture that was rendered."""
-
-    fabric: str
-    """Empty for a scene, which has cloths of its own."""
-    scene: str
-    """View of the fabric, or name of the scene."""
-    method: str
-    """``truth`` for the reference."""
-    setting: str
-    path: Path
 
 
 @dataclass(frozen=True)
@@ -94,16 +102,6 @@ class PageInput:
     pictures: Sequence[PictureFile]
 
 
-@dataclass
-class _Strip:
-    """One view of one fabric by every method."""
-
-    fabric: str
-    role: str
-    scene: str
-    cells: list[dict[str, str]] = field(default_factory=list)
-
-
 def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] = lambda fraction: None) -> Path:
     """Write a page into `folder` and return the path of ``index.html``.
 
@@ -131,7 +129,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         "energy": summary.energy_table(page.records),
         "silhouettes": silhouette_table(page.records),
     }
-    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"])
+    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"], tables["aliasing"])
     tables["scenes"] = summary.scene_table(page.records)
     tables["by_size"] = size_table(page.records)
     tables["equal_time"] = equal_time_table(tables["by_size"])
@@ -156,7 +154,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     progress(0.4)
     for done, (name, content) in enumerate(_tiles(page)):
         atomic_write(folder / "figures" / name, content)
-        progress(0.4 + 0.6 * min(1.0, (done + 1) / (2 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
+        progress(0.4 + 0.6 * min(1.0, (done + 1) / (3 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
     write_records(folder / OF_A_PAGE, page.records, page.machine)
     index = folder / "index.html"
     atomic_write(index, _html(page, tables, findings, {name.removesuffix("-light.png") for name in images}).encode())
@@ -200,11 +198,14 @@ def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
     if len(errors):
         plots["errors"] = (figures.errors, errors, tables["errors_by_fabric"])
     if tables["tradeoff"]["error"].notna().any():
-        plots["error-against-time"] = (figures.error_against_time, tables["tradeoff"])
+        plots["error-against-time"] = (front_figures.error_against_time, tables["tradeoff"])
+        plots["error-against-bytes"] = (front_figures.error_against_bytes, tables["tradeoff"])
+    if tables["tradeoff"]["flicker"].notna().any():
+        plots["aliasing-against-time"] = (front_figures.aliasing_against_time, tables["tradeoff"])
     if len(tables["by_size"]):
-        plots["error-by-size"] = (figures.error_by_size, tables["by_size"])
-    if len(tables["scenes"]):
-        plots["scenes"] = (figures.scenes, tables["scenes"])
+        plots["error-by-size"] = (front_figures.error_by_size, tables["by_size"])
+    if tables["scenes"]["frame_time"].notna().any():
+        plots["scenes"] = (front_figures.scenes, tables["scenes"])
     if len(aliasing):
         plots["aliasing"] = (figures.aliasing, aliasing)
     if curves:
@@ -217,13 +218,19 @@ def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
 
 
 def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
-    """Draw every picture, every difference, and the maps of every fabric."""
+    """Draw every picture, every difference, every strip of frames, and the maps of every fabric."""
     truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.pictures if p.method == TRUTH}
     for file in page.pictures:
         exr = truths[file.fabric, file.scene] if file.method == TRUTH else read_exr(file.path)
-        yield f"{_stem(file)}.png", tiles.picture(exr)
-        if file.method != TRUTH:
-            yield f"{_stem(file)}-difference.png", tiles.difference(exr, truths[file.fabric, file.scene])
+        yield f"{file.stem}.png", tiles.picture(exr)
+        if file.method != TRUTH and file.fabric:
+            yield f"{file.stem}-difference.png", tiles.difference(exr, truths[file.fabric, file.scene])
+        elif file.method != TRUTH:
+            yield f"{file.stem}-relative.png", differences.relative_tile(exr)
+            yield f"{file.stem}-flip.png", differences.flip_tile(exr)
+    for scene, files in films(page.pictures).items():
+        shown = {file.stem: film(read_exr(file.path)) for file in files}
+        yield f"film-{scene}.png", filmstrip(shown, liveliest(shown))
     for fabric, _ in page.fabrics:
         for kind, draw in (("drawdown", tiles.drawdown), ("height", tiles.height), ("normals", tiles.normals)):
             yield f"{fabric.name}-{kind}.png", draw(fabric)
@@ -243,10 +250,15 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    fabrics = [cells.fabric_card(fabric, role) for fabric, role in page.fabrics]
+    fabrics = [fabric_card(fabric, role) for fabric, role in page.fabrics]
     measured = _of_the_truth(page.records)
     shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
-    strips = _strips(page, tables["pictures"], tables["scenes"])
+    views = strips(
+        page.pictures,
+        {fabric.name: role for fabric, role in page.fabrics},
+        [*page.options.views, *page.options.scenes.names],
+        [tables["pictures"], tables["scenes"]],
+    )
     return environment.get_template("page.html.j2").render(
         page=page,
         headlines=_headlines(errors, timing, untrained),
@@ -254,6 +266,7 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         front=cells.front_rows(tables["tradeoff"]),
         front_columns=cells.FRONT,
         cheapest=cheapest_sentences(tables["tradeoff"]),
+        least_flicker=least_flicker_sentences(tables["tradeoff"]),
         beaten=beaten(tables["tradeoff"]),
         equal_time=cells.equal_time_rows(tables["equal_time"]),
         equal_time_sentences=equal_time_sentences(tables["equal_time"]),
@@ -269,29 +282,39 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         paths=cells.path_rows(summary.path_table(page.records)),
         edits=cells.edit_rows(page.records),
         shares=[f"t = {share:g}" for share in latents.SHARES],
-        stability=cells.stability_rows(findings),
+        stability=truth_cells.stability_rows(findings),
         extremes=cells.extreme_rows(extremes_table(page.records)),
         extreme_columns=cells.EXTREMES,
-        rates=cells.rate_rows(page.records),
-        accuracies=cells.accuracy_rows(measured["truth_accuracy"]),
-        reference=cells.percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
+        rates=truth_cells.rate_rows(page.records),
+        accuracies=truth_cells.accuracy_rows(measured["truth_accuracy"]),
+        reference=percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         accuracy_count=max((row.count for row in measured["truth_accuracy"]), default=0),
-        biases=cells.bias_rows(measured["truth_bias"]),
-        efforts=cells.effort_rows(measured["truth_effort"]),
-        samplers=cells.sampler_rows(measured["sampler"]),
-        limit=cells.percent(bias.LIMIT),
-        asked=cells.percent(effort.RELATIVE_ERROR),
-        columns={"accuracy": cells.ACCURACY, "bias": cells.BIAS, "effort": cells.EFFORT, "sampler": cells.SAMPLERS},
-        titles={name: cells.plain(name) for name in cells.accuracy_rows(measured["truth_accuracy"])},
-        strips=[strip for strip in strips if strip.fabric],
-        scenes=cells.scene_rows(tables["scenes"]),
-        scene_columns=cells.SCENE,
-        scene_strips={strip.scene: strip for strip in strips if not strip.fabric},
+        biases=truth_cells.bias_rows(measured["truth_bias"]),
+        efforts=truth_cells.effort_rows(measured["truth_effort"]),
+        samplers=truth_cells.sampler_rows(measured["sampler"]),
+        limit=percent(bias.LIMIT),
+        asked=percent(effort.RELATIVE_ERROR),
+        columns={
+            "accuracy": truth_cells.ACCURACY,
+            "bias": truth_cells.BIAS,
+            "effort": truth_cells.EFFORT,
+            "sampler": truth_cells.SAMPLERS,
+        },
+        titles={name: plain(name) for name in truth_cells.accuracy_rows(measured["truth_accuracy"])},
+        strips=[view for view in views if view.fabric],
+        scenes=scene_cells.scene_rows(tables["scenes"]),
+        scene_columns=[column.title for column in scene_cells.scene_columns(tables["scenes"])],
+        scene_strips={view.scene: view for view in views if not view.fabric},
+        films=films(page.pictures),
+        scene_sentences=scene_sentences(tables["scenes"]),
+        relative_range=differences.RELATIVE_RANGE,
+        display=display,
+        film_frames=min(page.options.scenes.frames, SHOWN),
         fabrics=fabrics,
         shown=shown,
         plots=plots,
         definitions=DEFINITIONS,
-        caveats=[*caveats(page.options, per_material, errors), *lacking(page.records)],
+        caveats=[*caveats(page.options, per_material, errors), *lacking(page.records), *unseen_by_eye(page.records)],
         colours={name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for name, scheme in schemes.items()},
         schemes=schemes,
         difference_range=tiles.DIFFERENCE_RANGE,
@@ -306,27 +329,3 @@ def _headlines(errors: pd.DataFrame, timing: pd.DataFrame, untrained: set[str]) 
         if text := headline(*key, errors, timing, paper=not result):
             result.append(text)
     return result
-
-
-def _strips(page: PageInput, pictures: pd.DataFrame, scenes: pd.DataFrame) -> list[_Strip]:
-    """Return the views of the fabrics, then the scenes, each with the truth first."""
-    mse = {(row.fabric, row.scene, row.method, row.setting): row.mse for row in summary.rows(pictures)}
-    mse |= {("", row.scene, row.method, row.setting): row.mse for row in summary.rows(scenes)}
-    strips: dict[tuple[str, str], _Strip] = {}
-    roles: dict[str, str] = {fabric.name: role for fabric, role in page.fabrics}
-    for file in sorted(page.pictures, key=lambda file: file.method != TRUTH):
-        strip = strips.setdefault(
-            (file.fabric, file.scene), _Strip(file.fabric, roles.get(file.fabric, ""), file.scene)
-        )
-        value = mse.get((file.fabric, file.scene, file.method, file.setting))
-        cell = {"stem": _stem(file), "method": file.method, "label": display(file.method, file.setting)}
-        strip.cells.append(cell | {"mse": cells.scientific(value)})
-    order = {fabric.name: index for index, (fabric, _) in enumerate(page.fabrics)}
-    views = {str(name): index for index, name in enumerate((*page.options.views, *page.options.scenes.names))}
-    place = len(order)
-    return sorted(strips.values(), key=lambda s: (order.get(s.fabric, place), views.get(s.scene, len(views))))
-
-
-def _stem(file: PictureFile) -> str:
-    words = [file.fabric or "scene", file.scene, file.method, *file.setting.replace("=", "").split()]
-    return "-".join(words)

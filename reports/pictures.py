@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -91,13 +92,17 @@ def write_picture(
     mask: npt.NDArray[np.bool_],
     about: Mapping[str, str | float],
     noise: npt.NDArray[np.floating] | None = None,
+    layers: Mapping[str, npt.ArrayLike] = MappingProxyType({}),
 ) -> None:
-    """Write a picture (H, W, 3) as an OpenEXR: A = 1 where `mask` is, with the standard error if known."""
+    """Write a picture (H, W, 3) as an OpenEXR: A = 1 where `mask` is, with the standard error if known.
+
+    Further `layers`, planes by name, are stored as float16.
+    """
     channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
     channels["A"] = mask.astype(np.float32)
     if noise is not None:
         channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
-    write_exr(path, channels, dict(about))
+    write_exr(path, channels | dict(layers), dict(about), half=layers)
 
 
 def _about(fabric: Fabric, scene: View, gbuffer: GBuffer) -> dict[str, str | float]:

@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from reports.record import TRUTH
 
 DPI: Final = 200
+NARROWEST: Final = 8.6
+"""Width of plots in inches, at least: the page shows every plot as wide as its column."""
 NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 
 MARKERS: Final = {

@@ -101,30 +101,59 @@ SCENE_METRICS: Final[tuple[Metric, ...]] = (
     "flip_ldr",
     "flip_hdr",
     "delta_e",
-    "flip_hdr_floor",
     "flicker",
     "excess_energy",
     "fallback_share",
     "frame_time",
     "colour_rrmse",
+    "fovvideovdp",
 )
 """What is measured of every method on a scene."""
+
+SCENE_FLOORS: Final[tuple[Metric, ...]] = (
+    "truth_noise",
+    "mse_relative_floor",
+    "psnr_floor",
+    "ssim_floor",
+    "flip_ldr_floor",
+    "flip_hdr_floor",
+    "delta_e_floor",
+)
+"""What the truth's noise alone scores on a scene (`reports.image_error`); the same for every method."""
+
+SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
+    "mse",
+    "mse_relative",
+    "psnr",
+    "ssim",
+    "flip_ldr",
+    "flip_hdr",
+    "delta_e",
+    "flicker",
+    "colour_rrmse",
+)
+"""Which of `SCENE_METRICS` have a 95 % interval."""
 
 
 def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the benchmark's scenes, one row a scene, method and setting.
 
-    Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms); ratio (MSE of 2 points over the method's);
-    front (nothing beats it on both MSE and time in its scene).
+    Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms, its quartiles in the Records) and
+    `SCENE_FLOORS`; of each of `SCENE_INTERVALS` the ends of its 95 % interval, <metric>_low and <metric>_high; ratio
+    (MSE of 2 points over the method's); front (nothing beats it on both MSE and time in its scene).
     """
     table = to_table(records)
-    table = table[(table["fabric"] == "") & (table["scene"] != "") & table["metric"].isin(SCENE_METRICS)]
-    keys = ["scene", *_KEYS]
+    metrics = [*SCENE_METRICS, *SCENE_FLOORS]
+    table = table[(table["fabric"] == "") & (table["scene"] != "") & table["metric"].isin(metrics)]
+    keys, ends = ["scene", *_KEYS], [f"{name}_{end}" for name in SCENE_INTERVALS for end in ("low", "high")]
     if table.empty:
-        return pd.DataFrame(columns=[*keys, *SCENE_METRICS, "ratio", "front"])
-    order = table[keys].drop_duplicates()
-    wide = table.pivot(index=keys, columns="metric", values="value").reindex(columns=list(SCENE_METRICS)).reset_index()
-    wide = order.merge(wide, on=keys)
+        return pd.DataFrame(columns=[*keys, *metrics, *ends, "ratio", "front"])
+    wide = table[keys].drop_duplicates()
+    for column, names in (("value", metrics), ("low", SCENE_INTERVALS), ("high", SCENE_INTERVALS)):
+        part = table.pivot(index=keys, columns="metric", values=column).reindex(columns=list(names))
+        part = part if column == "value" else part.add_suffix(f"_{column}")
+        wide = wide.merge(part.reset_index(), on=keys)
+    wide = wide[[*keys, *metrics, *ends]]
     base = wide[of_baseline(wide)].set_index("scene")["mse"]
     wide["ratio"] = wide["scene"].map(base) / wide["mse"]
     wide["front"] = False

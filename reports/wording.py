@@ -6,7 +6,7 @@ Nothing is claimed that was not measured: a sentence is only made where both of 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
 import pandas as pd
@@ -18,7 +18,7 @@ from reports.record import TRUTH, Record
 from reports.style import display
 from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
-from reports.tradeoff import LIMITS, cheapest
+from reports.tradeoff import FLICKER_LIMITS, LIMITS, cheapest
 
 DEFINITIONS: Final = {
     "MSE": "Mean squared error in linear RGB of the fabric's own colours, over held-out queries and channels, the "
@@ -33,6 +33,26 @@ DEFINITIONS: Final = {
     "colour": "Relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft): root of the MSE over the mean of the "
     "truth, mean over fabrics; the same colour for every fabric.",
     "S warp, S weft, C warp, C weft": "Relative RMSE of each component: specular and diffuse, warp and weft.",
+    "PSNR": "Peak signal-to-noise ratio of a scene's first frame as it is shown (times the exposure, cut at 1, sRGB "
+    "codes): 10 log10 of 1 over the mean squared difference of lit pixels, in dB. Higher is better.",
+    "SSIM": "Structural similarity of the same codes, Gaussian window, mean over channels and lit pixels. 1 is equal.",
+    "FLIP": "Mean of the error map that NVIDIA's FLIP makes of the same codes: how different two pictures look to who "
+    "flips between them on a screen. 0 is equal, 1 as different as can be.",
+    "HDR-FLIP": "The same of linear light, over all exposures that the truth's median and brightest pixels ask for.",
+    "ΔE": "Mean difference of colour by CIEDE2000, of linear light cut at 1. About 1 can just be seen side by side.",
+    "in scenes": "Colour: relative RMSE of the colour measure over the questions of all frames. Flicker and excess "
+    "energy: as in the columns of that name, of the frames along the camera's way, where cloth is lit in every one. "
+    "Small numbers beneath: 95 % intervals, blocks of neighbouring pixels drawn anew; they say how much the choice of "
+    "pixels matters.",
+    "truth's noise": "Last row of a scene's table. Of MSE, the truth's mean squared standard error, which is already "
+    "subtracted; elsewhere what the truth scores with as much noise once more: about what a perfect method would. "
+    "Differences smaller than that mean nothing.",
+    "in the noise": "The mean squared error as measured is no larger than the truth's noise explains: what is left "
+    "after subtracting it is not above 0.",
+    "not its own": "Share of a scene's questions that a method does not know (light or a viewer behind the cloth, "
+    "cloth unlike what it learnt) and that quadrature answers in its place.",
+    "FovVideoVDP": "How visible the differences of the frames are on a display, flicker included, in "
+    "just-objectionable differences (JOD): 10 is no visible difference. Shown where it was installed.",
     "flicker": "Temporal variance of the receding plane's luminance while the cloth slides by less than a pixel a "
     "frame, minus the truth's own, over the truth's squared mean. 0 is the truth; below 0 the method shows less of the "
     "motion than there is. Random methods draw new points in every frame.",
@@ -86,18 +106,71 @@ def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) ->
 
     Errors that one method is the cheapest for are named together.
     """
-    result = []
-    for role, group in table.groupby("role", sort=False):
-        said: dict[str, list[str]] = {}
-        for limit in limits:
-            best = cheapest(group, limit)
-            text = f"{display(best.method, best.setting)} ({best.ns:,.0f} ns)" if best else ""
-            said.setdefault(text, []).append(f"{100 * limit:g} %")
-        parts = [f"for {_and(found)} the cheapest is {text}" for text, found in said.items() if text]
-        if missed := said.get(""):
-            parts.append(f"{_and(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
-        result.append(f"{str(role).capitalize()} fabrics, error of the colour: {'; '.join(parts)}.")
+    return [
+        f"{str(role).capitalize()} fabrics, error of the colour: {_cheapest(group, limits, 'ns', 'error')}."
+        for role, group in table.groupby("role", sort=False)
+    ]
+
+
+def least_flicker_sentences(table: pd.DataFrame, limits: Sequence[float] = FLICKER_LIMITS) -> list[str]:
+    """Return the same for the flicker of the receding plane, as its distance from the truth's."""
+    return [
+        f"{str(role).capitalize()} fabrics, flicker within a distance of the truth’s: "
+        f"{_cheapest(group, limits, 'ns', 'flicker')}."
+        for role, group in table.groupby("role", sort=False)
+        if group["flicker"].notna().any()
+    ]
+
+
+def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
+    """Return for each scene which method costs least within errors of the colour and of flicker, and what is noise.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `summary.scene_table`.
+    """
+    result = {}
+    for scene, group in table.groupby("scene", sort=False) if len(table) else ():
+        timed = group[group["frame_time"].notna()].assign(distance=group["flicker"].abs())
+        found = []
+        if len(timed):
+            within = _cheapest(timed, LIMITS[:3], "frame_time", "colour_rrmse")
+            found.append(f"Error of the colour: {within}.")
+        if len(timed) and timed["distance"].notna().any():
+            within = _cheapest(timed, FLICKER_LIMITS, "frame_time", "distance")
+            found.append(f"Flicker within a distance of the truth’s: {within}.")
+        lost = [display(row.method, row.setting) for row in rows(group[group["colour_rrmse"] == 0])]
+        if lost:
+            is_ = "is" if len(lost) == 1 else "are"
+            found.append(f"{_and(lost)} {is_} in the noise: no error beyond what the truth’s own explains.")
+        result[str(scene)] = found
     return result
+
+
+_COSTS: Final[dict[str, Callable[[float], str]]] = {
+    "ns": lambda value: f"{value:,.0f} ns",
+    "frame_time": lambda value: f"{value:.3g} ms",
+}
+_FAULTS: Final[dict[str, Callable[[float], str]]] = {
+    "error": lambda limit: f"{100 * limit:g} %",
+    "colour_rrmse": lambda limit: f"{100 * limit:g} %",
+    "flicker": lambda limit: f"{limit:g}".removeprefix("0"),
+    "distance": lambda limit: f"{limit:g}".removeprefix("0"),
+}
+
+
+def _cheapest(table: pd.DataFrame, limits: Sequence[float], cost: str, fault: str) -> str:
+    """Return what costs least within each limit; limits that one method is the cheapest for are named together."""
+    said: dict[str, list[str]] = {}
+    for limit in limits:
+        best = cheapest(table, limit, cost, fault)
+        text = f"{display(best.method, best.setting)} ({_COSTS[cost](getattr(best, cost))})" if best else ""
+        said.setdefault(text, []).append(_FAULTS[fault](limit))
+    parts = [f"for {_and(found)} the cheapest is {text}" for text, found in said.items() if text]
+    if missed := said.get(""):
+        parts.append(f"{_and(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
+    return "; ".join(parts)
 
 
 def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:
@@ -185,6 +258,17 @@ def lacking(records: Sequence[Record]) -> list[str]:
         f"{_and(list(dict.fromkeys(methods)))} by {runtime} {'was' if len(set(methods)) == 1 else 'were'} not measured "
         f"({reason.rstrip('.')})."
         for (runtime, reason), methods in reasons.items()
+    ]
+
+
+def unseen_by_eye(records: Sequence[Record]) -> list[str]:
+    """Return a sentence if scenes were measured without FovVideoVDP."""
+    found = {record.metric for record in records}
+    if "frame_time" not in found or "fovvideovdp" in found:
+        return []
+    return [
+        "How visible the differences in the frames of a scene are was not scored by FovVideoVDP: pyfvvdp was not "
+        "installed when they were measured (pip install pyfvvdp adds it; it may not be used commercially)."
     ]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reports.aliasing import excess_energy, flicker, spectrum, temporal_variance
+from reports.aliasing import excess_energy, flicker, spectrum, temporal_variance, temporal_variances
 
 X = np.arange(96)
 Y = np.arange(64)[:, None]
@@ -42,6 +42,16 @@ def test_truth_against_itself_scores_zero():
     assert excess_energy(truth, truth) == 0
     assert flicker(truth, truth, noise, noise) == 0
     assert excess_energy(truth, truth, noise, noise) == 0
+
+
+def test_variances_of_pixels_average_to_the_variance():
+    random = np.random.default_rng(5)
+    shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
+    variances = temporal_variances(shown, noise)
+    assert variances.shape == (6, 7)
+    assert variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
+    # Two frames that differ by d have the variance d^2 / 2.
+    assert temporal_variances(np.array([[1.0, 2.0], [1.0, 5.0]]), 0.5) == pytest.approx([-0.25, 4.5 - 0.25])
 
 
 def test_flicker_of_a_known_sinusoid():

@@ -7,9 +7,8 @@ import pytest
 from pipeline.models.options import CLASSES
 from reports import figures, summary
 from reports.style import DARK, LIGHT, MARKERS, NAMES, display, render
-from reports.tradeoff import tradeoff_table
 
-PLOTS = ["errors", "error_against_time", "aliasing", "spectra", "timing"]
+PLOTS = ["errors", "aliasing", "spectra", "timing"]
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +16,6 @@ def data(made_up):
     errors, timing = summary.error_table(made_up), summary.timing_table(made_up)
     return {
         "errors": (errors, summary.fabric_table(made_up)),
-        "error_against_time": (tradeoff_table(errors, timing),),
         "aliasing": (summary.aliasing_table(made_up),),
         "spectra": (summary.spectra(made_up),),
         "timing": (timing,),
@@ -37,28 +35,6 @@ def test_equal_data_give_equal_bytes(data):
     drawn = [render(figures.timing, LIGHT, *data["timing"]) for _ in range(2)]
     assert drawn[0] == drawn[1]
     assert b"Software" not in drawn[0]
-
-
-def test_front_holds_what_nothing_beats_on_both(data):
-    """Made up: points of k cost 400 k and err 1/k, woven and NeuMIP lie at k = 9 like points: all are on the front
-    but NeuMIP, which costs more than woven at the same error."""
-    (table,) = data["error_against_time"]
-    figure = figures.error_against_time(LIGHT, table)
-    line = figure.axes[0].lines[0]
-    assert sorted(line.get_xdata()) == list(line.get_xdata())
-    costs = table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
-    assert costs["neumip", ""] not in line.get_xdata()
-    assert costs["woven", ""] in line.get_xdata()
-    assert len(line.get_xdata()) == 6
-
-
-def test_the_knobs_of_a_method_are_one_curve_and_its_ends_are_numbered(data):
-    figure = figures.error_against_time(LIGHT, *data["error_against_time"])
-    curves = {len(line.get_xdata()) for line in figure.axes[0].lines[1:]}
-    assert curves == {1, 5}  # woven and NeuMIP; points of 1, 2, 4, 16, 64
-    assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["woven", "NeuMIP", "points", "the paper: 2.0× lower at 0.83× the time"]
 
 
 def test_rows_of_a_method_stand_together_under_its_name(data):

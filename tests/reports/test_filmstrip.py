@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reports import tiles
-from reports.filmstrip import GAP, Crop, filmstrip
+from reports.filmstrip import GAP, Crop, filmstrip, liveliest
 from weaves.errors import BadInput
 
 FRAMES = np.linspace(0.0, 0.6, 4 * 12 * 20).reshape(4, 12, 20)
@@ -55,3 +55,15 @@ def test_colours_and_short_films_fit_beside_others():
 def test_what_cannot_be_shown_is_bad_input(rows, crop):
     with pytest.raises(BadInput, match="strip of frames"):
         filmstrip(rows, crop)
+
+
+def test_the_liveliest_crop_holds_what_moves():
+    """Films stand still but for one patch: the crop contains it, whichever film it is in; small films are whole."""
+    still = np.zeros((3, 64, 120, 3))
+    moving = still.copy()
+    moving[1, 40:52, 70:90] = 0.5
+    crop = liveliest({"truth": still, "points": moving}, (16, 32))
+    assert crop.height == 16 and crop.width == 32
+    assert crop.top <= 40 and crop.top + 16 >= 52 and crop.left <= 70 and crop.left + 32 >= 90
+    assert liveliest({"truth": still}, (16, 32)) == Crop(0, 0, 16, 32)
+    assert liveliest({"truth": moving}, (100, 200)) == Crop(0, 0, 64, 120)

@@ -11,9 +11,10 @@ from reports import accuracy, bias, effort
 from reports.exr import write_exr
 from reports.latents import SHARES
 from reports.options import BenchOptions
-from reports.page import ModelNote, PageInput, PictureFile, write_page
+from reports.page import ModelNote, PageInput, write_page
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.stability import judge, to_records
+from reports.strips import PictureFile
 from weaves.fabric import load_fabric
 
 VOID = {"meta", "img", "source", "link", "br", "hr", "input"}

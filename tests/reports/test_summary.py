@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.cells import significant, timing_columns, timing_rows
+from reports.cells import timing_columns, timing_rows
 from reports.record import Record
 from reports.summary import (
     aliasing_table,
@@ -148,11 +148,3 @@ def test_nothing_measured_gives_empty_tables():
     for table in (error_table, fabric_table, picture_table, aliasing_table, timing_table, summary_table):
         assert table([]).empty
     assert spectra([]) == {}
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(1696.4, "1,696"), (12.34, "12.3"), (0.0456, ".0456"), (999.6, "1,000"), (0.0, "0"), (-2.0, "-2.00")],
-)
-def test_three_digits_are_significant(value, text):
-    assert significant(value) == text

@@ -4,7 +4,6 @@ import pandas as pd
 import pytest
 
 from pipeline.scenes.options import ViewOptions
-from reports.cells import fixed, percent, plain, scientific, signed, size, times
 from reports.options import BenchOptions
 from reports.wording import beaten, caveats, cheapest_sentences, headline, learnt
 
@@ -63,29 +62,3 @@ def test_caveats_name_the_footprint(footprint):
     text = " ".join(caveats(options, [], tables(1.0)[0]))
     assert ("longer axis" in text) == (footprint == "major")
     assert "NeuMIP" not in text
-
-
-@pytest.mark.parametrize(
-    ("found", "expected"),
-    [
-        (scientific(2.62e-3), "2.62e−3"),
-        (scientific(None), "–"),
-        (scientific(math.nan), "–"),
-        (signed(1.0), "+1.00e0"),
-        (signed(-0.02), "−2.00e−2"),
-        (times(4.12), "4.1×"),
-        (times(0.0834), "0.083×"),
-        (times(1234.0), "1,234×"),
-        (percent(0.0151, 2), "1.51 %"),
-        (fixed(0.1234), ".123"),
-        (fixed(1.5), "1.500"),
-        (size(512), "512 B"),
-        (size(346_896), "346.9 kB"),
-        (size(16_300_000), "16.30 MB"),
-        (plain("twill_4_4"), "twill 4/4"),
-        (plain("wool_gabardine"), "wool gabardine"),
-        (plain("satin_8"), "satin 8"),
-    ],
-)
-def test_numbers_are_worded(found, expected):
-    assert found == expected

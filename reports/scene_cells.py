@@ -1,0 +1,78 @@
+"""Rows of the tables of scenes: a number, its 95 % interval beneath, and last what the truth's noise alone scores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import pandas as pd
+
+from reports.cells import Row, groups, row_of
+from reports.numbers import NONE, fixed, fixed_to, missing, percent, scientific, signed, times
+from reports.summary import rows
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table of a scene."""
+
+    title: str
+    metric: str
+    """Column of `summary.scene_table`."""
+    worded: Callable[[float], str]
+    floor: str = ""
+    """Column of what the truth's noise alone scores."""
+
+
+COLUMNS: Final = (
+    Column("colour", "colour_rrmse", lambda value: percent(value) if value != 0 else "in the noise"),
+    Column("MSE", "mse", scientific, "truth_noise"),
+    Column("× lower", "ratio", times),
+    Column("PSNR, dB", "psnr", lambda value: fixed_to(value, 1), "psnr_floor"),
+    Column("SSIM", "ssim", fixed, "ssim_floor"),
+    Column("FLIP", "flip_ldr", fixed, "flip_ldr_floor"),
+    Column("HDR-FLIP", "flip_hdr", fixed, "flip_hdr_floor"),
+    Column("ΔE", "delta_e", lambda value: fixed_to(value, 2), "delta_e_floor"),
+    Column("flicker", "flicker", signed),
+    Column("excess energy", "excess_energy", signed),
+    Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
+    Column("not its own", "fallback_share", lambda value: percent(value, 0)),
+    Column("ms a frame", "frame_time", lambda value: fixed_to(value, 1)),
+)
+"""All that there may be; `scene_columns` says which are shown."""
+
+
+def scene_columns(table: pd.DataFrame) -> list[Column]:
+    """Return the columns of `scene_rows`: those of `COLUMNS` but FovVideoVDP where nobody measured it."""
+    return [column for column in COLUMNS if column.metric != "fovvideovdp" or table[column.metric].notna().any()]
+
+
+def scene_rows(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Return for each scene the rows of its table, in groups, and the row of the truth's noise.
+
+    Times on the front of MSE and time are marked.
+    """
+    columns, result = scene_columns(table), {}
+    for scene, group in table.groupby("scene", sort=False) if len(table) else ():
+        lines: list[Row] = []
+        for row in rows(group):
+            cells = [_cell(row, column) for column in columns]
+            cells[-1]["best"] = bool(row.front)
+            lines.append(row_of(row.method, row.setting) | {"cells": cells})
+        noise = [column.worded(group[column.floor].mean()) if column.floor else NONE for column in columns]
+        result[str(scene)] = {"groups": groups(lines), "noise": noise}
+    return result
+
+
+def _cell(row: Any, column: Column) -> Row:
+    """Return a number and its interval, which is empty where there is none."""
+    ends = [getattr(row, f"{column.metric}_{end}", math.nan) for end in ("low", "high")]
+    interval = "" if any(map(missing, ends)) else " … ".join(_end(end, column) for end in ends)
+    return {"text": column.worded(getattr(row, column.metric)), "interval": interval, "best": False}
+
+
+def _end(value: float, column: Column) -> str:
+    """Return an end of an interval; no error is less than nothing."""
+    return "0" if value == 0 else column.worded(value).removesuffix(" %")
