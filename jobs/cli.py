@@ -259,12 +259,14 @@ def require(
     recipe: Annotated[str, Parameter(help="General recipe whose page holds the measurements.")] = "quick",
     frames: Annotated[int, Parameter(help="Frames of the camera's way to look at.")] = 4,
     margin: Annotated[float, Parameter(help="Factor by which ranges are widened.")] = 1.25,
+    method: Annotated[str, Parameter(help="Method of the general recipe; left out: the cheapest.")] = "",
+    effort: Annotated[float, Parameter(help="Share of its rows a fabric and of its steps that are learnt from.")] = 0.25,
     out: Out = OUT,
 ) -> None:
     """Tell what a scene requires and write the cheapest recipe that meets a wish."""
     from jobs.requiring import require as required
 
-    required(scene, out, recipe, error, time, frames, margin)
+    required(scene, out, recipe, error, time, frames, margin, method, effort)
 
 
 def main(tokens: Sequence[str] | None = None) -> int:
