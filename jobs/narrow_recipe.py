@@ -67,7 +67,7 @@ def write_recipe(
     model = next(model for model in general.models if model.options.name == method)
     queries = requirement.queries(model.options.kinds)
     worn = {name: fabrics[name] for name in requirement.fabrics}
-    table = {
+    table: dict[str, Any] = {
         "name": f"require-{requirement.scene}",
         "about": f"What the scene {requirement.scene} requires, by {method}.",
         "dataset": {
@@ -161,8 +161,13 @@ def _model(model: ModelRecipe, setting: str, effort: float) -> dict[str, Any]:
         knob = next(key for key in ("counts", "nodes") if hasattr(model.options, key))
         options[knob] = [int(setting.removeprefix("k = "))]
     if model.learns:
-        steps = max(1, round(effort * model.training.steps))
-        options["training"] = model.training.model_dump(mode="json", exclude_defaults=True) | {"steps": steps}
+        training = model.training
+        # The running average of the weights spans the same share of the training.
+        shorter = {
+            "steps": max(1, round(effort * training.steps)),
+            "average": round(training.average ** (1 / effort), 6),
+        }
+        options["training"] = training.model_dump(mode="json", exclude_defaults=True) | shorter
     return options
 
 

@@ -53,7 +53,9 @@ def load_scene(name_or_path: str | Path) -> Scene:
 def _with_fabrics(scene: Scene, folder: Path) -> Scene:
     """Return a scene whose fabrics' files lie beside it, wherever it is read from."""
     cloths = {
-        key: cloth.model_copy(update={"fabric": str(folder / cloth.fabric)}) if cloth.fabric.endswith(".toml") else cloth
+        key: cloth.model_copy(update={"fabric": str(folder / cloth.fabric)})
+        if cloth.fabric.endswith(".toml")
+        else cloth
         for key, cloth in scene.cloths.items()
     }
     return scene.model_copy(update={"cloths": cloths})

@@ -12,7 +12,9 @@ TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=8)
 VALUES = st.one_of(TEXT, st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False))
 TABLES = st.recursive(
     st.dictionaries(TEXT, VALUES, max_size=3),
-    lambda inner: st.dictionaries(TEXT, st.one_of(VALUES, st.lists(VALUES, max_size=3), inner, st.lists(inner)), max_size=3),
+    lambda inner: st.dictionaries(
+        TEXT, st.one_of(VALUES, st.lists(VALUES, max_size=3), inner, st.lists(inner)), max_size=3
+    ),
     max_leaves=12,
 )
 
@@ -23,7 +25,7 @@ def test_what_was_written_is_read_again(table):
     assert tomllib.loads(toml(table)) == table
 
 
-@pytest.mark.parametrize("text", ["a\x7f\x00\"\\\n", "\U0001f9f6", "é"])
+@pytest.mark.parametrize("text", ['a\x7f\x00"\\\n', "\U0001f9f6", "é"])
 def test_characters_that_json_and_toml_write_differently(text):
     assert tomllib.loads(toml({text: [text]})) == {text: [text]}
 
