@@ -261,12 +261,15 @@ def require(
     margin: Annotated[float, Parameter(help="Factor by which ranges are widened.")] = 1.25,
     method: Annotated[str, Parameter(help="Method of the general recipe; left out: the cheapest.")] = "",
     effort: Annotated[float, Parameter(help="Share of its rows a fabric and of its steps to learn from.")] = 0.25,
+    set_: Annotated[
+        list[str], Parameter(name="--set", help="Option of the method that is other than there: hidden=64.")
+    ] = [],  # noqa: B006
     out: Out = OUT,
 ) -> None:
     """Tell what a scene requires and write the cheapest recipe that meets a wish."""
     from jobs.requiring import require as required
 
-    required(scene, out, recipe, error, time, frames, margin, method, effort)
+    required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
 
 
 @app.command(sort_key=14)

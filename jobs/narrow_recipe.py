@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 from jobs.plan import plan
@@ -23,6 +24,7 @@ from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+from weaves.validation import validated
 
 EFFORT: Final = 0.25
 """Share of the general recipe's training rows a fabric, and of its steps, that a scene's recipe takes."""
@@ -32,7 +34,7 @@ SAMPLED: Final = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
 
 _TEST_ROWS: Final = 4096
 _FEWEST_ROWS: Final = 1024
-_BASELINE: Final = {"model": "point_sampled", "counts": [2]}
+_BASELINE: Final = "point_sampled"
 
 
 def write_recipe(
@@ -44,6 +46,7 @@ def write_recipe(
     scene: str,
     fabrics: Mapping[str, tuple[str, Fabric]],
     effort: float = EFFORT,
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
     """Write the recipe of one method in the scene's domain, and read it back: it must be one.
 
@@ -63,6 +66,13 @@ def write_recipe(
         For each fabric's name what names it, a preset or a path from the current folder, and itself.
     effort : float
         Share of the training rows a fabric and of the steps, > 0; 1: all of them.
+    options : mapping
+        Options of the model that are other than in the general recipe, such as a smaller width.
+
+    Raises
+    ------
+    BadInput
+        If the model has no such options, or the recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
     queries = requirement.queries(model.options.kinds)
@@ -78,7 +88,7 @@ def write_recipe(
             "queries": queries.model_dump(mode="json", exclude_defaults=True),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
-        "models": [_model(model, setting, effort), *([_BASELINE] if method != _BASELINE["model"] else [])],
+        "models": [_model(model, setting, effort, options), *_baseline(general, method)],
         "bench": _bench(general, _beside(path, scene)),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -153,10 +163,19 @@ def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) ->
     return True
 
 
-def _model(model: ModelRecipe, setting: str, effort: float) -> dict[str, Any]:
+def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
+    """Return point sampling at 2 points, which others are measured by, where the general recipe has it."""
+    found = [model for model in general.models if model.options.name == _BASELINE != method]
+    return [_model(model, "k = 2", 1.0) for model in found]
+
+
+def _model(
+    model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
     """Return a model's table, with one setting alone where one is wished, and its training cut down."""
-    options = model.options.model_dump(mode="json", exclude_defaults=True)
+    options = model.options.model_dump(mode="json", exclude_defaults=True) | dict(other)
     options = {"model": model.options.model, "name": model.options.name} | options
+    validated(type(model.options), options, "--set")
     if setting.startswith("k = "):
         knob = next(key for key in ("counts", "nodes") if hasattr(model.options, key))
         options[knob] = [int(setting.removeprefix("k = "))]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,7 @@ def require(
     margin: float,
     method: str = "",
     effort: float = EFFORT,
+    changes: Sequence[str] = (),
 ) -> None:
     """Print what a scene asks and which method meets the wish, and write its recipe.
 
@@ -61,6 +63,8 @@ def require(
         Wish: a method of the general recipe; the front's own choice if empty.
     effort : float
         Share of the general recipe's rows a fabric and of its steps that a training takes.
+    changes : sequence of str
+        Options of the model that are other than there, each as ``key = value`` in TOML.
 
     Raises
     ------
@@ -85,6 +89,7 @@ def require(
         if not (value > 0 if allowed == "> 0" else value >= 1):
             raise BadInput("require", f"--{key}", value, f"must be {allowed}")
     general = load_recipe(recipe)
+    options = _options(changes)
     names = [model.options.name for model in general.models]
     if method and method not in names:
         raise BadInput(
@@ -117,7 +122,7 @@ def require(
         wish = f"{100 * error:g} % in {ms:g} ms a frame"
         raise BadInput("require", "wish", wish, f"no method meets it; the nearest points of the front are {near}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
-    write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort)
+    write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options)
     name = f"{chosen.method} {chosen.setting}".strip()
     console.print(
         f"{name}: {100 * chosen.error:.2g} % in {chosen.ms:.3g} ms a frame ({chosen.known}). {savings(path, general)}",
@@ -157,6 +162,17 @@ def _requirement(scene: str, asked: Mapping[str, Queries], frames: int, margin: 
     from reports.equal_time import EDGES, SIZES
 
     return Requirement.of(load_scene(scene).name, frames, asked, EDGES[:-1], SIZES, margin)
+
+
+def _options(changes: Iterable[str]) -> dict[str, Any]:
+    """Return options from ``key = value`` in TOML."""
+    found: dict[str, Any] = {}
+    for change in changes:
+        try:
+            found |= tomllib.loads(change)
+        except ValueError as error:
+            raise BadInput("require", "--set", change, "must be KEY=VALUE as in TOML, such as hidden=64") from error
+    return found
 
 
 class _Taught:

@@ -1,10 +1,10 @@
 """What a scene's own recipe saves against the general one, measured: both have run, and nothing is computed here.
 
-Rows and seconds of the ground truth and of the training come from the ledger, queries learnt from are steps taken times
-batch, errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's
-method alone: the rows that this method learns from and is measured on, its own training, and none of its other methods'.
-Seconds depend on what else a machine does; rows and queries learnt from do not. So does the time of a frame, which
-therefore stands beside that of point sampling at 2 points on the same page as well.
+Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
+errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
+alone: the rows that this method learns from and is measured on, and its own training. Seconds depend on what else a
+machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
+frames of point sampling at 2 points, timed in turns with it.
 """
 
 from __future__ import annotations

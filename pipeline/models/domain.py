@@ -2,15 +2,15 @@
 
 The domain is on the model card. Two things may be asked of a model.
 
-- Its answer to a file of queries (`twillight evaluate`): kinds and yarns that it never saw are refused; within a kind it
-  is asked beyond the trained ranges, for whoever wrote the file wants this model's answer.
+- Its answer to a file of queries (`twillight evaluate`): kinds and yarns that it never saw are refused; within a kind
+  it is asked beyond the trained ranges, for whoever wrote the file wants this model's answer.
 - Its share of a scene (`pipeline.models.fallback`): there the ranges hold as well, and what lies beyond them is
-  `strange`. A footprint may be smaller or larger than those trained on by `_SLACK` of the range's logarithm, and
-  directions `ANGLE` degrees steeper, so that a model trained up to 89 degrees is asked about all; cloth bent more than
-  any that was seen is strange at once. Of one thing the answer beyond is known: a footprint over `AVERAGED` of the
-  repeat and more sees its average, so that where training reached that far, a larger footprint is asked as the largest
-  one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of a variation of period 1, at .5
-  less than a hundredth.
+  `strange`. Footprints may be smaller or larger than those trained on by `_SLACK` of the range's logarithm, and
+  directions `ANGLE` degrees steeper, so that a model trained up to 89 degrees is asked about all of them; cloth bent
+  more than any that was seen is strange at once. Of one thing the answer beyond is known: a footprint of `AVERAGED`
+  repeats sees the repeat's average, so that where training reached that far, larger footprints are asked as the largest
+  one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what varies with period 1: at
+  .5 less than a hundredth.
 """
 
 from __future__ import annotations

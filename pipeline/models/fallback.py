@@ -81,7 +81,7 @@ class Fallback:
         return behind if self._domain is None else behind | self._domain.strange(fabric, self._nearest(queries))
 
     def _known(self, fabric: Fabric, queries: Queries) -> Queries:
-        """Return queries as the method is asked: in the nearest form, averages of the repeat at a size it was taught."""
+        """Return queries as the method is asked: in the nearest form, no larger than where it learnt the average."""
         nearest = self._nearest(queries)
         return nearest if self._domain is None else self._domain.within(fabric, nearest)
 
