@@ -84,7 +84,9 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     from pipeline.scenes.catalogue import load_scene
 
     general = load_recipe(recipe)
-    found = {name: saved(name, out, general) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)}
+    found = {
+        name: saved(name, out, general, recipe) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
+    }
     console = Console()
     for rows in found.values():
         console.print(_table(rows), "")
@@ -95,8 +97,8 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     console.print(f"the numbers: {path}", soft_wrap=True, highlight=False)
 
 
-def saved(scene: str, out: Path, general: Recipe) -> list[Saving]:
-    """Return what a scene, by its name, takes by the general recipe and by its own."""
+def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]:
+    """Return what a scene, by its name, takes by the general recipe, which is run by the name `run`, and by its own."""
     path = out / "recipes" / f"require-{scene}.toml"
     if not path.is_file():
         raise BadInput("savings", "scene", scene, f"there is no {path}; write it with `twillight require {scene}`")
@@ -107,9 +109,9 @@ def saved(scene: str, out: Path, general: Recipe) -> list[Saving]:
         raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
     same = next(one for one in general.models if one.options.name == name)
     sides = []
-    for whole, chosen, run in ((general, same, general.name), (own, model, str(path))):
-        costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), run)
-        sides.append(costs | _measured(out, whole.name, scene, model, run))
+    for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
+        costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
+        sides.append(costs | _measured(out, whole.name, scene, model, called))
     theirs, ours = sides
     return [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
 
@@ -140,9 +142,7 @@ def _costs(
     asked = {task.id for task in plan(recipe)}
     tasks = [task for task in whole if task.id in asked and task.stage in ("generate", "train")]
     if left := [task for task in tasks if ledger.state(task) != "done"]:
-        allowed = (
-            f"{len(left)} of the {len(tasks)} tasks behind {model.options.name} are not done; `twillight run {run}`"
-        )
+        allowed = f"{len(left)} of {len(tasks)} tasks behind {model.options.name} are not done; `twillight run {run}`"
         raise BadInput("savings", "recipe", recipe.name, allowed)
     shards, trainings = ([task for task in tasks if task.stage == stage] for stage in ("generate", "train"))
     cards = [json.loads((ledger.out / task.products[1]).read_bytes()) for task in trainings]
