@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jobs.comparing import records_file
+from jobs.leftovers import left_to_quadrature
 from jobs.narrow_recipe import EFFORT, savings, write_recipe
 from jobs.recipe import ModelRecipe, Recipe, load_recipe
 from weaves.errors import BadInput
@@ -23,7 +24,6 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pipeline.models.domain import Domain
     from pipeline.scenes.requirement import Requirement
     from pipeline.truth.query import Queries
     from reports.options import SceneBenchOptions
@@ -175,33 +175,13 @@ def _options(changes: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-class _Taught:
-    """What is known of a method before it is loaded."""
-
-    name = setting = ""
-
-    def __init__(self, domain: Domain | None) -> None:
-        self.domain = domain
-
-
 def _left(
     model: ModelRecipe, asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
 ) -> float | None:
     """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
-    import numpy as np
-
-    from pipeline.models.domain import Domain
-    from pipeline.models.fallback import Fallback
-
-    learnt_from = [*(general.seen + general.population)]
-    if model.of_one_material:
-        if not set(fabrics) <= {fabric.name for fabric in general.seen + general.unseen}:
-            return None
-        learnt_from = [*fabrics.values()]
-    domain = Domain.of(general.dataset.model_dump(mode="json"), learnt_from) if model.learns else None
-    method: Any = _Taught(domain)
-    fallback = Fallback(method, model.options.kinds, general.bench.scenes.footprint)
-    return float(np.concatenate([fallback.strange(fabrics[name], queries) for name, queries in asked.items()]).mean())
+    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.seen + general.unseen}:
+        return None
+    return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in asked.items()])
 
 
 def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:

@@ -4,7 +4,8 @@ Rows and seconds of ground truth and training come from the ledger, queries lear
 errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
 alone: the rows that this method learns from and is measured on, and its own training. Seconds depend on what else a
 machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
-frames of point sampling at 2 points, timed in turns with it.
+frames of point sampling at 2 points, timed in turns with it. Last comes what either model leaves to quadrature in the
+general recipe's other scenes: a scene's own model answers for its domain, and for no other.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from jobs.ledger import Ledger
+from jobs.leftovers import left_to_quadrature
 from jobs.narrow_recipe import alone
 from jobs.plan import plan
 from jobs.recipe import ModelRecipe, Recipe, load_recipe
@@ -113,7 +115,8 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]
         costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
         sides.append(costs | _measured(out, whole.name, scene, model, called))
     theirs, ours = sides
-    return [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    found = [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    return found + list(_elsewhere(scene, out, general, same, own, model))
 
 
 def verdict(rows: Sequence[Saving]) -> str:
@@ -176,6 +179,22 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     base = next((one for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"), None)
     relative = found["frame_time"].value / base.value if base else math.nan
     return values | {("frame_time over 2 points", "1"): Value(relative)}
+
+
+def _elsewhere(
+    scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
+) -> Iterator[Saving]:
+    """Yield what either model leaves to quadrature in the general recipe's other scenes, whose frames are there."""
+    from reports.scene_frames import read_shot
+
+    for task in plan(general):
+        if task.setting.get("make") != "shot" or Ledger(out).state(task) != "done":
+            continue
+        shot = read_shot(out / task.products[0])
+        if shot.name != scene:
+            asked = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
+            shares = (Value(left_to_quadrature(*of, asked)) for of in ((same, general), (model, own)))
+            yield Saving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
 
 
 def _value(record: Record) -> Value:
