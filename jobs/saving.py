@@ -38,6 +38,10 @@ MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_ti
 """Records of a method on a scene that are held side by side."""
 
 
+DIFFERENCE: Final = "mse, own less general"
+"""Quantity that pairs both pictures, pixel by pixel (`reports.paired_error`)."""
+
+
 class Value(NamedTuple):
     """A number and, where it has one, its 95 % interval (of times the quartiles)."""
 
@@ -58,9 +62,9 @@ class Saving(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """How many times less it is by the scene's own recipe; infinite for nothing, nan for nothing in either."""
+        """How many times less it is by the scene's own recipe; infinite where it takes nothing, nan of nothing."""
         a, b = self.general.value, self.narrow.value
-        return a / b if b else math.inf if a else math.nan
+        return math.nan if not a else a / b if b else math.inf
 
 
 def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
@@ -116,25 +120,25 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]
         sides.append(costs | _measured(out, whole.name, scene, model, called))
     theirs, ours = sides
     found = [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    found += _difference(scene, out, (general, own), model)
     return found + list(_elsewhere(scene, out, general, same, own, model))
 
 
 def verdict(rows: Sequence[Saving]) -> str:
-    """Say in a sentence what a scene's recipe saves and whether it errs more."""
+    """Say in a sentence what a scene's recipe saves, and at which error."""
     by = {row.quantity: row for row in rows}
     generated, learnt, error = by["queries generated"], by["queries learnt from"], by["mse"]
     fewer = [f"{generated.ratio:.1f} times fewer queries to generate"]
     if not math.isnan(learnt.ratio):
         fewer.append(f"{learnt.ratio:.1f} times fewer to learn from")
-    if error.narrow.value <= error.general.value:
-        said = "at no more error"
-    elif (error.narrow.low or 0.0) <= (error.general.high or math.inf):
-        said = "at an error whose interval overlaps the general one's"
-    else:
-        said = "at a larger error"
+    ratio = f"MSE {error.narrow.value:.2g} in place of {error.general.value:.2g}"
+    if DIFFERENCE in by:
+        low, high = by[DIFFERENCE].narrow[1:]
+        proven = "less" if (high or 0.0) < 0.0 else "more" if (low or 0.0) > 0.0 else "no difference shown"
+        ratio += f", paired: {proven}"
     most = max(one.ratio for one in (generated, learnt) if not math.isnan(one.ratio))
     short = "" if most >= ENOUGH else f"; less than {ENOUGH:g} times"
-    return f"{rows[0].scene}, {rows[0].method}: {', '.join(fewer)}, {said}{short}."
+    return f"{rows[0].scene}, {rows[0].method}: {', '.join(fewer)}; {ratio}{short}."
 
 
 def _costs(
@@ -165,8 +169,7 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     from reports.record import OF_A_PAGE, read_records
     from reports.summary import BASELINE
 
-    method, knobs = model.options.name, model.options.knobs
-    setting = f"k = {knobs[0]}" if knobs else ""
+    method, setting = model.options.name, _setting(model)
     path = out / "report" / page / OF_A_PAGE
     if not path.is_file():
         raise BadInput("savings", "recipe", page, f"it has no page in {out / 'report'}; `twillight run {run}` first")
@@ -179,6 +182,34 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     base = next((one for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"), None)
     relative = found["frame_time"].value / base.value if base else math.nan
     return values | {("frame_time over 2 points", "1"): Value(relative)}
+
+
+def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
+    """Return how much more the scene's own model errs; nothing where a picture or the truth's frames are not there."""
+    from reports.exr import read_exr
+    from reports.paired_error import mse_difference
+    from reports.pictures import RGB
+    from reports.scene_frames import read_shot
+
+    name, setting = model.options.name, _setting(model)
+    pictures, frames = [], None
+    for task in (task for recipe in recipes for task in plan(recipe)):
+        if task.setting.get("make") == "shot" and task.spec["scene"]["name"] == scene:
+            frames = out / task.products[0]
+        asked = task.setting.get("scene") == scene and task.setting.get("model", {}).get("name") == name
+        if task.setting.get("make") == "scene" and asked and setting in task.setting["pictures_of"]:
+            pictures.append(out / task.setting["pictures_of"][setting])
+    if len(pictures) != 2 or frames is None or not all(path.is_file() for path in (*pictures, frames)):
+        return []
+    first = read_shot(frames).first()
+    a, b = (read_exr(path).stack(*RGB) for path in pictures)
+    difference = mse_difference(a, b, first.pictures()[0], first.lit[0], recipes[0].bench.scenes.image)
+    return [Saving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
+
+
+def _setting(model: ModelRecipe) -> str:
+    """Return the first of a model's settings, of which a scene's recipe has one."""
+    return f"k = {model.options.knobs[0]}" if model.options.knobs else ""
 
 
 def _elsewhere(
