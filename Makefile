@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/installed
 
-.PHONY: report run list plan generate check train bench status test test-slow lint clean
+.PHONY: report run list plan generate check train bench status savings test test-slow lint clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -16,6 +16,17 @@ list: $(READY)
 
 plan generate check train bench status: $(READY)
 	@$(BIN)/twillight $@ $(RECIPE)
+
+# What the recipes of three scenes save against the general one, which runs first if it has not; it goes on where it was.
+savings: $(READY)
+	@$(BIN)/twillight run $(RECIPE)
+	@$(BIN)/twillight require sphere --recipe $(RECIPE) --method woven --set hidden=64
+	@$(BIN)/twillight require table --recipe $(RECIPE) --method woven
+	@$(BIN)/twillight require roll --recipe $(RECIPE) --method neumip --effort .75
+	@$(BIN)/twillight run out/recipes/require-sphere.toml
+	@$(BIN)/twillight run out/recipes/require-table.toml
+	@$(BIN)/twillight run out/recipes/require-roll.toml
+	@$(BIN)/twillight savings $(RECIPE) sphere table roll
 
 test: lint
 	$(BIN)/python -m pytest -m "not slow"

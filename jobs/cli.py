@@ -259,12 +259,30 @@ def require(
     recipe: Annotated[str, Parameter(help="General recipe whose page holds the measurements.")] = "quick",
     frames: Annotated[int, Parameter(help="Frames of the camera's way to look at.")] = 4,
     margin: Annotated[float, Parameter(help="Factor by which ranges are widened.")] = 1.25,
+    method: Annotated[str, Parameter(help="Method of the general recipe; left out: the cheapest.")] = "",
+    effort: Annotated[float, Parameter(help="Share of its rows a fabric and of its steps to learn from.")] = 0.25,
+    set_: Annotated[
+        list[str], Parameter(name="--set", help="Option of the method that is other than there: hidden=64.")
+    ] = [],  # noqa: B006
     out: Out = OUT,
 ) -> None:
     """Tell what a scene requires and write the cheapest recipe that meets a wish."""
     from jobs.requiring import require as required
 
-    required(scene, out, recipe, error, time, frames, margin)
+    required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
+
+
+@app.command(sort_key=14)
+def savings(
+    recipe: RecipeName,
+    scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, have run.")],
+    *,
+    out: Out = OUT,
+) -> None:
+    """Tell what scenes' own recipes saved against the general one, and at which error."""
+    from jobs.saving import savings as saved
+
+    saved(scenes, out, recipe)
 
 
 def main(tokens: Sequence[str] | None = None) -> int:

@@ -15,6 +15,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
 from pipeline.models.options import ModelOptions
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
@@ -178,7 +180,7 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
         file.about,
         dataset,
         file.models,
-        file.bench,
+        _with_scenes(file.bench, path),
         seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
         population=tuple(population_fabrics(dataset.population)),
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
@@ -198,6 +200,23 @@ def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
         else:
             allowed = f"a preset or the path of a .toml file beside the recipe is needed; {nearest(name, known)}"
             raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
+
+
+def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
+    """Return measurements whose scenes are there, paths being found from wherever the recipe is read."""
+    found = []
+    for index, name in enumerate(bench.scenes.names):
+        path = recipe.parent / name if "\0" not in name else Path()
+        if name not in SHIPPED and not (path.suffix in (".toml", ".xml") and path.is_file()):
+            allowed = "a scene of the package or the path of a .toml or .xml file beside the recipe is needed; "
+            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED))
+        found.append(name if name in SHIPPED else str(path.resolve()))
+    scenes = [load_scene(name).name for name in found]
+    for index, name in enumerate(scenes):
+        if name in scenes[:index]:
+            allowed = "names of scenes must differ, because files are called by them"
+            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed)
+    return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(found)})})
 
 
 def _refuse_contradictions(recipe: Recipe, where: str) -> None:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jobs.comparing import records_file
-from jobs.narrow_recipe import savings, write_recipe
+from jobs.leftovers import left_to_quadrature
+from jobs.narrow_recipe import EFFORT, savings, write_recipe
 from jobs.recipe import ModelRecipe, Recipe, load_recipe
 from weaves.errors import BadInput
+from weaves.errors import nearest as nearest_name
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -28,7 +31,18 @@ if TYPE_CHECKING:
 _SAMPLE = 2000  # questions by which quadrature is timed
 
 
-def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames: int, margin: float) -> None:
+def require(
+    scene: str,
+    out: Path,
+    recipe: str,
+    error: float,
+    ms: float,
+    frames: int,
+    margin: float,
+    method: str = "",
+    effort: float = EFFORT,
+    changes: Sequence[str] = (),
+) -> None:
     """Print what a scene asks and which method meets the wish, and write its recipe.
 
     Parameters
@@ -45,6 +59,12 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
         Frames that are looked at, spread over the camera's way.
     margin : float
         By how much ranges are widened (`Requirement.of`).
+    method : str
+        Wish: a method of the general recipe; the front's own choice if empty.
+    effort : float
+        Share of the general recipe's rows a fabric and of its steps that a training takes.
+    changes : sequence of str
+        Options of the model that are other than there, each as ``key = value`` in TOML.
 
     Raises
     ------
@@ -54,23 +74,35 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
     """
     from rich.console import Console
 
-    from reports.choice import cheapest, nearest, predictions, with_measured
+    from reports.choice import cheapest, nearest, of_method, predictions, with_measured
     from reports.equal_time import size_table
     from reports.record import read_records
     from reports.summary import rows, scene_table
 
-    if not (error > 0 and ms > 0 and margin >= 1 and frames >= 1):
-        raise BadInput(
-            "require", "error, time, margin, frames", (error, ms, margin, frames), "must be > 0, margin >= 1"
-        )
+    for key, value, allowed in (
+        ("error", error, "> 0"),
+        ("time", ms, "> 0"),
+        ("frames", frames, ">= 1"),
+        ("margin", margin, ">= 1"),
+        ("effort", effort, "> 0"),
+    ):
+        if not (value > 0 if allowed == "> 0" else value >= 1):
+            raise BadInput("require", f"--{key}", value, f"must be {allowed}")
     general = load_recipe(recipe)
+    options = _options(changes)
+    names = [model.options.name for model in general.models]
+    if method and method not in names:
+        raise BadInput(
+            "require", "--method", method, f"{general.name} has no such method; {nearest_name(method, names)}"
+        )
     records = read_records([records_file(out, general.name)])
     sizes = size_table(records)
     if sizes.empty:
         raise BadInput(str(out), "recipe", recipe, "its page has no errors by the size of footprints; run it again")
-    asked, fabrics = _questions(scene, frames, general.bench.scenes)
+    asked, worn = _questions(scene, frames, general.bench.scenes)
+    fabrics = {name: fabric for name, (_, fabric) in worn.items()}
     requirement = _requirement(scene, asked, frames, margin)
-    left = {model.options.name: _left(model, requirement, fabrics, general) for model in general.models}
+    left = {model.options.name: _left(model, asked, fabrics, general) for model in general.models}
     quadrature = _quadrature(asked, fabrics)
     shares = {name: share for name, share in left.items() if share is not None}
     table = predictions(sizes, requirement.sizes, requirement.questions, shares, quadrature)
@@ -78,6 +110,9 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
     console = Console()
     console.print(_asked_table(requirement), "")
     console.print(_choice_table(rows(table)), "")
+    if method and (table := of_method(table, method)).empty:
+        allowed = "it was not measured on footprints of these sizes, or does not know the scene's fabrics"
+        raise BadInput("require", "--method", method, allowed)
     chosen = cheapest(table, error, ms)
     if chosen is None:
         near = "; ".join(
@@ -87,7 +122,7 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
         wish = f"{100 * error:g} % in {ms:g} ms a frame"
         raise BadInput("require", "wish", wish, f"no method meets it; the nearest points of the front are {near}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
-    write_recipe(path, requirement, general, chosen.method, chosen.setting)
+    write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options)
     name = f"{chosen.method} {chosen.setting}".strip()
     console.print(
         f"{name}: {100 * chosen.error:.2g} % in {chosen.ms:.3g} ms a frame ({chosen.known}). {savings(path, general)}",
@@ -95,8 +130,10 @@ def require(scene: str, out: Path, recipe: str, error: float, ms: float, frames:
     )  # fmt: skip
 
 
-def _questions(scene: str, frames: int, options: SceneBenchOptions) -> tuple[dict[str, Queries], dict[str, Fabric]]:
-    """Return all questions of some frames about each fabric, by its name, and the fabrics."""
+def _questions(
+    scene: str, frames: int, options: SceneBenchOptions
+) -> tuple[dict[str, Queries], dict[str, tuple[str, Fabric]]]:
+    """Return all questions of some frames about each fabric, by its name; and what names each fabric, and itself."""
     import numpy as np
 
     from pipeline.scenes.catalogue import load_scene
@@ -110,8 +147,8 @@ def _questions(scene: str, frames: int, options: SceneBenchOptions) -> tuple[dic
     fabrics = {}
     for index in np.linspace(0, max(described.frames - 1, 0), frames):
         for key, gbuffer in render(loaded, float(index), options.size).gbuffers.items():
-            fabric = loaded.cloths[key][1]
-            fabrics[fabric.name] = fabric
+            cloth, fabric = loaded.cloths[key]
+            fabrics[fabric.name] = (cloth.fabric or key, fabric)
             found.setdefault(fabric.name, []).append(gbuffer.queries(fabric.weave.repeat))
     return {
         name: Queries(*(np.concatenate([getattr(part, column) for part in parts]) for column in Queries._fields))
@@ -127,11 +164,24 @@ def _requirement(scene: str, asked: Mapping[str, Queries], frames: int, margin: 
     return Requirement.of(load_scene(scene).name, frames, asked, EDGES[:-1], SIZES, margin)
 
 
-def _left(model: ModelRecipe, requirement: Requirement, fabrics: Mapping[str, Fabric], general: Recipe) -> float | None:
+def _options(changes: Iterable[str]) -> dict[str, Any]:
+    """Return options from ``key = value`` in TOML."""
+    found: dict[str, Any] = {}
+    for change in changes:
+        try:
+            found |= tomllib.loads(change)
+        except ValueError as error:
+            raise BadInput("require", "--set", change, "must be KEY=VALUE as in TOML, such as hidden=64") from error
+    return found
+
+
+def _left(
+    model: ModelRecipe, asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
+) -> float | None:
     """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
-    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.fabrics}:
+    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.seen + general.unseen}:
         return None
-    return requirement.viewer_behind if "behind" in model.options.kinds else requirement.not_in_front
+    return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in asked.items()])
 
 
 def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:

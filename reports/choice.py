@@ -89,6 +89,11 @@ def _with_front(table: pd.DataFrame) -> pd.DataFrame:
     return found.sort_values("ms", kind="stable", ignore_index=True)
 
 
+def of_method(table: pd.DataFrame, method: str) -> pd.DataFrame:
+    """Return the rows of one method, which is on its own front."""
+    return _with_front(table.loc[table["method"] == method, list(COLUMNS)])
+
+
 def cheapest(table: pd.DataFrame, error: float = math.inf, ms: float = math.inf) -> Any | None:
     """Return the row that meets a wish: within both limits, of least time; of least error if only time is limited.
 

@@ -69,9 +69,11 @@ def build(options: BtfAutoencoderOptions, fabrics: Sequence[Fabric]) -> UnifiedB
 
 def restore(options: BtfAutoencoderOptions, trained: Trained) -> list[BtfAutoencoder]:
     """Return one method that holds all trained fabrics."""
-    methods, domain = {}, None
+    methods, domains = {}, []
     for card, weights in trained:
         network, domain = restored(options, card, weights)
         (fabric,) = card["fabrics"]
         methods[fabric["optics"]] = UnifiedBtf(network, domain)
-    return [BtfAutoencoder(options.name, methods, domain)]
+        domains.append(domain)
+    known = [domain for domain in domains if domain is not None]
+    return [BtfAutoencoder(options.name, methods, Domain.joined(known) if known else None)]

@@ -1,15 +1,26 @@
 """What a trained model was taught: kinds of questions and cloths outside of it are refused, never guessed at.
 
-The domain is on the model card. Within a kind that it knows a model is asked beyond the trained ranges: larger
-footprints are the average of the repeat, smaller ones nearly points, and grazing angles are close to those it saw.
+The domain is on the model card. Two things may be asked of a model.
+
+- Its answer to a file of queries (`twillight evaluate`): kinds and yarns that it never saw are refused; within a kind
+  it is asked beyond the trained ranges, for whoever wrote the file wants this model's answer.
+- Its share of a scene (`pipeline.models.fallback`): there the ranges hold as well, and what lies beyond them is
+  `strange`. Footprints may be smaller or larger than those trained on by `_SLACK` of the range's logarithm, and
+  directions `ANGLE` degrees steeper, so that a model trained up to 89 degrees is asked about all of them; cloth bent
+  more than any that was seen is strange at once. Of one thing the answer beyond is known: a footprint of `AVERAGED`
+  repeats sees the repeat's average, so that where training reached that far, larger footprints are asked as the largest
+  one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what varies with period 1: at
+  .5 less than a hundredth.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict
 
 from pipeline.shards.queries import QueryOptions
@@ -22,7 +33,13 @@ PHYSICS: Final = ("footprint", "frame", "normaliser", "geometry", "shadows", "va
 """Options of the truth that decide what is learnt, not how exactly."""
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
-_SLACK: Final = 0.02  # of a range, that a fabric may lie outside
+_SLACK: Final = 0.02  # of a range, that a fabric or a footprint may lie outside
+
+ANGLE: Final = 1.0
+"""Degrees by which a direction may be steeper than the steepest trained on."""
+
+AVERAGED: Final = 0.5
+"""Standard deviation of a footprint that sees the average of the repeat, in repeats."""
 
 
 class Domain(BaseModel):
@@ -49,6 +66,58 @@ class Domain(BaseModel):
                 name: (min(min(n[name]) for n in numbers), max(max(n[name]) for n in numbers)) for name in numbers[0]
             },
         )
+
+    @classmethod
+    def joined(cls, domains: Sequence[Domain]) -> Domain:
+        """Return the domain of networks that know one fabric each, trained on queries of the same distribution."""
+        first = domains[0]
+        yarns = {
+            name: (min(one.yarns[name][0] for one in domains), max(one.yarns[name][1] for one in domains))
+            for name in first.yarns
+        }
+        return first.model_copy(update={"yarns": yarns})
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Which of `behind`, `stretch` and `curvature` were trained on."""
+        queries = self.queries
+        taught = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
+        return frozenset(kind for kind, there in taught.items() if there)
+
+    def strange(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+        """Say which queries about a fabric lie beyond the ranges trained on, (N,); all if its yarns do.
+
+        Kinds that were not trained on at all are no matter of ranges (`faults`).
+        """
+        if not self.knows(fabric):
+            return np.ones(len(queries.u), np.bool_)
+        options = self.queries
+        low, high = options.sigma
+        slack = (high / low) ** _SLACK + 1e-6
+        size = _size(queries)
+        result = (size < low / slack) | ((size > high * slack) & ~self._averaged(fabric, queries))
+        if options.stretch > 1.0:
+            result |= queries.sigma > options.stretch * (1.0 + _SLACK) * queries.sigma_minor
+        if options.curvature[1] > 0.0:
+            result |= queries.curvature > options.curvature[1]
+        if options.max_angle + ANGLE < 90.0:
+            steepest = math.cos(math.radians(options.max_angle + ANGLE))
+            result |= np.minimum(np.abs(queries.wi[:, 2]), np.abs(queries.wo[:, 2])) < steepest
+        return np.asarray(result)
+
+    def within(self, fabric: Fabric, queries: Queries) -> Queries:
+        """Return queries whose footprints, where they see the average of the repeat, are no larger than trained on."""
+        averaged = self._averaged(fabric, queries)
+        if not averaged.any():
+            return queries
+        shrunk = np.where(averaged, self.queries.sigma[1] / _size(queries), 1.0).astype(np.float32)
+        return queries._replace(sigma=queries.sigma * shrunk, sigma_minor=queries.sigma_minor * shrunk)
+
+    def _averaged(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+        """Say which footprints, larger than any trained on, would see the average of the repeat at that size, (N,)."""
+        size, high = _size(queries), self.queries.sigma[1]
+        narrow = high * queries.sigma_minor / size
+        return np.asarray((size > high) & (narrow >= AVERAGED * max(fabric.weave.repeat)))
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""
@@ -104,6 +173,17 @@ class Domain(BaseModel):
 def domain_of(card: Mapping[str, Any]) -> Domain | None:
     """Return the domain on a model card, if there is one."""
     return Domain.model_validate(card["domain"]) if "domain" in card else None
+
+
+def joined_domain(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
+    """Return the domain of networks that know one fabric each, from their cards."""
+    found = [domain for domain in map(domain_of, cards) if domain is not None]
+    return Domain.joined(found) if found else None
+
+
+def _size(queries: Queries) -> npt.NDArray[np.float64]:
+    """Return the root of the product of each footprint's axes, the size that `QueryOptions.sigma` speaks of."""
+    return np.asarray(np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor))
 
 
 def _numbers(fabric: Fabric) -> dict[str, list[float]]:

@@ -3,8 +3,9 @@
 Footprints are ellipses and cloth is curved; many methods know round footprints and flat cloth only, and a renderer that
 had nothing else would ask them so: the ellipse becomes the round footprint of equal area (or of its major axis, which
 blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, nor for yarns unlike those
-that a network was trained on, such as open cloth where it saw solid cloth alone: such a query is answered by the
-truth's own quadrature (`stand_in`) and never guessed at. How many those are is part of every result.
+that a network was trained on, such as open cloth where it saw solid cloth alone, nor for footprints and directions
+beyond the ranges that it was trained on (`pipeline.models.domain`): such a query is answered by the truth's own
+quadrature (`stand_in`) and never guessed at. How many those are is part of every result.
 """
 
 from __future__ import annotations
@@ -63,7 +64,11 @@ class Fallback:
 
     def __init__(self, method: Method, kinds: Collection[str], footprint: RoundFootprint = "geometric_mean") -> None:
         self.name, self.setting = method.name, method.setting
-        self._method, self._kinds, self._footprint = method, frozenset(kinds), footprint
+        self._method, self._footprint = method, footprint
+        self._domain: Domain | None = getattr(method, "domain", None)
+        # What it could know it may not have been taught: a scene's own recipe leaves out what never occurs there.
+        taught = self._domain.kinds | getattr(method, "untaught", frozenset()) if self._domain else frozenset(kinds)
+        self._kinds = frozenset(kinds) & taught
 
     def covers(self, fabric: Fabric) -> bool:
         """Tell whether the method covers the fabric."""
@@ -77,11 +82,11 @@ class Fallback:
         """Answer N queries of any kind, float32 (N, 4)."""
         strange = self.strange(fabric, queries)
         if not strange.any():
-            return self._method.predict(fabric, self._nearest(queries), seed)
+            return self._method.predict(fabric, self._known(fabric, queries), seed)
         result = np.empty((len(strange), 4), np.float32)
         result[strange] = stand_in(fabric, queries.take(strange), seed).mean
         if not strange.all():
-            result[~strange] = self._method.predict(fabric, self._nearest(queries.take(~strange)), seed)
+            result[~strange] = self._method.predict(fabric, self._known(fabric, queries.take(~strange)), seed)
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
@@ -90,11 +95,14 @@ class Fallback:
 
     def strange(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Say which queries about a fabric are not the method's but the quadrature's, (N,)."""
-        domain: Domain | None = getattr(self._method, "domain", None)
-        if domain is not None and not domain.knows(fabric):
-            return np.ones(len(queries.u), np.bool_)
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
-        return queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
+        behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
+        return behind if self._domain is None else behind | self._domain.strange(fabric, self._nearest(queries))
+
+    def _known(self, fabric: Fabric, queries: Queries) -> Queries:
+        """Return queries as the method is asked: in the nearest form, no larger than where it learnt the average."""
+        nearest = self._nearest(queries)
+        return nearest if self._domain is None else self._domain.within(fabric, nearest)
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

@@ -8,7 +8,7 @@ from typing import Generic
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.domain import Domain, domain_of
+from pipeline.models.domain import Domain, joined_domain
 from pipeline.models.method import Net, Trained, loaded
 from pipeline.models.per_fabric import PerFabric
 from weaves.fabric import Fabric
@@ -62,10 +62,9 @@ def restored(trained: Trained, make: Callable[[tuple[int, int]], Net]) -> tuple[
 
     `make` returns an untrained network for a repeat (ends, picks).
     """
-    networks, domain = {}, None
+    networks = {}
     for card, weights in trained:
-        domain = domain_of(card)
         (fabric,) = card["fabrics"]
         ends, picks = fabric["repeat"]
         networks[fabric["optics"]] = loaded(make((ends, picks)), weights)
-    return networks, domain
+    return networks, joined_domain([card for card, _ in trained])

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -154,6 +154,9 @@ class Selvage:
         What it was taught; anything that the sums know if left out.
     """
 
+    untaught: ClassVar[frozenset[str]] = frozenset({"stretch"})
+    """Kinds of queries that it knows without training: what an ellipse weighs is the sums' business."""
+
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self.bound = network.options.bound
@@ -238,7 +241,6 @@ class Selvage:
 
     def _refuse(self, queries: Queries) -> None:
         if self.domain is not None:
-            # The sums know footprints of any shape; what the network corrects is in their nodes.
             self.domain.refuse(queries._replace(sigma_minor=queries.sigma), self.name)
         refuse_other(queries, self.name, stretch=True)
 

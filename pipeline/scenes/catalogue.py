@@ -6,7 +6,7 @@ frames = 24
 step = [0.001, 0.0, 0.0]     # of the camera, from frame to frame
 
 [cloths.denim]               # what shapes with the BSDF id fabric_denim wear
-fabric = "denim"             # a preset, or the path of a fabric's TOML
+fabric = "denim"             # a preset, or a fabric's TOML beside this file
 yarns = [400.0, 300.0]       # yarn spacings in one unit of u and of v
 """
 
@@ -42,9 +42,20 @@ def load_scene(name_or_path: str | Path) -> Scene:
         table = read_toml(path)
         if isinstance(table.get("source"), str):
             table["source"] = path.parent / table["source"]
-        return validated(Scene, table, str(path))
+        return _with_fabrics(validated(Scene, table, str(path)), path.parent)
     if path.suffix == ".xml":
         name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60]
         return Scene(name=name, source=path)
     allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "
     raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED))
+
+
+def _with_fabrics(scene: Scene, folder: Path) -> Scene:
+    """Return a scene whose fabrics' files lie beside it, wherever it is read from."""
+    cloths = {
+        key: cloth.model_copy(update={"fabric": str(folder / cloth.fabric)})
+        if cloth.fabric.endswith(".toml")
+        else cloth
+        for key, cloth in scene.cloths.items()
+    }
+    return scene.model_copy(update={"cloths": cloths})

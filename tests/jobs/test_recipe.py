@@ -1,3 +1,4 @@
+import json
 import tomllib
 
 import pytest
@@ -5,7 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from jobs.recipe import load_recipe, recipe_names
+from pipeline.scenes.catalogue import load_scene
 from weaves.errors import BadInput
+from weaves.fabric import load_fabric
 
 
 @pytest.mark.parametrize("name", recipe_names())
@@ -81,6 +84,40 @@ def test_bad_input_is_one_sentence(files, old, new, words):
     assert "\n" not in sentence and ".toml" in sentence
     for word in words:
         assert word in sentence, sentence
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["spere"], ["bench.scenes.names.0 = 'spere'", "did you mean 'sphere'", "known: curtain, drape"]),
+        (["sphere", "attic.toml"], ["bench.scenes.names.1 = 'attic.toml'", "beside the recipe"]),
+        (["sphere", "sphere"], ["bench.scenes.names.1 = 'sphere'", "must differ"]),
+        (["own.toml"], ["own.toml", "unknown key"]),
+        (["a\0b.toml"], ["bench.scenes.names.0"]),
+        ([""], ["bench.scenes.names.0 = ''"]),
+    ],
+)
+def test_scenes_that_are_not_there_are_one_sentence(files, names, words):
+    files.text += f"[bench.scenes]\nnames = {json.dumps(names)}\n"
+    with pytest.raises(BadInput) as caught:
+        load_recipe(files.write())
+    sentence = str(caught.value)
+    assert "\n" not in sentence and ".toml" in sentence
+    for word in words:
+        assert word in sentence, sentence
+
+
+def test_scenes_beside_the_recipe_are_found_from_anywhere(files, tmp_path, monkeypatch):
+    (files.folder / "attic.xml").write_text("<scene version='3.0.0'/>")
+    (files.folder / "loft.toml").write_text('name = "loft"\nsource = "attic.xml"\n[cloths.a]\nfabric = "own.toml"\n')
+    files.text += '[bench.scenes]\nnames = ["sphere", "attic.xml", "loft.toml"]\n'
+    path = files.write()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    names = load_recipe(path).bench.scenes.names
+    assert names == ("sphere", str(files.folder / "attic.xml"), str(files.folder / "loft.toml"))
+    scene = load_scene(names[2])
+    assert load_fabric(scene.cloths["a"].fabric).name == "own" and scene.source.is_file()
 
 
 def test_the_unseen_draft_must_be_kept_out_of_the_population(files):

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pipeline.models.domain import Domain
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -55,3 +58,92 @@ def test_yarns_outside_the_trained_ranges_are_refused():
 def test_other_physics_is_refused_naming_both():
     with pytest.raises(BadInput, match=r"truth: frame = 'macro'.*frame = 'ply'"):
         PLAIN.refuse_truth(TruthOptions(frame="macro"), "m")
+
+
+NARROW = Domain.of({"queries": {"sigma": [0.2, 3.0], "max_angle": 60.0}}, FABRICS)
+DENIM = FABRICS[0]  # its repeat is 4 by 4
+
+
+def one(sigma=1.0, minor=None, light=10.0, viewer=10.0, curvature=0.0):
+    """A single query: axes in yarn spacings, angles to the normal in degrees."""
+    queries = draw_queries(QueryOptions(), (4, 4), 1, 0, 1)
+
+    def towards(angle):
+        return np.array([[np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))]], np.float32)
+
+    columns = {"sigma": sigma, "sigma_minor": minor or sigma, "curvature": curvature}
+    columns = {name: np.array([value], np.float32) for name, value in columns.items()}
+    return queries._replace(wi=towards(light), wo=towards(viewer), **columns)
+
+
+@pytest.mark.parametrize(
+    ("asked", "strange"),
+    [
+        ({}, False),
+        ({"sigma": 0.2}, False),
+        ({"sigma": 0.19}, False),  # 2 % of the logarithm of 15, a factor of 1.056
+        ({"sigma": 0.18}, True),
+        ({"sigma": 0.01}, True),
+        ({"light": 60.9}, False),
+        ({"light": 61.2}, True),
+        ({"viewer": 75.0}, True),
+        ({"viewer": 61.2, "light": -20.0}, True),
+    ],
+)
+def test_scenes_are_asked_within_the_trained_ranges(asked, strange):
+    assert NARROW.strange(DENIM, one(**asked)).tolist() == [strange]
+    # A file of queries may ask for more: it is this model's answer that is wanted.
+    NARROW.refuse(one(**asked), "m")
+
+
+def test_trained_up_to_89_degrees_it_is_asked_about_all():
+    assert not PLAIN.strange(DENIM, one(light=89.99, viewer=89.99)).any()
+
+
+def test_large_footprints_are_known_where_training_saw_the_average_of_the_repeat():
+    """A Gaussian of 3 yarns is the average of a repeat of 4 to exp(-2 pi^2 .75^2) = 2e-5; of 8-end satin it is not."""
+    huge = one(sigma=30.0)
+    assert not NARROW.strange(DENIM, huge).any()
+    assert NARROW.strange(load_fabric("satin_8"), huge).all()
+    asked = NARROW.within(DENIM, huge)
+    np.testing.assert_allclose([asked.sigma, asked.sigma_minor], 3.0, rtol=1e-6)
+    truth = TruthOptions(estimator="quadrature", relative_error=1e-4)
+    found, reference = (estimate(DENIM, queries, truth, 0).mean for queries in (asked, huge))
+    np.testing.assert_allclose(found, reference, rtol=2e-3)
+
+
+def test_of_ellipses_it_is_the_narrow_axis_that_must_see_the_average():
+    domain = Domain.of({"queries": {"sigma": [0.2, 3.0], "stretch": 16.0}}, FABRICS)
+    assert not domain.strange(DENIM, one(sigma=8.0, minor=4.0)).any()
+    assert domain.strange(DENIM, one(sigma=40.0, minor=4.0)).all()
+    assert domain.strange(DENIM, one(sigma=3.4, minor=0.2)).all()  # axes of 17 : 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(sigma=st.floats(0.01, 100.0), high=st.floats(0.2, 16.0))
+def test_what_is_asked_lies_within_what_was_taught(sigma, high):
+    """Whatever is not strange is asked at most 2 % of the range's logarithm beyond it; nothing else is changed."""
+    domain, queries = Domain.of({"queries": {"sigma": [0.1, high]}}, FABRICS), one(sigma=sigma)
+    asked = domain.within(DENIM, queries)
+    slack = 1.001 * (high / 0.1) ** 0.02
+    if not domain.strange(DENIM, queries).any():
+        assert 0.1 / slack <= asked.sigma.item() <= high * slack
+    if sigma < 0.999 * high or high < 0.499 * 4:  # single precision
+        assert asked is queries
+
+
+def test_cloth_bent_more_than_any_that_was_seen_is_strange():
+    domain = Domain.of({"queries": {"curvature": [0.01, 0.2]}}, FABRICS)
+    assert [domain.strange(DENIM, one(curvature=kappa)).item() for kappa in (0.1, 0.2, 0.21)] == [False, False, True]
+
+
+def test_networks_of_one_fabric_each_know_all_of_theirs():
+    alone = [Domain.of({}, [fabric]) for fabric in FABRICS]
+    assert not alone[0].knows(FABRICS[1])
+    joined = Domain.joined(alone)
+    assert joined == Domain.of({}, FABRICS) and all(joined.knows(fabric) for fabric in FABRICS)
+
+
+def test_kinds_are_those_that_were_trained_on():
+    assert PLAIN.kinds == frozenset()
+    assert Domain.of({"queries": WIDE.model_dump()}, FABRICS).kinds == {"behind", "stretch", "curvature"}

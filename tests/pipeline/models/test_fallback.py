@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pipeline.models
+from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT, Fallback, stand_in
 from pipeline.models.options import PointSampledOptions
 from pipeline.models.registry import load_methods, load_model
@@ -116,6 +117,38 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
     wrong = stand_in(fabric, queries, 0).mean - reference
     mean = reference.sum(axis=1).mean()
     assert np.sqrt(np.square(wrong).sum(axis=1).mean()) < bound * mean
+
+
+def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_method():
+    fabric, method = load_fabric("voile"), Seen()
+    method.domain = Domain.of({"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}}, [fabric])
+    queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
+    fallback = Fallback(method, ())
+    strange = fallback.strange(fabric, queries)
+    cosine = np.cos(np.radians(60.0))
+    steep = np.minimum(queries.wi[:, 2], queries.wo[:, 2]) < cosine
+    small = queries.sigma < 0.3
+    assert 0 < strange.sum() < 400 and strange[small & steep].all()
+    # The repeat of a plain weave is 2: a footprint of 1 yarn sees its average, and larger ones are asked as that.
+    assert not strange[~small & ~steep].any()
+    found = fallback.predict(fabric, queries)
+    assert (found[~strange] == 1.0).all()
+    np.testing.assert_array_equal(found[strange], stand_in(fabric, queries.take(strange), 0).mean)
+    (asked,) = method.asked
+    assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
+
+
+def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own():
+    """A recipe narrowed to a scene without light from behind teaches none, though the model could learn it."""
+    fabric, queries, method = load_fabric("voile"), mixed(), Seen()
+    method.domain = Domain.of({}, [fabric])
+    fallback = Fallback(method, {"behind", "stretch", "curvature"})
+    strange = fallback.strange(fabric, queries)
+    assert strange[queries.behind].all()
+    fallback.predict(fabric, queries)
+    (asked,) = method.asked
+    assert not asked.curvature.any() and not asked.behind.any()
+    np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
 
 
 @pytest.mark.parametrize("rows", [0, 7])
