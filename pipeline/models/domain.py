@@ -50,6 +50,11 @@ class Domain(BaseModel):
             },
         )
 
+    def with_yarns(self, other: Domain) -> Domain:
+        """Return this domain with ranges of yarns that hold those of another one too."""
+        both = {name: (*own, *other.yarns[name]) for name, own in self.yarns.items()}
+        return self.model_copy(update={"yarns": {name: (min(ends), max(ends)) for name, ends in both.items()}})
+
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""
         if found := self.faults(queries, model):

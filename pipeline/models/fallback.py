@@ -2,15 +2,16 @@
 
 Footprints are ellipses and cloth is curved; many methods know round footprints and flat cloth only, and a renderer that
 had nothing else would ask them so: the ellipse becomes the round footprint of equal area (or of its major axis, which
-blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, nor for yarns unlike those
-that a network was trained on, such as open cloth where it saw solid cloth alone: such a query is answered by the
-truth's `quadrature`, at `ERROR`, and never guessed at. How many those are is part of every result.
+blurs and never aliases), the curvature is left out, or cut at the steepest that was taught. Nothing stands in for light
+from behind, nor for yarns unlike those that a network was trained on, such as open cloth where it saw solid cloth
+alone: such a query is answered by the truth's `quadrature`, at `ERROR`, and never guessed at. How many those are is
+part of every result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,14 @@ ERROR: Final = 0.1
 
 QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=ERROR)
 """What steps in."""
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """A method that knows curved cloth, but not however steep."""
+
+    def steepest(self, fabric: Fabric) -> float:
+        """Return the largest curvature that it answers for, in 1/yarn spacings."""
 
 
 class Fallback:
@@ -59,11 +68,11 @@ class Fallback:
         """Answer N queries of any kind, float32 (N, 4)."""
         strange = self.strange(fabric, queries)
         if not strange.any():
-            return self._method.predict(fabric, self._nearest(queries), seed)
+            return self._method.predict(fabric, self._nearest(fabric, queries), seed)
         result = np.empty((len(strange), 4), np.float32)
         result[strange] = estimate(fabric, queries.take(strange), QUADRATURE, seed).mean
         if not strange.all():
-            result[~strange] = self._method.predict(fabric, self._nearest(queries.take(~strange)), seed)
+            result[~strange] = self._method.predict(fabric, self._nearest(fabric, queries.take(~strange)), seed)
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
@@ -78,7 +87,7 @@ class Fallback:
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
         return queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
 
-    def _nearest(self, queries: Queries) -> Queries:
+    def _nearest(self, fabric: Fabric, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""
         if "stretch" not in self._kinds:
             size = queries.sigma
@@ -86,5 +95,8 @@ class Fallback:
                 size = np.sqrt(queries.sigma * queries.sigma_minor)
             queries = queries._replace(sigma=size, sigma_minor=size, angle=np.zeros_like(size))
         if "curvature" not in self._kinds:
-            queries = queries._replace(curvature=np.zeros_like(queries.curvature))
+            return queries._replace(curvature=np.zeros_like(queries.curvature))
+        if isinstance(self._method, Limited):
+            steepest = np.float32(self._method.steepest(fabric))
+            return queries._replace(curvature=np.minimum(queries.curvature, steepest))
         return queries

@@ -58,13 +58,14 @@ class OneMaterial(Generic[Net]):
 
 
 def restored(trained: Trained, make: Callable[[tuple[int, int]], Net]) -> tuple[dict[str, Net], Domain | None]:
-    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught.
+    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught together.
 
     `make` returns an untrained network for a repeat (ends, picks).
     """
     networks, domain = {}, None
     for card, weights in trained:
-        domain = domain_of(card)
+        taught = domain_of(card)
+        domain = domain.with_yarns(taught) if domain and taught else taught
         (fabric,) = card["fabrics"]
         ends, picks = fabric["repeat"]
         networks[fabric["optics"]] = loaded(make((ends, picks)), weights)
