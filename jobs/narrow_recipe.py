@@ -25,6 +25,7 @@ _TEST_ROWS = 4096
 def write_recipe(path: Path, requirement: Requirement, general: Recipe, method: str, setting: str) -> None:
     """Write the recipe of one method in the scene's domain, and read it back: it must be one."""
     (model,) = (model for model in general.models if model.options.name == method)
+    general = general.teacher_of(model)
     options = model.options.model_dump(mode="json", exclude_defaults=True) | {
         "model": model.options.model,
         "name": method,

@@ -129,7 +129,8 @@ def _requirement(scene: str, asked: Mapping[str, Queries], frames: int, margin: 
 
 def _left(model: ModelRecipe, requirement: Requirement, fabrics: Mapping[str, Fabric], general: Recipe) -> float | None:
     """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
-    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.fabrics}:
+    taught = {fabric.name for fabric in general.teacher_of(model).fabrics}
+    if model.of_one_material and not set(fabrics) <= taught:
         return None
     return requirement.viewer_behind if "behind" in model.options.kinds else requirement.not_in_front
 
