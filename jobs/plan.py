@@ -39,12 +39,12 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
         if model.learns
     }
     trainings = [task for tasks in trained.values() for task in tasks.values()]
-    # Of another recipe's rows those that its models learn from.
-    read = {need for training in trainings for need in training.needs}
-    others = [part.task for there in taught.values() for part in there if part.task.id in read]
-    rows = _once([*(part.task for part in parts), *others])
+    rows = [part.task for part in parts]
+    for name, there in taught.items():  # of another recipe's rows those that its model learns from
+        read = {need for training in trained.get(name, {}).values() for need in training.needs}
+        rows += [part.task for part in there if part.task.id in read]
     benches = list(bench_tasks(recipe, parts, trained))
-    return [*rows, *trainings, *benches, _report_task(recipe, parts, trained, benches, alone)]
+    return [*_once(rows), *trainings, *benches, _report_task(recipe, parts, trained, benches, alone)]
 
 
 def _once(tasks: Iterable[Task]) -> list[Task]:

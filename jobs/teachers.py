@@ -88,7 +88,7 @@ def _taken(
     teacher = load(entry["recipe"], f"{key}.recipe")
     known = {model.options.name: model for model in teacher.models}
     name = entry.get("name", entry.get("model"))
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         called = "name" if "name" in entry else "model"
         allowed = f"must be a model of the recipe {teacher.name}; {nearest_name(str(name), list(known))}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
