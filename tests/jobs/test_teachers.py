@@ -72,6 +72,7 @@ name = "woven_sheer"
 transmission = true
 """
 
+FINE = '\n[[models]]\nmodel = "neumip"\nname = "fine"\nrecipe = "twin.toml"\n'
 SHEER = '\n[[models]]\nname = "woven_sheer"\nrecipe = "sheer.toml"\n'
 
 
@@ -169,7 +170,7 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files)
     """The other recipe has the same rows of denim: one task, two files."""
     same = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"own.toml"]', '"voile"]')
     same = same.replace('model = "neumip"', 'model = "neumip"\nname = "fine"')
-    recipe = asks(same, '\n[[models]]\nmodel = "neumip"\nname = "fine"\nrecipe = "twin.toml"\n', "twin")
+    recipe = asks(same, FINE, "twin")
     tasks = plan(recipe)
     assert len({task.id for task in tasks}) == len(tasks)
     products = [path for task in tasks for path in task.products]
@@ -184,19 +185,16 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files)
 
 def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
     """`generate` makes the rows of both recipes; either folder is whole, with a manifest of its own."""
-    twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace(
-        'model = "neumip"', 'model = "neumip"\nname = "fine"'
-    )
     for old, new in (
         ("train = 2500", "train = 150"),
         ("validation = 100", "validation = 70"),
+        ("test = 500", "test = 70"),
         ("count = 3", "count = 0"),
+        ("relative_error = 0.05", "relative_error = 0.5"),
     ):
-        files.recipe, twin = files.recipe.replace(old, new), twin.replace(old, new)
-    files.recipe, twin = (
-        text.replace("test = 500", "test = 70").replace("0.05\n\n", "0.5\n\n") for text in (files.recipe, twin)
-    )
-    asks(twin, '\n[[models]]\nmodel = "neumip"\nname = "fine"\nrecipe = "twin.toml"\n', "twin")
+        files.recipe = files.recipe.replace(old, new)
+    twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"neumip"', '"neumip"\nname = "fine"')
+    asks(twin, FINE, "twin")
     out = tmp_path / "out"
     assert main(["generate", str(files.path), "--out", str(out), "--workers", "1"]) == 0
     ledger = Ledger(out)
