@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
+from jobs.contradictions import refuse_contradictions
 from jobs.teachers import refuse_unlike, with_teachers
 from pipeline.models.options import ModelOptions
 from pipeline.shards.queries import QueryOptions
@@ -224,7 +225,7 @@ def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
         teachers=teachers,
     )
-    _refuse_contradictions(recipe, where)
+    refuse_contradictions(recipe, where)
     refuse_unlike(recipe, where)
     return recipe
 
@@ -250,45 +251,3 @@ def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
         else:
             allowed = f"a preset or the path of a .toml file beside the recipe is needed; {nearest(name, known)}"
             raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
-
-
-def _refuse_contradictions(recipe: Recipe, where: str) -> None:
-    """Refuse sections that do not fit together."""
-    for key, names in (
-        ("dataset", [fabric.name for fabric in recipe.fabrics]),
-        ("models", [model.options.name for model in recipe.models]),
-    ):
-        for name in names:
-            if names.count(name) > 1:
-                raise BadInput(where, key, name, "names must differ, because files are called by them")
-    if recipe.population and not recipe.dataset.rows.population:
-        raise BadInput(where, "dataset.rows.population", 0, "must be > 0 when dataset.population.count is")
-    # Where a seen fabric has the same draft, it is the yarns that are unseen.
-    seen = {fabric.weave.canonical() for fabric in recipe.seen}
-    unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen if fabric.weave.canonical() not in seen}
-    for member in recipe.population:
-        if fabric := unseen.get(member.weave.canonical()):
-            allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
-            raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
-    truth, training_truth = recipe.dataset.truth, recipe.dataset.truth_of("train")
-    for name in ("footprint", "frame", "normaliser", "geometry", "shadows", "variation"):
-        if (value := getattr(training_truth, name)) != getattr(truth, name):
-            allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
-            raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
-    queries = recipe.dataset.queries
-    asked = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-    plain = TruthOptions()
-    if recipe.bench.bounds and (kinds := [kind for kind, there in asked.items() if there]):
-        raise BadInput(where, "bench.bounds", True, f"the bound does not know queries with {' and '.join(kinds)}")
-    for index, model in enumerate(recipe.models):
-        for kind in (kind for kind, there in asked.items() if there and kind not in model.options.kinds):
-            allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
-            raise BadInput(where, f"models.{index}.name", model.options.name, allowed)
-        for name in () if model.options.any_physics else ("frame", "normaliser", "geometry", "shadows", "variation"):
-            if (value := getattr(truth, name)) != (own := getattr(plain, name)):
-                allowed = f"{model.options.name} (models.{index}) knows {name} = {own!r} only"
-                raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        footprint = getattr(model.options, "footprint", truth.footprint)
-        if footprint != truth.footprint:
-            key = f"models.{index}.footprint"
-            raise BadInput(where, key, footprint, f"must be that of dataset.truth, {truth.footprint!r}")
