@@ -32,27 +32,28 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
     alone : mapping
         Files of Records that no task writes and the page shows, each with its hash.
     """
-    parts, taught = shards(recipe), {name: shards(teacher) for name, teacher in recipe.teachers.items()}
-    trained = {
-        model.options.name: train_tasks(recipe.teacher_of(model), model, taught.get(model.options.name, parts))
-        for model in recipe.models
-        if model.learns
-    }
+    parts = {id(one): shards(one) for one in recipe.together}
+    own = parts[id(recipe)]
+    rows = [part.task for part in own]
+    trained = {}
+    for model in (model for model in recipe.models if model.learns):
+        teacher = recipe.teacher_of(model)
+        tasks = trained[model.options.name] = train_tasks(teacher, model, parts[id(teacher)])
+        # Of another recipe's rows those that its model learns from.
+        read = {need for task in tasks.values() for need in task.needs}
+        rows += [part.task for part in parts[id(teacher)] if part.task.id in read]
     trainings = [task for tasks in trained.values() for task in tasks.values()]
-    rows = [part.task for part in parts]
-    for name, there in taught.items():  # of another recipe's rows those that its model learns from
-        read = {need for training in trained.get(name, {}).values() for need in training.needs}
-        rows += [part.task for part in there if part.task.id in read]
-    benches = list(bench_tasks(recipe, parts, trained))
-    return [*_once(rows), *trainings, *benches, _report_task(recipe, parts, trained, benches, alone)]
+    benches = list(bench_tasks(recipe, own, trained))
+    return [*_once(rows), *trainings, *benches, _report_task(recipe, own, trained, benches, alone)]
 
 
 def _once(tasks: Iterable[Task]) -> list[Task]:
     """Return each task once: a shard of two data sets is made once and lies in both folders."""
     found: dict[str, Task] = {}
     for task in tasks:
-        products = found[task.id].products if task.id in found else ()
-        found[task.id] = replace(task, products=tuple(dict.fromkeys((*products, *task.products))))
+        if first := found.get(task.id):
+            task = replace(first, products=tuple(dict.fromkeys((*first.products, *task.products))))
+        found[task.id] = task
     return list(found.values())
 
 

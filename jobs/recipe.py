@@ -167,6 +167,11 @@ class Recipe:
         """The models that no other recipe trains."""
         return [model for model in self.models if model.options.name not in self.teachers]
 
+    @property
+    def together(self) -> list[Recipe]:
+        """The recipes whose rows are read: itself and those that train models of it, each once."""
+        return list({id(recipe): recipe for recipe in (self, *self.teachers.values())}.values())
+
     def teacher_of(self, model: ModelRecipe) -> Recipe:
         """Return the recipe that trains a model: this one, unless the model names another."""
         return self.teachers.get(model.options.name, self)
@@ -201,15 +206,18 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
 
 def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
     """Read a recipe for those that ask for it, each of which is named in the one before."""
-    where = str(path)
+    where, read = str(path), dict[Path, Recipe]()
 
     def load(name: object, key: str) -> Recipe:
         found = _beside(path, name, key)
+        if found in read:
+            return read[found]
         chain = (*asking, path, found)
         if found.resolve() in [one.resolve() for one in chain[:-1]]:
             told = " → ".join(one.stem for one in chain)
             raise BadInput(where, key, name, f"recipes must not wait for one another: {told}")
-        return _load(found, chain[:-1])
+        read[found] = _load(found, chain[:-1])
+        return read[found]
 
     content, teachers = with_teachers(read_toml(path), where, load)
     file = validated(_File, content, where)

@@ -35,7 +35,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
     console = Console()
     ledger = Ledger(out)
     with ledger.held():
-        manifests = [ManifestFile(one, shards(one), ledger) for one in (recipe, *recipe.teachers.values())]
+        manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]
 
         def recorded(task: Task) -> None:
             for manifest in manifests:
