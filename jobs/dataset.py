@@ -120,11 +120,12 @@ def _questions(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     """Cut every fabric's splits into shards, each with the role of its fabric."""
     rows = recipe.dataset.rows
     named = {"train": rows.train, "validation": rows.validation, "test": rows.test}
-    idle = bool(recipe.models) and not any(model.learns for model in recipe.models)
+    learners = [model for model in recipe.own_models if model.learns]  # those of other recipes read rows of their own
+    idle = bool(recipe.models) and not learners
     if idle:
         named = {"test": rows.test}
     # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
-    unseen = named if any(model.of_one_material for model in recipe.models) else {"test": rows.test}
+    unseen = named if any(model.of_one_material for model in learners) else {"test": rows.test}
     for role, fabrics, splits in (
         ("seen", recipe.seen, named),
         ("population", recipe.population, {} if idle else {"train": rows.population}),

@@ -81,9 +81,7 @@ class Ledger:
             source = next((file for file in sources if self._is_whole(file, receipt, verify=True)), None)
             if source is None:
                 return False
-            with atomic_path(self.out / path) as temporary:
-                temporary.unlink(missing_ok=True)
-                _link(source, temporary)
+            link(source, self.out / path)
         return self.state(task) == "done"
 
     @contextmanager
@@ -154,8 +152,11 @@ def _heading(task: Task) -> dict[str, str]:
     return {"task": task.id, "stage": task.stage, "title": task.title}
 
 
-def _link(source: Path, target: Path) -> None:
-    try:
-        os.link(source, target)
-    except OSError:  # another file system, or one without links
-        shutil.copyfile(source, target)
+def link(source: Path, target: Path) -> None:
+    """Let a second path, whole or not at all, name the same bytes; a copy of them where there are no links."""
+    with atomic_path(target) as temporary:
+        temporary.unlink(missing_ok=True)
+        try:
+            os.link(source, temporary)
+        except OSError:  # another file system, or one without links
+            shutil.copyfile(source, temporary)

@@ -19,7 +19,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import PHYSICS
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
-from reports.options import EXTREMES_VERSION, LATENT_PAIRS
+from reports.options import EXTREMES_VERSION, LATENT_PAIRS, BenchOptions
 from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import Fabric, load_fabric
 
@@ -78,14 +78,15 @@ def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Ma
         for model in recipe.models:
             trainings = trained.get(model.options.name, {})
             training = trainings.get("" if "" in trainings else subject.fabric.name)
-            yield _method_task(recipe, model, subject, parts, [training] if training else [])
+            if training or not model.learns:  # else another recipe trains it, on other cloths
+                yield _method_task(recipe, model, subject, parts, [training] if training else [])
     for model in recipe.models:
         if model.options.blends:
             yield _latents_task(recipe, model, trained[model.options.name][""])
     for name in recipe.bench.scenes.names:
         yield from scene_tasks(recipe, name, trained)
     for model in recipe.models:
-        yield _extremes_task(recipe, model, trained.get(model.options.name, {}))
+        yield from _extremes_tasks(recipe, model, trained.get(model.options.name, {}))
     yield _timing_task(recipe, subjects, parts, trained)
 
 
@@ -140,7 +141,8 @@ def _subject(recipe: Recipe, fabric: Fabric, role: str, parts: Sequence[Shard]) 
 def _truth_task(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> Task:
     """Return the measurements of the truth itself: its noise, and what moves in its frames."""
     name = subject.fabric.name
-    spec = {"measure": "truth", **_asked(recipe, subject, parts)}
+    bench = recipe.bench.model_copy(update={"runtimes": ()})  # the truth has no other way to run
+    spec = {"measure": "truth", **_asked(subject, parts, bench)}
     return Task(
         "bench",
         "truth",
@@ -150,7 +152,7 @@ def _truth_task(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> Tas
         subject.needs,
         cost=0.3,
         size=4000,
-        setting={"make": "truth", **_setting(recipe, subject, parts)},
+        setting={"make": "truth", **_setting(subject, parts, bench)},
     )
 
 
@@ -158,12 +160,12 @@ def _method_task(
     recipe: Recipe, model: ModelRecipe, subject: Subject, parts: Sequence[Shard], trainings: Sequence[Task]
 ) -> Task:
     """Return the measurements of a method on a fabric: errors, pictures, aliasing."""
-    options, bench, name = model.options, recipe.bench, subject.fabric.name
+    options, bench, name = model.options, model.measured(recipe.bench), subject.fabric.name
     spec = {
         "measure": options.version,
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in trainings],
-        **_asked(recipe, subject, parts),
+        **_asked(subject, parts, bench),
     }
     stem = f"{options.name}-{name}-{identity('bench', spec)[:8]}"
     # All knobs are measured; pictures are made of those that the recipe wants to see.
@@ -191,7 +193,7 @@ def _method_task(
             "model": options.model_dump(mode="json"),
             "models": [str(Path(training.products[0]).parent) for training in trainings],
             "pictures": pictures,
-            **_setting(recipe, subject, parts),
+            **_setting(subject, parts, bench),
         },
     )
 
@@ -227,12 +229,16 @@ def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
     )
 
 
-def _extremes_task(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> Task:
-    """Return the measurements of a model's methods at their extremes, on one fabric of each role."""
+def _extremes_tasks(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> Iterator[Task]:
+    """Yield the measurements of a model's methods at their extremes, on one fabric of each role, if it knows any."""
     options = model.options
-    fabrics = [
-        (fabric, role) for role, named in (("seen", recipe.seen), ("unseen", recipe.unseen)) for fabric in named[:1]
+    known = [
+        [fabric for fabric in named if not model.learns or {"", fabric.name} & trainings.keys()]
+        for named in (recipe.seen, recipe.unseen)
     ]
+    fabrics = [(fabric, role) for role, named in zip(("seen", "unseen"), known, strict=True) for fabric in named[:1]]
+    if not fabrics:
+        return
     # Of networks that know one fabric each, those of the fabrics asked about.
     needed = [trainings[key] for key in ("", *(fabric.name for fabric, _ in fabrics)) if key in trainings]
     spec = {
@@ -243,7 +249,7 @@ def _extremes_task(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, T
         "fabrics": [[fabric.name, fabric.optics(), role] for fabric, role in fabrics],
         "physics": recipe.dataset.truth.model_dump(mode="json", include=set(PHYSICS)),
     }
-    return Task(
+    yield Task(
         "bench",
         options.name,
         f"extremes of {options.name}",
@@ -277,6 +283,9 @@ def _timing_task(
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
         "trainings": [task.id for task in trainings],
     }
+    # Said apart from the options where a model has ways of its own.
+    if own := {m.options.name: m.runtimes for m in recipe.models if m.runtimes is not None}:
+        spec["runtimes"] = own
     return Task(
         "bench",
         "timing",
@@ -296,6 +305,7 @@ def _timing_task(
                     "folders": [
                         str(Path(task.products[0]).parent) for task in trained.get(model.options.name, {}).values()
                     ],
+                    "runtimes": model.measured(bench).runtimes,
                 }
                 for model in recipe.models
             ],
@@ -310,26 +320,26 @@ def _look(fabric: Fabric) -> dict[str, Any]:
     return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
 
 
-def _asked(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str, Any]:
-    """Return what every measurement of a fabric depends on."""
+def _asked(subject: Subject, parts: Sequence[Shard], bench: BenchOptions) -> dict[str, Any]:
+    """Return what a measurement of a fabric depends on that measures what `bench` asks."""
     return {
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "bench": recipe.bench.model_dump(mode="json", exclude={*_TIMED, "edge", "scenes"}),
+        "bench": bench.model_dump(mode="json", exclude={*_TIMED, "edge", "scenes"}),
         "fabric": _look(subject.fabric),
         "role": subject.role,
         "truth": fingerprint(subject.needs),
     }
 
 
-def _setting(recipe: Recipe, subject: Subject, parts: Sequence[Shard]) -> dict[str, Any]:
+def _setting(subject: Subject, parts: Sequence[Shard], bench: BenchOptions) -> dict[str, Any]:
     """Return what every measurement of a fabric needs to run."""
     return {
         "dataset": folder_of(parts),
         "fabric": subject.fabric.name,
         "role": subject.role,
         "truth": subject.truth,
-        "options": recipe.bench.model_dump(mode="json"),
+        "options": bench.model_dump(mode="json"),
     }
 
 

@@ -123,12 +123,13 @@ def timing(task: Task, out: Path, progress: Progress) -> None:
     manifest = Manifest.load(folder)
     asked = [(model["options"], model["folders"], out) for model in task.setting["models"]]
     provenance = Provenance(dataset=manifest.fingerprint)
-    loaded = [(_methods(*ask), ask[1]) for ask in asked]
-    methods = [one for found, _ in loaded for one in found]
-    variants = [one for found, folders in loaded for one in _variants(found, folders, options)]
+    benches = [options.model_copy(update={"runtimes": model["runtimes"]}) for model in task.setting["models"]]
+    loaded = [(_methods(*ask), ask[1], bench) for ask, bench in zip(asked, benches, strict=True)]
+    methods = [one for found, *_ in loaded for one in found]
+    variants = [one for found, folders, bench in loaded for one in _variants(found, folders, bench)]
     records = measure_timing(methods + variants, manifest, folder, options, provenance)
     progress(0.6)
-    records += [record for one in methods for record in _not_run(one, options, provenance)]
+    records += [record for found, _, bench in loaded for one in found for record in _not_run(one, bench, provenance)]
     records += measure_by_size(methods, manifest, folder, options, provenance)
     write_records(out / task.products[0], records, this_machine(max(thread_counts(options.threads))))
 

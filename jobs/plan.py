@@ -7,13 +7,15 @@ page by the benchmarks and by what was measured without a recipe.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 from jobs.dataset import Shard, fingerprint_of, folder_of, shards
 from jobs.measurements import bench_tasks
 from jobs.recipe import ModelRecipe, Recipe
+from jobs.scenes import worn
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
 from pipeline.training.options import VERSION as TRAINING_VERSION
@@ -30,11 +32,29 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
     alone : mapping
         Files of Records that no task writes and the page shows, each with its hash.
     """
-    parts = shards(recipe)
-    trained = {model.options.name: train_tasks(recipe, model, parts) for model in recipe.models if model.learns}
+    parts = {id(one): shards(one) for one in recipe.together}
+    own = parts[id(recipe)]
+    rows = [part.task for part in own]
+    trained = {}
+    for model in (model for model in recipe.models if model.learns):
+        teacher = recipe.teacher_of(model)
+        tasks = trained[model.options.name] = train_tasks(teacher, model, parts[id(teacher)])
+        # Of another recipe's rows those that its model learns from.
+        read = {need for task in tasks.values() for need in task.needs}
+        rows += [part.task for part in parts[id(teacher)] if part.task.id in read]
     trainings = [task for tasks in trained.values() for task in tasks.values()]
-    benches = list(bench_tasks(recipe, parts, trained))
-    return [*(part.task for part in parts), *trainings, *benches, _report_task(recipe, parts, trained, benches, alone)]
+    benches = list(bench_tasks(recipe, own, trained))
+    return [*_once(rows), *trainings, *benches, _report_task(recipe, own, trained, benches, alone)]
+
+
+def _once(tasks: Iterable[Task]) -> list[Task]:
+    """Return each task once: a shard of two data sets is made once and lies in both folders."""
+    found: dict[str, Task] = {}
+    for task in tasks:
+        if first := found.get(task.id):
+            task = replace(first, products=tuple(dict.fromkeys((*first.products, *task.products))))
+        found[task.id] = task
+    return list(found.values())
 
 
 def train_tasks(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Task]:
@@ -85,7 +105,7 @@ def _report_task(
         setting={
             "dataset": f"{recipe.name}, {fingerprint_of(parts)}",
             "fabrics": [(fabric.model_dump(mode="json"), role) for fabric, role in fabrics],
-            "models": [_note(model, trained.get(model.options.name, {})) for model in recipe.models],
+            "models": [_note(recipe, model, trained.get(model.options.name, {})) for model in recipe.models],
             "options": recipe.bench.model_dump(mode="json"),
             "records": [task.products[0] for task in benches if task.products[0].endswith(".json")],
             "timing": benches[-1].products[0],
@@ -110,7 +130,7 @@ def _of_scene(task: Task) -> list[dict[str, str]]:
     return [method | {"setting": setting, "path": path} for setting, path in task.setting["pictures_of"].items()]
 
 
-def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
+def _note(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
     """Return what the page says of a model."""
     options, training = model.options, model.training
     about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
@@ -121,6 +141,7 @@ def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
+        about += _taught(recipe, model, trainings)
     return {
         "name": options.name,
         "about": about,
@@ -128,6 +149,21 @@ def _note(model: ModelRecipe, trainings: Mapping[str, Task]) -> dict[str, Any]:
         "per_material": model.of_one_material,
         "kind": options.model,
     }
+
+
+def _taught(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> str:
+    """Say which recipe trains a model, and where it is left out because it does not know the cloth."""
+    if not (teacher := recipe.teachers.get(model.options.name)):
+        return ""
+    said = f"; trained by the recipe {teacher.name}"
+    if teacher.dataset.queries != recipe.dataset.queries:
+        said += ", on queries of its own"
+    if model.of_one_material:
+        unknown = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
+        unknown += [f"the scene {name}" for name in recipe.bench.scenes.names if not worn(name) <= set(trainings)]
+        if unknown:
+            said += f"; left out on {', '.join(unknown)}, of whose cloth it was taught nothing"
+    return said
 
 
 def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Sequence[Shard]) -> Task:

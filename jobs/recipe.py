@@ -8,19 +8,21 @@ material (`neumip`) is in the recipe, and no other model ever reads them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
+from jobs.contradictions import refuse_contradictions
+from jobs.teachers import refuse_unlike, with_teachers
 from pipeline.models.options import ModelOptions
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
-from reports.options import BenchOptions
+from reports.options import BenchOptions, RuntimeName
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import Population, population_fabrics
@@ -75,12 +77,17 @@ class DatasetOptions(_Section):
 
 
 class ModelRecipe(_Section):
-    """A model and how it is trained; in TOML the options stand beside the table ``training``."""
+    """A model and how it is trained; in TOML the options stand beside the table ``training``.
+
+    An entry with the key ``recipe`` names a model of another recipe, which trains it (`jobs.teachers`).
+    """
 
     options: ModelOptions
     """The design."""
     training: TrainingOptions = TrainingOptions()
     """How it is trained."""
+    runtimes: tuple[RuntimeName, ...] | None = None
+    """Ways to run it that are measured too; left out: those of ``bench.runtimes``."""
 
     @property
     def of_one_material(self) -> bool:
@@ -97,14 +104,21 @@ class ModelRecipe(_Section):
     def _split(cls, table: Any) -> Any:
         if not isinstance(table, Mapping):
             return table
-        options = {key: value for key, value in table.items() if key != "training"}
-        return {"options": options} | ({"training": table["training"]} if "training" in table else {})
+        beside = {key: table[key] for key in ("training", "runtimes") if key in table}
+        return {"options": {key: value for key, value in table.items() if key not in beside}} | beside
 
     @model_validator(mode="after")
     def _nothing_idle(self) -> ModelRecipe:
         if not self.learns and "training" in self.model_fields_set:
             raise ValueError(f"{self.options.model} has nothing to train: leave [models.training] out")
+        if not self.learns and self.runtimes is not None:
+            raise ValueError(f"{self.options.model} is no network: leave runtimes out")
         return self
+
+    def measured(self, bench: BenchOptions) -> BenchOptions:
+        """Return what is measured of this model: ways to run a network are no matter of the others."""
+        runtimes = (bench.runtimes if self.runtimes is None else self.runtimes) if self.learns else ()
+        return bench.model_copy(update={"runtimes": runtimes})
 
 
 class _File(_Section):
@@ -131,6 +145,8 @@ class Recipe:
         Measurements.
     seen, population, unseen : tuple of Fabric
         The fabrics in the order of the recipe.
+    teachers : mapping
+        From the names of models that another recipe trains to that recipe.
     """
 
     name: str
@@ -141,11 +157,26 @@ class Recipe:
     seen: tuple[Fabric, ...]
     population: tuple[Fabric, ...]
     unseen: tuple[Fabric, ...]
+    teachers: Mapping[str, Recipe] = field(default_factory=dict)
 
     @property
     def fabrics(self) -> tuple[Fabric, ...]:
         """All fabrics."""
         return self.seen + self.population + self.unseen
+
+    @property
+    def own_models(self) -> list[ModelRecipe]:
+        """The models that no other recipe trains."""
+        return [model for model in self.models if model.options.name not in self.teachers]
+
+    @property
+    def together(self) -> list[Recipe]:
+        """The recipes whose rows are read: itself and those that train models of it, each once."""
+        return list({id(recipe): recipe for recipe in (self, *self.teachers.values())}.values())
+
+    def teacher_of(self, model: ModelRecipe) -> Recipe:
+        """Return the recipe that trains a model: this one, unless the model names another."""
+        return self.teachers.get(model.options.name, self)
 
 
 def recipe_names() -> list[str]:
@@ -172,8 +203,26 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
             allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
             raise BadInput("recipe", "name", str(name_or_path), allowed)
         path = RECIPES / f"{name_or_path}.toml"
-    where = str(path)
-    file = validated(_File, read_toml(path), where)
+    return _load(path, ())
+
+
+def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
+    """Read a recipe for those that ask for it, each of which is named in the one before."""
+    where, read = str(path), dict[Path, Recipe]()
+
+    def load(name: object, key: str) -> Recipe:
+        found = _beside(path, name, key)
+        if found in read:
+            return read[found]
+        chain = (*asking, path, found)
+        if found.resolve() in [one.resolve() for one in chain[:-1]]:
+            told = " → ".join(one.stem for one in chain)
+            raise BadInput(where, key, name, f"recipes must not wait for one another: {told}")
+        read[found] = _load(found, chain[:-1])
+        return read[found]
+
+    content, teachers = with_teachers(read_toml(path), where, load)
+    file = validated(_File, content, where)
     dataset = file.dataset
     recipe = Recipe(
         file.name,
@@ -184,9 +233,21 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
         seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
         population=tuple(population_fabrics(dataset.population)),
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
+        teachers=teachers,
     )
-    _refuse_contradictions(recipe, where)
+    refuse_contradictions(recipe, where)
+    refuse_unlike(recipe, where)
     return recipe
+
+
+def _beside(recipe: Path, name: object, key: str) -> Path:
+    """Return the path of a recipe that another one names: of the package, or beside it."""
+    if name in (known := recipe_names()):
+        return RECIPES / f"{name}.toml"
+    if isinstance(name, str) and name.endswith(".toml") and "\0" not in name and (recipe.parent / name).is_file():
+        return recipe.parent / name
+    allowed = f"a recipe's name or the path of a .toml file beside this one is needed; {nearest(str(name), known)}"
+    raise BadInput(str(recipe), key, name, allowed)
 
 
 def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
@@ -217,45 +278,3 @@ def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
             allowed = "names of scenes must differ, because files are called by them"
             raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed)
     return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(found)})})
-
-
-def _refuse_contradictions(recipe: Recipe, where: str) -> None:
-    """Refuse sections that do not fit together."""
-    for key, names in (
-        ("dataset", [fabric.name for fabric in recipe.fabrics]),
-        ("models", [model.options.name for model in recipe.models]),
-    ):
-        for name in names:
-            if names.count(name) > 1:
-                raise BadInput(where, key, name, "names must differ, because files are called by them")
-    if recipe.population and not recipe.dataset.rows.population:
-        raise BadInput(where, "dataset.rows.population", 0, "must be > 0 when dataset.population.count is")
-    # Where a seen fabric has the same draft, it is the yarns that are unseen.
-    seen = {fabric.weave.canonical() for fabric in recipe.seen}
-    unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen if fabric.weave.canonical() not in seen}
-    for member in recipe.population:
-        if fabric := unseen.get(member.weave.canonical()):
-            allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
-            raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
-    truth, training_truth = recipe.dataset.truth, recipe.dataset.truth_of("train")
-    for name in ("footprint", "frame", "normaliser", "geometry", "shadows", "variation"):
-        if (value := getattr(training_truth, name)) != getattr(truth, name):
-            allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
-            raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
-    queries = recipe.dataset.queries
-    asked = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-    plain = TruthOptions()
-    if recipe.bench.bounds and (kinds := [kind for kind, there in asked.items() if there]):
-        raise BadInput(where, "bench.bounds", True, f"the bound does not know queries with {' and '.join(kinds)}")
-    for index, model in enumerate(recipe.models):
-        for kind in (kind for kind, there in asked.items() if there and kind not in model.options.kinds):
-            allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
-            raise BadInput(where, f"models.{index}.name", model.options.name, allowed)
-        for name in () if model.options.any_physics else ("frame", "normaliser", "geometry", "shadows", "variation"):
-            if (value := getattr(truth, name)) != (own := getattr(plain, name)):
-                allowed = f"{model.options.name} (models.{index}) knows {name} = {own!r} only"
-                raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        footprint = getattr(model.options, "footprint", truth.footprint)
-        if footprint != truth.footprint:
-            key = f"models.{index}.footprint"
-            raise BadInput(where, key, footprint, f"must be that of dataset.truth, {truth.footprint!r}")

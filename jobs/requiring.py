@@ -179,7 +179,8 @@ def _left(
     model: ModelRecipe, asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
 ) -> float | None:
     """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
-    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in general.seen + general.unseen}:
+    teacher = general.teacher_of(model)
+    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in teacher.seen + teacher.unseen}:
         return None
     return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in asked.items()])
 

@@ -27,7 +27,7 @@ def scene_tasks(recipe: Recipe, name: str, trained: Mapping[str, Mapping[str, Ta
     entries = [
         (model, trained.get(model.options.name, {}))
         for model in recipe.models
-        if not model.of_one_material or _worn(name) <= set(trained[model.options.name])
+        if not model.of_one_material or worn(name) <= set(trained[model.options.name])
     ]
     folders = [(model, _needed(name, model, trainings)) for model, trainings in entries]
     for model, trainings in folders:
@@ -132,14 +132,14 @@ def _timing_task(
     )
 
 
-def _worn(name: str) -> set[str]:
+def worn(name: str) -> set[str]:
     """Return the names of the fabrics that a scene shows."""
     return {load_fabric(cloth.fabric or key).name for key, cloth in load_scene(name).cloths.items()}
 
 
 def _needed(name: str, model: ModelRecipe, trainings: Mapping[str, Task]) -> list[Task]:
     """Return the trainings that a model answers a scene with."""
-    return [trainings[fabric] for fabric in sorted(_worn(name))] if model.of_one_material else [*trainings.values()]
+    return [trainings[fabric] for fabric in sorted(worn(name))] if model.of_one_material else [*trainings.values()]
 
 
 def _model(model: ModelRecipe, trainings: Sequence[Task]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from jobs.ledger import link
 from jobs.task import Stage, Task
 
 Progress = Callable[[float], None]
@@ -38,7 +39,10 @@ def _generate(task: Task, out: Path, progress: Progress) -> None:
     from pipeline.shards.generate import ShardTask, generate_shard
 
     question = ShardTask.model_validate(task.setting["question"])
-    generate_shard(question, out / task.products[0], progress)
+    first, *others = (out / path for path in task.products)
+    generate_shard(question, first, progress)
+    for other in others:  # of other data sets that hold it
+        link(first, other)
 
 
 def _train(task: Task, out: Path, progress: Progress) -> None:

@@ -16,7 +16,7 @@ from jobs.plan import plan
 from jobs.recipe import load_recipe
 from jobs.stages import compile_kernels, run
 from jobs.tables import methods_table, summary_table
-from jobs.task import Stage
+from jobs.task import Stage, Task
 from weaves.errors import WorkFailed
 
 
@@ -35,7 +35,12 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
     console = Console()
     ledger = Ledger(out)
     with ledger.held():
-        manifest = ManifestFile(recipe, shards(recipe), ledger)
+        manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]
+
+        def recorded(task: Task) -> None:
+            for manifest in manifests:
+                manifest.add(task)
+
         summary = execute(
             tasks,
             out,
@@ -44,7 +49,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
             scheduler=scheduler,
             workers=workers,
             prepare=compile_kernels if {"generate", "bench"}.intersection(stages) else None,
-            recorded=manifest.add,
+            recorded=recorded,
         )
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:

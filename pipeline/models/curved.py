@@ -206,13 +206,17 @@ class Curved(OneMaterial[CurvedNetwork]):
         network = self._asked(fabric, queries)
         return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
 
+    def steepest(self, fabric: Fabric) -> float:
+        """Return the largest curvature that the fabric's network answers for, in 1/yarn spacings."""
+        limit = self.network_of(fabric).options.largest_curvature
+        return limit if self.domain is None else min(limit, self.domain.queries.curvature[1])
+
     def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
         """Return the fabric's network; BadInput for what it was not taught."""
         network = self.network_of(fabric)
-        limit = network.options.largest_curvature
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-            limit = min(limit, self.domain.queries.curvature[1])
+        limit = self.steepest(fabric)
         beyond = np.flatnonzero(queries.curvature > limit * (1.0 + 1e-6))
         if beyond.size:
             where, value = f"curvature[{beyond[0]}]", float(queries.curvature[beyond[0]])

@@ -58,7 +58,7 @@ class OneMaterial(Generic[Net]):
 
 
 def restored(trained: Trained, make: Callable[[tuple[int, int]], Net]) -> tuple[dict[str, Net], Domain | None]:
-    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught.
+    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught together.
 
     `make` returns an untrained network for a repeat (ends, picks).
     """

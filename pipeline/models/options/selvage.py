@@ -12,7 +12,6 @@ from pipeline.models.options.base import Name, Options, Weight
 class SelvageOptions(Options):
     """Sums over few nodes, corrected by a small network: one for many fabrics and scales; own design."""
 
-    version: ClassVar[int] = 2
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
 
     model: Literal["selvage"] = "selvage"
