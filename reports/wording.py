@@ -49,8 +49,8 @@ DEFINITIONS: Final = {
     "subtracted; elsewhere what the truth scores with as much noise once more: about what a perfect method would. "
     "Differences smaller than that mean nothing.",
     "in the noise": "The mean squared error as measured is no larger than the truth's noise explains: what is left "
-    "after subtracting it is not above 0. It may still be as large as the upper end of its interval, and counts as that "
-    "where the cheapest within an error is named.",
+    "after subtracting it is not above 0. It may still be as large as the upper end of its interval, and counts as "
+    "that where the cheapest within an error is named.",
     "not its own": "Share of a scene's questions that a method does not know (light or a viewer behind the cloth, "
     "cloth unlike what it learnt) and that quadrature answers in its place.",
     "FovVideoVDP": "How visible the differences of the frames are on a display, flicker included, in "
