@@ -8,6 +8,7 @@ MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. What
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from typing import Final
 
@@ -33,8 +34,7 @@ _TIME: Final = "time of a query, ns (one process, side by side)"
 def error_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw the colour's error against the time of a query, with the paper's step, from `tradeoff.tradeoff_table`."""
     table = table.assign(x=table["ns"], y=table["error"])
-    figure = _by_role(scheme, table, _TIME, "relative RMSE of the colour", _percent, paper=True)
-    return figure
+    return _by_role(scheme, table, _TIME, "relative RMSE of the colour", _percent, paper=True)
 
 
 def aliasing_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
@@ -48,7 +48,7 @@ def error_against_bytes(scheme: Scheme, table: pd.DataFrame) -> Figure:
     table = table.assign(x=table["bytes_stored"], y=table["error"], front=table["front_bytes"])
     figure = _by_role(scheme, table, "bytes stored for one fabric", "relative RMSE of the colour", _percent)
     for axes in figure.axes:
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: size(value).replace(".0 ", " ")))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: re.sub(r"\.0+ ", " ", size(value))))
     return figure
 
 
@@ -155,7 +155,7 @@ def _percent(value: float) -> str:
 
 
 def _plain(value: float) -> str:
-    return f"{value:.3g}"
+    return f"{value:.3g}".replace("e-0", "e−")
 
 
 def _name_faults(axes: Axes, worded: Callable[[float], str], most: int | None = None) -> None:

@@ -21,6 +21,13 @@ def scientific(value: float | None) -> str:
     return f"{mantissa}e{int(exponent)}".replace("-", "−")
 
 
+def scientific_interval(low: float, high: float) -> str:
+    """Return both ends in the power of ten of the larger: ``(1.97 … 2.73)e-2``."""
+    exponent = int(f"{max(low, high, key=abs):e}".partition("e")[2])
+    ends = (f"{end / 10.0**exponent:.2f}" for end in (low, high))
+    return f"({' … '.join(ends)})e{exponent}".replace("-", "−")
+
+
 def signed(value: float) -> str:
     """Return a number with its sign; 0 has none."""
     return NONE if missing(value) else ("+" if value > 0 else "") + scientific(value)

@@ -10,7 +10,19 @@ from typing import Any, Final
 import pandas as pd
 
 from reports.cells import Row, groups, row_of
-from reports.numbers import NONE, fixed, fixed_to, missing, percent, scientific, signed, times
+from reports.numbers import (
+    NONE,
+    fixed,
+    fixed_to,
+    missing,
+    percent,
+    scientific,
+    scientific_interval,
+    signed,
+    significant,
+    times,
+)
+from reports.style import NO_BREAK
 from reports.summary import rows
 
 
@@ -25,11 +37,19 @@ class Column:
     floor: str = ""
     """Column of what the truth's noise alone scores."""
 
+    def interval(self, low: float, high: float) -> str:
+        """Return an interval in words; empty where there is none."""
+        if missing(low) or missing(high):
+            return ""
+        if self.worded in (scientific, signed):
+            return scientific_interval(low, high)
+        return " … ".join("0" if end == 0 else self.worded(end).removesuffix(" %") for end in (low, high))
+
 
 COLUMNS: Final = (
     Column("colour", "colour_rrmse", lambda value: percent(value) if value != 0 else "in the noise"),
     Column("MSE", "mse", scientific, "truth_noise"),
-    Column("× lower", "ratio", times),
+    Column(f"×{NO_BREAK}lower", "ratio", times),
     Column("PSNR, dB", "psnr", lambda value: fixed_to(value, 1), "psnr_floor"),
     Column("SSIM", "ssim", fixed, "ssim_floor"),
     Column("FLIP", "flip_ldr", fixed, "flip_ldr_floor"),
@@ -39,7 +59,7 @@ COLUMNS: Final = (
     Column("excess energy", "excess_energy", signed),
     Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
     Column("not its own", "fallback_share", lambda value: percent(value, 0)),
-    Column("ms a frame", "frame_time", lambda value: fixed_to(value, 1)),
+    Column("ms a frame", "frame_time", significant),
 )
 """All that there may be; `scene_columns` says which are shown."""
 
@@ -68,11 +88,6 @@ def scene_rows(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
 
 def _cell(row: Any, column: Column) -> Row:
     """Return a number and its interval, which is empty where there is none."""
-    ends = [getattr(row, f"{column.metric}_{end}", math.nan) for end in ("low", "high")]
-    interval = "" if any(map(missing, ends)) else " … ".join(_end(end, column) for end in ends)
-    return {"text": column.worded(getattr(row, column.metric)), "interval": interval, "best": False}
-
-
-def _end(value: float, column: Column) -> str:
-    """Return an end of an interval; no error is less than nothing."""
-    return "0" if value == 0 else column.worded(value).removesuffix(" %")
+    low, high = (getattr(row, f"{column.metric}_{end}", math.nan) for end in ("low", "high"))
+    text = column.worded(getattr(row, column.metric))
+    return {"text": text, "interval": column.interval(low, high), "best": False}

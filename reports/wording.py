@@ -6,16 +6,17 @@ Nothing is claimed that was not measured: a sentence is only made where both of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import pandas as pd
 
 from pipeline.scenes.options import ViewOptions
 from reports.equal_time import SIZES, WHOLE
+from reports.numbers import significant
 from reports.options import BenchOptions
 from reports.record import TRUTH, Record
-from reports.style import display
+from reports.style import NO_BREAK, display
 from reports.summary import BASELINE, PAPER, of_baseline, rows
 from reports.tiles import DIFFERENCE_RANGE, EXPOSURE
 from reports.tradeoff import FLICKER_LIMITS, LIMITS, cheapest
@@ -48,7 +49,8 @@ DEFINITIONS: Final = {
     "subtracted; elsewhere what the truth scores with as much noise once more: about what a perfect method would. "
     "Differences smaller than that mean nothing.",
     "in the noise": "The mean squared error as measured is no larger than the truth's noise explains: what is left "
-    "after subtracting it is not above 0.",
+    "after subtracting it is not above 0. It may still be as large as the upper end of its interval, and counts as "
+    "that where the cheapest within an error is named.",
     "not its own": "Share of a scene's questions that a method does not know (light or a viewer behind the cloth, "
     "cloth unlike what it learnt) and that quadrature answers in its place.",
     "FovVideoVDP": "How visible the differences of the frames are on a display, flicker included, in "
@@ -107,16 +109,15 @@ def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) ->
     Errors that one method is the cheapest for are named together.
     """
     return [
-        f"{str(role).capitalize()} fabrics, error of the colour: {_cheapest(group, limits, 'ns', 'error')}."
+        f"{str(role).capitalize()} fabrics, error of the colour: {_for_errors(group, limits, 'ns')}."
         for role, group in table.groupby("role", sort=False)
     ]
 
 
-def least_flicker_sentences(table: pd.DataFrame, limits: Sequence[float] = FLICKER_LIMITS) -> list[str]:
-    """Return the same for the flicker of the receding plane, as its distance from the truth's."""
+def least_flicker_sentences(table: pd.DataFrame) -> list[str]:
+    """Return the same for the distance of the receding plane's flicker from the truth's."""
     return [
-        f"{str(role).capitalize()} fabrics, flicker within a distance of the truth’s: "
-        f"{_cheapest(group, limits, 'ns', 'flicker')}."
+        f"{str(role).capitalize()} fabrics, flicker: {_for_flicker(group, 'ns')}."
         for role, group in table.groupby("role", sort=False)
         if group["flicker"].notna().any()
     ]
@@ -131,46 +132,51 @@ def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
         From `summary.scene_table`.
     """
     result = {}
+    # What is lost in the noise may be as large as the upper end of its interval.
+    lost = table["colour_rrmse"] == 0
+    error = table["colour_rrmse"].where(~lost, table["colour_rrmse_high"])
+    table = table.assign(flicker=table["flicker"].abs(), error=error, lost=lost)
     for scene, group in table.groupby("scene", sort=False) if len(table) else ():
-        timed = group[group["frame_time"].notna()].assign(distance=group["flicker"].abs())
-        found = []
+        timed, found = group[group["frame_time"].notna()], []
         if len(timed):
-            within = _cheapest(timed, LIMITS[:3], "frame_time", "colour_rrmse")
+            within = _for_errors(timed, LIMITS[:3], "frame_time")
             found.append(f"Error of the colour: {within}.")
-        if len(timed) and timed["distance"].notna().any():
-            within = _cheapest(timed, FLICKER_LIMITS, "frame_time", "distance")
-            found.append(f"Flicker within a distance of the truth’s: {within}.")
-        lost = [display(row.method, row.setting) for row in rows(group[group["colour_rrmse"] == 0])]
-        if lost:
-            is_ = "is" if len(lost) == 1 else "are"
-            found.append(f"{_and(lost)} {is_} in the noise: no error beyond what the truth’s own explains.")
+        if timed["flicker"].notna().any():
+            found.append(f"Flicker: {_for_flicker(timed, 'frame_time')}.")
+        names = [display(row.method, row.setting) for row in rows(group[group["lost"]])]
+        if names:
+            found.append(f"The error of {_and(names)} is in the noise: the truth’s own explains it all.")
         result[str(scene)] = found
     return result
 
 
-_COSTS: Final[dict[str, Callable[[float], str]]] = {
-    "ns": lambda value: f"{value:,.0f} ns",
-    "frame_time": lambda value: f"{value:.3g} ms",
-}
-_FAULTS: Final[dict[str, Callable[[float], str]]] = {
-    "error": lambda limit: f"{100 * limit:g} %",
-    "colour_rrmse": lambda limit: f"{100 * limit:g} %",
-    "flicker": lambda limit: f"{limit:g}".removeprefix("0"),
-    "distance": lambda limit: f"{limit:g}".removeprefix("0"),
-}
+def _for_errors(table: pd.DataFrame, limits: Sequence[float], cost: str) -> str:
+    """Return what costs least within each `error`."""
+    return _cheapest(table, {limit: f"{100 * limit:g} %" for limit in limits}, cost, "error", "for {}")
 
 
-def _cheapest(table: pd.DataFrame, limits: Sequence[float], cost: str, fault: str) -> str:
+def _for_flicker(table: pd.DataFrame, cost: str) -> str:
+    """Return what costs least within each distance of `flicker` from the truth's."""
+    named = {limit: f"{limit:g}".removeprefix("0") for limit in FLICKER_LIMITS}
+    return _cheapest(table, named, cost, "flicker", "within {} of the truth’s")
+
+
+def _cheapest(table: pd.DataFrame, limits: Mapping[float, str], cost: str, fault: str, where: str) -> str:
     """Return what costs least within each limit; limits that one method is the cheapest for are named together."""
     said: dict[str, list[str]] = {}
-    for limit in limits:
+    for limit, name in limits.items():
         best = cheapest(table, limit, cost, fault)
-        text = f"{display(best.method, best.setting)} ({_COSTS[cost](getattr(best, cost))})" if best else ""
-        said.setdefault(text, []).append(_FAULTS[fault](limit))
-    parts = [f"for {_and(found)} the cheapest is {text}" for text, found in said.items() if text]
+        text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
+        said.setdefault(text, []).append(name)
+    parts = [f"{where.format(_and(found))} the cheapest is {text}" for text, found in said.items() if text]
     if missed := said.get(""):
         parts.append(f"{_and(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
     return "; ".join(parts)
+
+
+def _cost(value: float, cost: str) -> str:
+    """Return the time of a query or of a frame."""
+    return f"{value:,.0f}{NO_BREAK}ns" if cost == "ns" else f"{significant(value)}{NO_BREAK}ms"
 
 
 def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.numbers import fixed, percent, plain, scientific, signed, significant, size, times
+from reports.numbers import fixed, percent, plain, scientific, scientific_interval, signed, significant, size, times
 
 
 @pytest.mark.parametrize(
@@ -11,6 +11,9 @@ from reports.numbers import fixed, percent, plain, scientific, signed, significa
         (scientific(2.62e-3), "2.62e−3"),
         (scientific(None), "–"),
         (scientific(math.nan), "–"),
+        (scientific_interval(8.76e-2, 0.158), "(0.88 … 1.58)e−1"),
+        (scientific_interval(-2e-3, 1e-4), "(−2.00 … 0.10)e−3"),
+        (scientific_interval(0.0, 0.0), "(0.00 … 0.00)e0"),
         (signed(1.0), "+1.00e0"),
         (signed(-0.02), "−2.00e−2"),
         (times(4.12), "4.1×"),

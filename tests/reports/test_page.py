@@ -3,15 +3,21 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import urlparse
 
+import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
 
 from reports import accuracy, bias, effort
+from reports.differences import difference_maps
 from reports.exr import write_exr
+from reports.film import frame_layers
+from reports.filmstrip import GAP
+from reports.image_error import image_errors
 from reports.latents import SHARES
-from reports.options import BenchOptions
+from reports.options import BenchOptions, SceneBenchOptions
 from reports.page import ModelNote, PageInput, write_page
+from reports.pictures import write_picture
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.stability import judge, to_records
 from reports.strips import PictureFile
@@ -276,3 +282,56 @@ def test_what_accuracy_costs_is_shown_where_it_was_measured(written, page_input,
     assert all((tmp_path / link).is_file() for link in page.files)
     # Nothing else on the page takes them for rates or for methods.
     assert "rates" not in page.ids and page.words.count("owen, 64 points") == 2
+
+
+@pytest.fixture
+def scenes(tmp_path):
+    """A page of one scene: three frames by the truth, by a method and by the baseline, which nobody else measured."""
+    random = np.random.default_rng(2)
+    truth = 0.1 + random.random((3, 24, 32, 3))
+    lit = np.ones((24, 32), bool)
+    lit[:6] = False
+    pictures, records = [], []
+    for method, setting, factor in (("truth", "", 1.0), ("woven", "", 1.08), ("point_sampled", "k = 2", 0.6)):
+        path, layers = tmp_path / f"{method}.exr", frame_layers(factor * truth)
+        if method != "truth":
+            found = image_errors(factor * truth[0], truth[0], 0.01 * truth[0], lit)
+            layers |= difference_maps(factor * truth[0], truth[0], found)
+            subject = Record(method=method, setting=setting, scene="attic")
+            records += [*found.records(subject), subject.of("frame_time", 20.0 * factor, 25, unit="ms/frame")]
+            records += [subject.of("colour_rrmse", abs(factor - 1), 900), subject.of("flicker", factor - 1, 3)]
+        write_picture(path, factor * truth[0], np.ones_like(lit), {}, layers=layers)
+        pictures.append(PictureFile("", "attic", method, setting, path))
+    options = BenchOptions(scenes=SceneBenchOptions(names=("attic",), frames=3))
+    models = [ModelNote("woven", "one network"), ModelNote("point_sampled", "nothing is trained")]
+    return PageInput("tiny", "", "0123", "tiny-0123", [], models, options, records, this_machine(1), pictures)
+
+
+def test_scenes_show_intervals_noise_frames_and_maps(scenes, tmp_path):
+    page = Page(write_page(tmp_path / "page", scenes).read_text(encoding="utf-8"))
+    assert "scenes" in page.ids
+    assert all((tmp_path / "page" / link).is_file() for link in page.files)
+    stem = "figures/scene-attic-point_sampled-k-2"
+    assert {"figures/film-attic.png", f"{stem}-flip.png", f"{stem}-relative.png"} <= set(page.files)
+    # Three frames of 32 pixels and their slice over time, all twice as large.
+    film = matplotlib.image.imread(tmp_path / "page" / "figures" / "film-attic.png")
+    assert film.shape[:2] == (2 * (3 * 24 + 2 * GAP), 2 * (4 * 32 + 5 * GAP))
+    # Rows are the truth, woven, which is brighter, and points.
+    rows = film[::2, ::2, :3]
+    truth, woven, points = (rows[top : top + 24, :32].mean() for top in (0, 24 + GAP, 2 * (24 + GAP)))
+    assert points < truth < woven
+    words = page.words
+    assert "for 10 % the cheapest is woven (21.6 ms); 5 % and 2 % are reached by none" in words
+    assert "truth’s noise" in words and "frame 3" in words and "frame 4" not in words
+    assert "pyfvvdp was not installed" in words
+
+
+def test_the_same_scenes_give_the_same_tables(scenes, tmp_path):
+    for name in ("one", "two"):
+        write_page(tmp_path / name, scenes)
+    for path in sorted((tmp_path / "one").rglob("*.*")):
+        if path.suffix in (".csv", ".parquet", ".png", ".html"):
+            assert path.read_bytes() == (tmp_path / "two" / path.relative_to(tmp_path / "one")).read_bytes(), path
+    table = pd.read_csv(tmp_path / "one" / "tables" / "scenes.csv").set_index("method")
+    assert (table["mse_low"] <= table["mse"]).all() and (table["mse"] <= table["mse_high"]).all()
+    assert table["flip_ldr_floor"].nunique() == 1 and (table["flip_ldr_floor"] > 0).all()

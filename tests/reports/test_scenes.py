@@ -1,5 +1,8 @@
 """Frames of a scene and what is measured on them, at a size of a few pixels."""
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,10 +11,11 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.exr import read_exr
+from reports.film import film
 from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
 from reports.scene_bench import measure_scene, time_scene, write_truth
 from reports.scene_frames import read_shot, shoot
-from reports.summary import scene_table
+from reports.summary import SCENE_INTERVALS, scene_table
 from weaves.errors import BadInput
 
 pytest.importorskip("mitsuba")
@@ -91,11 +95,10 @@ def test_noise_of_many_lights_adds_in_quadrature(shot):
     np.testing.assert_allclose(found, own, rtol=1e-6)
 
 
-def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot, tmp_path):
+def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot):
     frames, _ = shot
     methods = [Fallback(Answers(1.0), ALL), Fallback(Answers(1.3), ALL), Fallback(Answers(1.0, covered=False), ALL)]
-    picture = tmp_path / "picture.exr"
-    records = measure_scene(methods, frames, OPTIONS, {"x 1.3": picture})
+    records = measure_scene(methods, frames, OPTIONS, {})
     records += time_scene(methods, frames, OPTIONS)
     table = scene_table(records).set_index("setting")
     assert list(table.index) == ["x 1", "x 1.3"]
@@ -105,8 +108,44 @@ def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot,
     light = (frames.pictures() - frames.base)[0][frames.lit[0]]
     assert bad.mse == pytest.approx(0.09 * np.square(light).mean(), rel=0.1)
     assert good.fallback_share == bad.fallback_share >= 0 and (table.frame_time > 0).all()
-    shown = read_exr(picture).stack("R", "G", "B")
-    np.testing.assert_allclose(shown[~frames.lit[0]], frames.base[0][~frames.lit[0]], rtol=1e-6)
+    # Every number but the energy lies in its interval.
+    for name in SCENE_INTERVALS:
+        assert (table[f"{name}_low"] <= table[name]).all() and (table[name] <= table[f"{name}_high"]).all(), name
+        assert bad[f"{name}_low"] < bad[f"{name}_high"], name
+    assert (table["psnr_floor"] > bad.psnr).all() and (table["truth_noise"] > 0).all()
+
+
+def test_pictures_hold_their_frames_and_differences(shot, tmp_path):
+    frames, _ = shot
+    measure_scene([Fallback(Answers(1.3), ALL)], frames, OPTIONS, {"x 1.3": tmp_path / "picture.exr"})
+    found = read_exr(tmp_path / "picture.exr")
+    shown, lit = film(found), frames.lit
+    np.testing.assert_allclose(shown[~lit], frames.base[~lit], rtol=2e-3, atol=1e-6)
+    assert (shown[lit] >= frames.base[lit] * (1 - 2e-3) - 1e-6).all() and shown.shape == frames.base.shape
+    np.testing.assert_array_equal(found.channels["lit"] > 0, lit[0])
+    # Cloth answers a third too bright: relative differences are positive where the cloth is all there is to see.
+    assert np.median(found.channels["relative.Y"][lit[0]]) > 0.05
+    assert (found.channels["flip_ldr"][lit[0]] >= 0).all() and found.channels["flip_ldr"][lit[0]].mean() > 0.01
+
+
+def test_what_an_eye_sees_is_scored_where_it_can_be(shot, monkeypatch):
+    """A stand-in for pyfvvdp scores 10 less the mean difference of the light it is shown."""
+
+    class Metric:
+        def __init__(self, **about):
+            pass
+
+        def predict(self, film, reference, dim_order, frames_per_second):
+            assert film.shape == reference.shape == (3, 32, 40) and dim_order == "FHW"
+            return 10.0 - float(np.abs(film - reference).mean()), None
+
+    anything = lambda *values, **named: None  # noqa: E731
+    stand_in = SimpleNamespace(fvvdp=Metric, fvvdp_display_photo_eotf=anything, fvvdp_display_geometry=anything)
+    monkeypatch.setitem(sys.modules, "pyfvvdp", stand_in)
+    frames, _ = shot
+    methods = [Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)]
+    table = scene_table(measure_scene(methods, frames, OPTIONS, {})).set_index("setting")
+    assert 10 > table.loc["x 1", "fovvideovdp"] > table.loc["x 1.3", "fovvideovdp"]
 
 
 def test_the_truths_picture_holds_its_noise(shot, tmp_path):
@@ -114,6 +153,7 @@ def test_the_truths_picture_holds_its_noise(shot, tmp_path):
     write_truth(frames, tmp_path / "truth.exr")
     found = read_exr(tmp_path / "truth.exr")
     np.testing.assert_allclose(found.stack("R", "G", "B"), frames.pictures()[0], rtol=1e-6)
+    np.testing.assert_allclose(film(found), frames.pictures(), rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(found.stack("error.R", "error.G", "error.B"), frames.noise()[0], rtol=1e-5, atol=1e-9)
 
 

@@ -64,3 +64,19 @@ def test_nothing_measured_gives_an_empty_table():
     for errors, timing in ((ERRORS[:0], TIMING), (ERRORS, TIMING[:0])):
         table = tradeoff_table(errors, timing)
         assert table.empty and "front" in table
+
+
+def test_flicker_and_bytes_have_fronts_of_their_own():
+    """Flicker counts by its distance from the truth's, on both sides; what was not measured is on no front."""
+    timing = TIMING.assign(bytes_stored=[50.0, 10.0, 10.0, 70.0, 1.0, 1.0, math.nan])
+    aliasing = pd.DataFrame(
+        [("slow", "", "seen", -0.3), ("fast", "k = 1", "seen", 0.2), ("fast", "k = 2", "seen", -0.1)],
+        columns=["method", "setting", "role", "flicker"],
+    )
+    table = tradeoff_table(ERRORS, timing, aliasing)
+    seen = table[table["role"] == "seen"].set_index(["method", "setting"])
+    assert seen.loc[("slow", ""), "flicker"] == pytest.approx(0.3) and math.isnan(seen.loc[("poor", ""), "flicker"])
+    assert set(seen.index[seen["front_flicker"]]) == {("fast", "k = 1"), ("fast", "k = 2")}
+    assert set(seen.index[seen["front_bytes"]]) == {("fast", "k = 2"), ("slow", "")}
+    assert cheapest(seen.reset_index(), 0.15, fault="flicker").setting == "k = 2"
+    assert cheapest(seen.reset_index(), 0.15, cost="bytes_stored").setting == "k = 2"
