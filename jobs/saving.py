@@ -42,6 +42,9 @@ DIFFERENCE: Final = "mse, own less general"
 """Quantity that pairs both pictures, pixel by pixel (`reports.paired_error`)."""
 
 
+_WIDTH: Final = 100  # columns that a table with its intervals takes
+
+
 class Value(NamedTuple):
     """A number and, where it has one, its 95 % interval (of times the quartiles)."""
 
@@ -94,6 +97,7 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
         name: saved(name, out, general, recipe) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
     }
     console = Console()
+    console.width = max(console.width, _WIDTH)
     for rows in found.values():
         console.print(_table(rows), "")
     for rows in found.values():
@@ -237,7 +241,7 @@ def _table(rows: Sequence[Saving]) -> Table:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
-    for name in (f"{rows[0].scene}, {rows[0].method}", "general", "own", "general / own"):
+    for name in (f"{rows[0].scene}, {rows[0].method}", "general", "own", "times less"):
         table.add_column(name, justify="left" if name.startswith(rows[0].scene) else "right")
     for row in rows:
         unit = "" if row.unit == "1" else f", {row.unit}"
@@ -248,7 +252,7 @@ def _table(rows: Sequence[Saving]) -> Table:
 
 def _shown(value: Value) -> str:
     number = f"{value.value:,.0f}" if abs(value.value) >= 1e4 else f"{value.value:.3g}"
-    return number if value.low is None else f"{number} ({value.low:.3g} to {value.high:.3g})"
+    return number if value.low is None else f"{number} ({value.low:.2g} to {value.high:.2g})"
 
 
 def _csv(rows: Sequence[Saving]) -> str:
