@@ -32,6 +32,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     from reports.compare import LEVEL, refuse_other_machine
     from reports.compare import compare as differences
     from reports.record import read_machine, read_records
+    from reports.waiting import busy
 
     files = [records_file(path, recipe) for path in (a, b)]
     first, second = (read_records([file]) for file in files)
@@ -42,7 +43,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     for title, rows in (("time", found.times), ("MSE, 95 % interval", found.errors)):
         if rows:
             console.print(_table(title, rows), "")
-    for sentence in [*unlike, *found.unlike]:
+    for sentence in [*unlike, *found.unlike, *busy(first, second)]:
         console.print(f"{sentence}.", soft_wrap=True, highlight=False)
     left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
     marked = sum(one.verdict not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))

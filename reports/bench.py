@@ -6,6 +6,7 @@ Each function stands alone, so that a task system can run them apart; so do thos
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import count, cycle, islice
@@ -160,6 +161,8 @@ def _times(entries: Sequence[tuple[Record, Contender]], options: BenchOptions) -
         about = subject.model_copy(update={"note": f"{len(contender.questions[0][1].u)} queries a fabric"})
         repeats, samples = len(timing.samples), timing.samples
         records.append(about.of("time", median, repeats, unit="ns/query", low=low, high=high, samples=samples))
+        if math.isfinite(timing.waited):
+            records.append(subject.of("waited", timing.waited, repeats))
     return records
 
 

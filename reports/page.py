@@ -45,6 +45,7 @@ from reports.stability_methods import extremes_table
 from reports.strips import PictureFile, films, strips
 from reports.style import DARK, LIGHT, Scheme, display, render
 from reports.tradeoff import tradeoff_table
+from reports.waiting import waiting
 from reports.wording import (
     DEFINITIONS,
     beaten,
@@ -314,7 +315,12 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
         shown=shown,
         plots=plots,
         definitions=DEFINITIONS,
-        caveats=[*caveats(page.options, per_material, errors), *lacking(page.records), *unseen_by_eye(page.records)],
+        caveats=[
+            *caveats(page.options, per_material, errors),
+            *waiting(page.records),
+            *lacking(page.records),
+            *unseen_by_eye(page.records),
+        ],
         colours={name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for name, scheme in schemes.items()},
         schemes=schemes,
         difference_range=tiles.DIFFERENCE_RANGE,

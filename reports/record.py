@@ -68,6 +68,7 @@ Metric = Literal[
     "excess_energy",
     "spectrum",
     "time",
+    "waited",
     "bytes_stored",
     "peak_memory",
     "prepare_time",

@@ -4,11 +4,13 @@ All methods answer the same queries; they take turns, so that whatever else the 
 called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
 queries of several fabrics in turn, because the cost of the point model depends on the weave. On several threads every
 thread makes that call, as a renderer gives each of its threads a tile of the picture; a method itself never uses more
-than one. Numbers of different machines are never compared.
+than one. Numbers of different machines are never compared. How long a method's only thread waited for others to leave
+the processor is measured beside its time: on a quiet machine next to nothing.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -57,6 +59,8 @@ class Timing(NamedTuple):
     """Of every repeat, in their order."""
     rows: int
     """Queries in each of them."""
+    waited: float = math.nan
+    """Share of the time on one thread in which that thread did not run, because others did; NaN on several threads."""
 
     @property
     def quartiles(self) -> tuple[float, float, float]:
@@ -90,20 +94,24 @@ def time_side_by_side(
     """
     set_threads(1)
     elapsed: list[list[int]] = [[] for _ in contenders]
+    ran = [0] * len(contenders)
     with ThreadPoolExecutor(max((contender.threads for contender in contenders), default=1)) as pool:
         for _ in range(warm_up):
             for contender in contenders:
                 _call(contender, pool)
         for _ in range(repeats):
-            for contender, readings in zip(contenders, elapsed, strict=True):
+            for index, contender in enumerate(contenders):
                 synchronise()
-                start = clock()
+                start, ran_before = clock(), time.thread_time_ns()
                 _call(contender, pool)
                 synchronise()
-                readings.append(clock() - start)
+                elapsed[index].append(clock() - start)
+                ran[index] += time.thread_time_ns() - ran_before
     return [
-        Timing(tuple(reading / contender.rows for reading in readings), contender.rows)
-        for contender, readings in zip(contenders, elapsed, strict=True)
+        Timing(
+            tuple(reading / contender.rows for reading in readings), contender.rows, _waited(contender, readings, own)
+        )
+        for contender, readings, own in zip(contenders, elapsed, ran, strict=True)
     ]
 
 
@@ -171,6 +179,12 @@ def _call(contender: Contender, pool: ThreadPoolExecutor) -> None:
         _answer(contender)
     else:
         list(pool.map(_answer, [contender] * contender.threads))
+
+
+def _waited(contender: Contender, readings: Sequence[int], ran: int) -> float:
+    """Return the share of the readings in which the one thread of a contender did not run."""
+    total = sum(readings)
+    return max(0.0, 1.0 - ran / total) if contender.threads == 1 and total > 0 else math.nan
 
 
 def _answer(contender: Contender) -> None:
