@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 
 NONE = "–"
 
@@ -19,6 +20,11 @@ def scientific(value: float | None) -> str:
         return NONE
     mantissa, _, exponent = f"{value:.2e}".partition("e")
     return f"{mantissa}e{int(exponent)}".replace("-", "−")
+
+
+def beyond_noise(value: float, worded: Callable[[float], str]) -> str:
+    """Return an error in words, or that nothing of it is left after the noise of the truth was subtracted."""
+    return "in the noise" if value <= 0 else worded(value)
 
 
 def scientific_interval(low: float, high: float) -> str:

@@ -12,6 +12,7 @@ import pandas as pd
 from reports.cells import Row, groups, row_of
 from reports.numbers import (
     NONE,
+    beyond_noise,
     fixed,
     fixed_to,
     missing,
@@ -36,26 +37,28 @@ class Column:
     worded: Callable[[float], str]
     floor: str = ""
     """Column of what the truth's noise alone scores."""
+    in_powers: bool = False
+    """Whether intervals are in powers of ten."""
 
     def interval(self, low: float, high: float) -> str:
         """Return an interval in words; empty where there is none."""
         if missing(low) or missing(high):
             return ""
-        if self.worded in (scientific, signed):
+        if self.in_powers:
             return scientific_interval(low, high)
-        return " … ".join("0" if end == 0 else self.worded(end).removesuffix(" %") for end in (low, high))
+        return " … ".join("0" if end <= 0 else self.worded(end).removesuffix(" %") for end in (low, high))
 
 
 COLUMNS: Final = (
-    Column("colour", "colour_rrmse", lambda value: percent(value) if value != 0 else "in the noise"),
-    Column("MSE", "mse", scientific, "truth_noise"),
+    Column("colour", "colour_rrmse", lambda value: beyond_noise(value, percent)),
+    Column("MSE", "mse", lambda value: beyond_noise(value, scientific), "truth_noise", in_powers=True),
     Column(f"×{NO_BREAK}lower", "ratio", times),
     Column("PSNR, dB", "psnr", lambda value: fixed_to(value, 1), "psnr_floor"),
     Column("SSIM", "ssim", fixed, "ssim_floor"),
     Column("FLIP", "flip_ldr", fixed, "flip_ldr_floor"),
     Column("HDR-FLIP", "flip_hdr", fixed, "flip_hdr_floor"),
     Column("ΔE", "delta_e", lambda value: fixed_to(value, 2), "delta_e_floor"),
-    Column("flicker", "flicker", signed),
+    Column("flicker", "flicker", signed, in_powers=True),
     Column("excess energy", "excess_energy", signed),
     Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
     Column("not its own", "fallback_share", lambda value: percent(value, 0)),

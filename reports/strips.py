@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Final
 
 import pandas as pd
 
-from reports.numbers import scientific
+from reports.numbers import beyond_noise, scientific
 from reports.record import TRUTH
 from reports.style import display
 from reports.summary import BASELINE, rows
@@ -76,9 +77,9 @@ def strips(
     found: dict[tuple[str, str], Strip] = {}
     for file in sorted(pictures, key=lambda file: file.method != TRUTH):
         strip = found.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene, order.get(file.fabric, "")))
-        value = mse.get((file.fabric, file.scene, file.method, file.setting))
+        value = mse.get((file.fabric, file.scene, file.method, file.setting), math.nan)
         cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
-        strip.cells.append(cell | {"mse": scientific(value)})
+        strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
     fabrics, places = ({name: index for index, name in enumerate(names)} for names in (order, dict.fromkeys(scenes)))
     return sorted(found.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
 

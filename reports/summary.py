@@ -140,7 +140,8 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms, its quartiles in the Records) and
     `SCENE_FLOORS`; of each of `SCENE_INTERVALS` the ends of its 95 % interval, <metric>_low and <metric>_high; ratio
-    (MSE of 2 points over the method's); front (nothing beats it on both MSE and time in its scene).
+    (MSE of 2 points over the method's); front (nothing beats it on both MSE and time in its scene). An MSE that is not
+    above 0, lost in the noise of the truth, has no ratio and is on no front.
     """
     table = to_table(records)
     metrics = [*SCENE_METRICS, *SCENE_FLOORS]
@@ -155,10 +156,11 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
         wide = wide.merge(part.reset_index(), on=keys)
     wide = wide[[*keys, *metrics, *ends]]
     base = wide[of_baseline(wide)].set_index("scene")["mse"]
-    wide["ratio"] = wide["scene"].map(base) / wide["mse"]
+    found = wide["mse"].where(wide["mse"] > 0)
+    wide["ratio"] = wide["scene"].map(base) / found
     wide["front"] = False
     for _, group in wide.groupby("scene"):
-        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], group["mse"], strict=True)))
+        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], found[group.index], strict=True)))
     return wide.rename_axis(columns=None)
 
 

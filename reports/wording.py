@@ -69,8 +69,9 @@ DEFINITIONS: Final = {
     "memory of a call": "What a call on one thread adds to the process at most, answers included, beyond the bytes "
     "stored. Not of a GPU.",
     "× time": "That time over the time of point sampling at 2 points.",
-    "front": "The methods that no other beats on both error (relative RMSE of the colour) and time. Only methods that "
-    "answer for the same fabrics are compared; an error that is lost in the noise of the truth takes no part.",
+    "front": "The methods that no other beats on both error (relative RMSE of the colour; in scenes, MSE) and time, in "
+    "other plots on what their axes say. Only methods that answer for the same fabrics are compared; an error that is "
+    "lost in the noise of the truth takes no part.",
     "eager-bf16, eager-fp16, compile, onnx, onnx-int8": "A trained network run in another way, of the same weights: "
     "products of matrices in half precision, compiled by torch, by ONNX Runtime, with weights and activations of 8 "
     "bits. What computes in single precision agrees with the network itself to 1e-4.",

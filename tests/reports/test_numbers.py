@@ -2,7 +2,18 @@ import math
 
 import pytest
 
-from reports.numbers import fixed, percent, plain, scientific, scientific_interval, signed, significant, size, times
+from reports.numbers import (
+    beyond_noise,
+    fixed,
+    percent,
+    plain,
+    scientific,
+    scientific_interval,
+    signed,
+    significant,
+    size,
+    times,
+)
 
 
 @pytest.mark.parametrize(
@@ -14,6 +25,9 @@ from reports.numbers import fixed, percent, plain, scientific, scientific_interv
         (scientific_interval(8.76e-2, 0.158), "(0.88 … 1.58)e−1"),
         (scientific_interval(-2e-3, 1e-4), "(−2.00 … 0.10)e−3"),
         (scientific_interval(0.0, 0.0), "(0.00 … 0.00)e0"),
+        (beyond_noise(-1e-9, scientific), "in the noise"),
+        (beyond_noise(0.02, percent), "2.0 %"),
+        (beyond_noise(math.nan, percent), "–"),
         (signed(1.0), "+1.00e0"),
         (signed(-0.02), "−2.00e−2"),
         (times(4.12), "4.1×"),

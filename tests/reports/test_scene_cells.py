@@ -68,3 +68,12 @@ def test_what_an_eye_sees_of_the_frames_has_a_column_where_it_was_measured(table
 
 def test_nothing_measured_gives_no_rows():
     assert scene_rows(scene_table([])) == {}
+
+
+def test_an_error_in_the_noise_has_no_ratio_and_is_on_no_front():
+    lost = measured("sums", mse=(-3e-6, -7e-6, 1e-6), frame_time=1.0)
+    table = scene_table([*RECORDS, *lost])
+    assert math.isnan(table["ratio"].iloc[-1]) and table["front"].tolist() == [True, True, False]
+    cells = scene_rows(table)["attic"]["groups"][-1]["rows"][0]["cells"]
+    assert [cell["text"] for cell in cells[1:3]] == ["in the noise", "–"]
+    assert cells[1]["interval"] == "(−7.00 … 1.00)e−6"
