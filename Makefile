@@ -21,8 +21,8 @@ plan generate check train bench status: $(READY)
 savings: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
 	@$(BIN)/twillight require sphere --recipe $(RECIPE) --method woven --set hidden=64
-	@$(BIN)/twillight require table --recipe $(RECIPE) --method woven
-	@$(BIN)/twillight require roll --recipe $(RECIPE) --method neumip --effort .75
+	@$(BIN)/twillight require table --recipe $(RECIPE) --method woven --effort .33
+	@$(BIN)/twillight require roll --recipe $(RECIPE) --method neumip --effort 1
 	@$(BIN)/twillight run out/recipes/require-sphere.toml
 	@$(BIN)/twillight run out/recipes/require-table.toml
 	@$(BIN)/twillight run out/recipes/require-roll.toml

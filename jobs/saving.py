@@ -42,7 +42,7 @@ DIFFERENCE: Final = "mse, own less general"
 """Quantity that pairs both pictures, pixel by pixel (`reports.paired_error`)."""
 
 
-_WIDTH: Final = 100  # columns that a table with its intervals takes
+_WIDTH: Final = 110  # columns that a table with its intervals takes
 
 
 class Value(NamedTuple):
