@@ -141,7 +141,7 @@ def _note(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> 
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
-        about += _taught(recipe, model, trainings)
+        about += _taught(recipe, model) + _left_out(recipe, model, trainings)
     return {
         "name": options.name,
         "about": about,
@@ -151,19 +151,21 @@ def _note(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> 
     }
 
 
-def _taught(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> str:
-    """Say which recipe trains a model, and where it is left out because it does not know the cloth."""
-    if not (teacher := recipe.teachers.get(model.options.name)):
+def _taught(recipe: Recipe, model: ModelRecipe) -> str:
+    """Say which other recipe trains a model."""
+    teacher = recipe.teacher_of(model)
+    own = "" if teacher.dataset.queries == recipe.dataset.queries else ", on queries of its own"
+    return "" if teacher is recipe else f"; trained by the recipe {teacher.name}{own}"
+
+
+def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task]) -> str:
+    """Say where a model is left out because it does not know the cloth."""
+    if not model.of_one_material:
         return ""
-    said = f"; trained by the recipe {teacher.name}"
-    if teacher.dataset.queries != recipe.dataset.queries:
-        said += ", on queries of its own"
-    if model.of_one_material:
-        unknown = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
-        unknown += [f"the scene {name}" for name in recipe.bench.scenes.names if not worn(name) <= set(trainings)]
-        if unknown:
-            said += f"; left out on {', '.join(unknown)}, of whose cloth it was taught nothing"
-    return said
+    fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
+    scenes = [f"in the scene {name}" for name in recipe.bench.scenes.names if not worn(name) <= set(trainings)]
+    where = [f"on {name}" for name in fabrics] + scenes
+    return f"; left out {', '.join(where)}: it was not trained on that cloth" if where else ""
 
 
 def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Sequence[Shard]) -> Task:
