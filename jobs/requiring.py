@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from reports.options import SceneBenchOptions
 
 _SAMPLE = 2000  # questions by which quadrature is timed
+_JUDGED = 100  # questions a fabric by which its error is judged
 
 
 def require(
@@ -186,23 +187,34 @@ def _left(
 
 
 def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:
-    """Return the error that the quadrature states on the scene's questions, and its nanoseconds a question."""
+    """Return what quadrature errs (as the colour measure of the benchmark) and its nanoseconds a question.
+
+    It is asked what it will mostly be asked: with light or viewer behind, where a scene has that.
+    """
     import numpy as np
 
-    from pipeline.models.fallback import stand_in
+    from pipeline.models.stand_in import stand_in
+    from pipeline.truth.estimator import estimate
+    from pipeline.truth.options import TruthOptions
+    from reports.metrics import COLOUR_WEIGHTS
 
-    states, seconds, count = [], 0.0, 0
+    some = any(queries.behind.any() for queries in asked.values())
+    wrong, colours, seconds, count = [], [], 0.0, 0
     for name, queries in asked.items():
-        rows = np.random.default_rng(0).permutation(len(queries.u))[: _SAMPLE // len(asked)]
+        rows = np.flatnonzero(queries.behind) if some else np.arange(len(queries.u))
+        rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(asked)]
         if not rows.size:
             continue
         stand_in(fabrics[name], queries.take(rows[:2]), 0)  # tables
         start = time.perf_counter()
         answers = stand_in(fabrics[name], queries.take(rows), 0)
         seconds, count = seconds + time.perf_counter() - start, count + rows.size
-        squared = np.square(answers.standard_error.astype(np.float64)).sum(axis=1).mean()
-        states.append(math.sqrt(squared) / max(float(answers.mean.sum(axis=1).mean()), 1e-9))
-    return float(np.mean(states)), 1e9 * seconds / count
+        truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="elliptic"), 1).mean
+        colour = truth @ COLOUR_WEIGHTS
+        wrong.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
+        colours.append(colour)
+    error, mean = math.sqrt(np.mean(np.square(np.concatenate(wrong)))), float(np.mean(np.concatenate(colours)))
+    return error / max(mean, 1e-9), 1e9 * seconds / count
 
 
 def _asked_table(requirement: Requirement) -> Table:

@@ -5,13 +5,12 @@ had nothing else would ask them so: the ellipse becomes the round footprint of e
 blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, nor for yarns unlike those
 that a network was trained on, such as open cloth where it saw solid cloth alone, nor for footprints and directions
 beyond the ranges that it was trained on (`pipeline.models.domain`): such a query is answered by the truth's own
-quadrature (`stand_in`) and never guessed at. How many those are is part of every result.
+quadrature (`pipeline.models.stand_in`) and never guessed at. How many those are is part of every result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,34 +18,9 @@ import numpy.typing as npt
 from pipeline.models.domain import Domain
 from pipeline.models.method import Method
 from pipeline.models.options.base import RoundFootprint
-from pipeline.truth.estimator import estimate, known_to_table
-from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Answers, Queries
+from pipeline.models.stand_in import stand_in
+from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
-
-TABLE: Final = TruthOptions(estimator="table")
-"""What steps in: the sum over the truth's table of nodes, typically 1 % off, at about ten microseconds a query."""
-
-QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=0.1)
-"""What steps in where the table does not reach: typically 2 % off, at a tenth of a millisecond a query."""
-
-FLAT: Final = 0.1
-"""Radians that cloth may turn across a footprint's deviation and still be flat to the table. In the shipped scenes that
-moves answers by .1 to .3 % with the light behind and by 1 % with it in front; at grazing angles by up to 7 %."""
-
-
-def stand_in(fabric: Fabric, queries: Queries, seed: int) -> Answers:
-    """Answer queries of any kind in a method's place."""
-    turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
-    flat = queries._replace(curvature=np.where(turned <= FLAT, np.float32(0.0), queries.curvature))
-    known = known_to_table(fabric, flat, TABLE)
-    parts = [np.flatnonzero(rows) for rows in (known, ~known)]
-    answers = [
-        estimate(fabric, flat.take(rows), options, seed)
-        for rows, options in zip(parts, (TABLE, QUADRATURE), strict=True)
-    ]
-    order = np.argsort(np.concatenate(parts))
-    return Answers(*(np.concatenate(columns)[order] for columns in zip(*answers, strict=True)))
 
 
 class Fallback:
@@ -84,13 +58,13 @@ class Fallback:
         if not strange.any():
             return self._method.predict(fabric, self._known(fabric, queries), seed)
         result = np.empty((len(strange), 4), np.float32)
-        result[strange] = stand_in(fabric, queries.take(strange), seed).mean
+        result[strange] = stand_in(fabric, queries.take(strange), seed)
         if not strange.all():
             result[~strange] = self._method.predict(fabric, self._known(fabric, queries.take(~strange)), seed)
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the method's bytes; the quadrature needs none that the fabric itself does not."""
+        """Return the method's bytes; what stands in for it has tables that all methods share."""
         return self._method.bytes_stored(fabric)
 
     def strange(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:

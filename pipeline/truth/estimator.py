@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.truth import replicates
-from pipeline.truth.auto import auto_rows, elliptic_rows, table_rows, tabulated
+from pipeline.truth.auto import auto_rows, elliptic_rows, table_rows
 from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature import quadrature_rows
@@ -88,13 +88,3 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     return Answers(
         single_mean[:, :4], single_error[:, :4], count.astype(np.int32), single_mean[:, 4], single_error[:, 4]
     )
-
-
-def known_to_table(fabric: Fabric, queries: Queries, options: TruthOptions) -> npt.NDArray[np.bool_]:
-    """Say which queries the estimator `table` answers with these options, (N,)."""
-    known = np.zeros(len(queries.u), np.bool_)
-    for behind in (False, True):
-        index = np.flatnonzero((queries.wo[:, 2] < 0) == behind)
-        if index.size:
-            known[index] = tabulated(model_of(fabric, options, behind), columns_of(queries.take(index), behind))
-    return known
