@@ -31,6 +31,7 @@ from reports import (
     tiles,
     truth_cells,
 )
+from reports.definitions import DEFINITIONS
 from reports.equal_time import equal_time_table, size_table
 from reports.exr import read_exr
 from reports.fabric_card import fabric_card
@@ -47,7 +48,6 @@ from reports.style import DARK, LIGHT, Scheme, display, render
 from reports.tradeoff import tradeoff_table
 from reports.waiting import waiting
 from reports.wording import (
-    DEFINITIONS,
     beaten,
     caveats,
     cheapest_sentences,
