@@ -279,7 +279,7 @@ def _timing_task(
         "measure": "timing",
         "version": BENCH_VERSION,
         "dataset": fingerprint_of(parts),
-        "options": bench.model_dump(mode="json", include={"rows", "bounds", "runtimes", *_TIMED}),
+        "options": bench.model_dump(mode="json", include={"rows", "bounds", "runtimes", "seed", *_TIMED}),
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
         "trainings": [task.id for task in trainings],
     }
@@ -316,7 +316,8 @@ def _timing_task(
 
 def _look(fabric: Fabric) -> dict[str, Any]:
     """Return all of a fabric that shapes its pictures: its optics and colours, and its name, which seeds them."""
-    colours = fabric.model_dump(mode="json", include={"warp": {"specular", "diffuse"}, "weft": {"specular", "diffuse"}})
+    shown = {"specular", "diffuse", "diffuse_transmission"}
+    colours = fabric.model_dump(mode="json", include={"warp": shown, "weft": shown})
     return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
 
 

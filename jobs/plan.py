@@ -15,7 +15,7 @@ from typing import Any
 from jobs.dataset import Shard, fingerprint_of, folder_of, shards
 from jobs.measurements import bench_tasks
 from jobs.recipe import ModelRecipe, Recipe
-from jobs.scenes import worn
+from jobs.scenes import fabrics_of
 from jobs.task import Task, identity
 from pipeline.fingerprint import fingerprint
 from pipeline.training.options import VERSION as TRAINING_VERSION
@@ -163,7 +163,7 @@ def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task])
     if not model.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
-    scenes = [f"in the scene {name}" for name in recipe.bench.scenes.names if not worn(name) <= set(trainings)]
+    scenes = [f"in the scene {name}" for name in recipe.bench.scenes.names if not fabrics_of(name) <= set(trainings)]
     where = [f"on {name}" for name in fabrics] + scenes
     return f"; left out {', '.join(where)}: it was not trained on that cloth" if where else ""
 

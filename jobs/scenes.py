@@ -12,6 +12,7 @@ from jobs.task import Task, identity
 from pipeline.fingerprint import file_sha256
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.options import VERSION as SCENE_VERSION
+from pipeline.scenes.sources import files, worn
 from pipeline.shards.version import VERSION as TRUTH_VERSION
 from reports.options import SCENE_BENCH_VERSION
 from reports.options import VERSION as BENCH_VERSION
@@ -27,7 +28,7 @@ def scene_tasks(recipe: Recipe, name: str, trained: Mapping[str, Mapping[str, Ta
     entries = [
         (model, trained.get(model.options.name, {}))
         for model in recipe.models
-        if not model.of_one_material or worn(name) <= set(trained[model.options.name])
+        if not model.of_one_material or fabrics_of(name) <= set(trained[model.options.name])
     ]
     folders = [(model, _needed(name, model, trainings)) for model, trainings in entries]
     for model, trainings in folders:
@@ -39,8 +40,8 @@ def _frames_task(recipe: Recipe, name: str) -> Task:
     """Return the task that works out the frames with the truth's answers."""
     options = recipe.bench.scenes
     scene = load_scene(name)
-    source = file_sha256(scene.source) if isinstance(scene.source, Path) else name
-    fabrics = {key: cloth.fabric or key for key, cloth in scene.cloths.items()}
+    source = {path.name: file_sha256(path) for path in files(scene)} or name
+    fabrics = worn(scene)
     spec = {
         "versions": [TRUTH_VERSION, BENCH_VERSION, SCENE_VERSION, SCENE_BENCH_VERSION],
         "source": source,
@@ -132,14 +133,16 @@ def _timing_task(
     )
 
 
-def worn(name: str) -> set[str]:
+def fabrics_of(name: str) -> set[str]:
     """Return the names of the fabrics that a scene shows."""
-    return {load_fabric(cloth.fabric or key).name for key, cloth in load_scene(name).cloths.items()}
+    return {load_fabric(fabric).name for fabric in worn(load_scene(name)).values()}
 
 
 def _needed(name: str, model: ModelRecipe, trainings: Mapping[str, Task]) -> list[Task]:
     """Return the trainings that a model answers a scene with."""
-    return [trainings[fabric] for fabric in sorted(worn(name))] if model.of_one_material else [*trainings.values()]
+    return (
+        [trainings[fabric] for fabric in sorted(fabrics_of(name))] if model.of_one_material else [*trainings.values()]
+    )
 
 
 def _model(model: ModelRecipe, trainings: Sequence[Task]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.shade import colours
@@ -26,6 +27,7 @@ from reports.metrics import COLOUR_WEIGHTS, Error, colour_error, component_error
 from reports.options import BenchOptions
 from reports.record import TRUTH, Metric, Provenance, Record, Role
 from reports.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
+from reports.truth_noise import with_noise
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -64,7 +66,8 @@ def measure_errors(
     options : BenchOptions
         How many rows, and the seed of random methods.
     """
-    cloth, queries, truth = _held_out(manifest, folder, fabric, options)
+    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
+    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
     method.prepare(cloth)
     values = method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
     subject = Record(
@@ -75,7 +78,7 @@ def measure_errors(
         scene="queries",
         provenance=provenance or Provenance(),
     )
-    records = subject.of_error(colour_error(values, truth, colours(cloth)))
+    records = subject.of_error(colour_error(values, truth, _colours(cloth, queries)))
     relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
     relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
     black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
@@ -181,6 +184,14 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
     low, median, high = quartiles(times)
     found = subject.of("prepare_time", median, len(times), unit="ms", low=low, high=high, samples=tuple(times))
     return [found]
+
+
+def _colours(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
+    """Return the colours of the components, (4, 3), or (N, 4, 3) if some light is transmitted."""
+    through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
+    if not through.any():
+        return colours(fabric)
+    return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
 def _held_out(manifest: Manifest, folder: Path, name: str, options: BenchOptions) -> tuple[Fabric, Queries, Answers]:

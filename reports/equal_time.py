@@ -24,12 +24,14 @@ import pandas as pd
 
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.manifest import Manifest
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.metrics import COLOUR_WEIGHTS, colour_error
 from reports.options import BenchOptions
 from reports.record import Metric, Provenance, Record
 from reports.summary import rows
 from reports.timing import Contender, affordable, time_side_by_side
+from reports.truth_noise import with_noise
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -155,12 +157,19 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
 def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:
     """Return the error of a knob's curve of (time, error) at a time; NaN before its fastest setting.
 
-    Straight in both logarithms between settings that no faster one beats; beyond the slowest its error.
+    Straight in both logarithms between settings that no faster one beats; beyond the slowest its error. From the first
+    setting on whose error is lost in the truth's noise (not above 0) it is 0.
     """
     best: list[tuple[float, float]] = []
+    lost = math.inf
     for time, error in sorted(curve):
-        if error > 0 and (not best or error < best[-1][1]):
+        if error <= 0:
+            lost = time
+            break
+        if not best or error < best[-1][1]:
             best.append((time, error))
+    if ns >= lost:
+        return 0.0
     if not best or ns < best[0][0]:
         return math.nan
     times, errors = np.log(np.array(best)).T
@@ -172,7 +181,8 @@ def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Asked], dic
     classes: dict[float, _Asked] = {}
     counts: dict[float, int] = {}
     for name in manifest.names("seen", "unseen"):
-        queries, answers = manifest.read(folder, name, "test")
+        queries, stated = manifest.read(folder, name, "test")
+        answers = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
         size = np.sqrt(queries.sigma * queries.sigma_minor)
         for low, high in itertools.pairwise(EDGES):
             chosen = np.flatnonzero((size >= low) & (size < high))

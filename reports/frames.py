@@ -21,6 +21,7 @@ from reports.exr import read_exr, write_exr
 from reports.metrics import colour_noise
 from reports.options import BenchOptions
 from reports.record import TRUTH, Provenance, Record, Role
+from reports.truth_noise import with_noise
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
 
@@ -53,7 +54,8 @@ def render_frames(fabric: Fabric, options: BenchOptions, path: Path) -> None:
     for index in range(options.frames):
         gbuffer = _view(options, index)
         seed = int(fingerprint(["frame", fabric.name, index, options.seed]), 16)
-        answers = estimate(fabric, gbuffer.queries(fabric.weave.repeat), options.frame_truth, seed)
+        queries = gbuffer.queries(fabric.weave.repeat)
+        answers = with_noise(estimate(fabric, queries, options.frame_truth, seed), queries, options.frame_truth)
         values.append(_spread(gbuffer, answers.mean @ weights))
         errors.append(_spread(gbuffer, colour_noise(answers, weights)))
     channels = {"Y": np.concatenate(values), "error.Y": np.concatenate(errors)}

@@ -28,6 +28,7 @@ from reports.metrics import COLOUR_WEIGHTS, colour_error
 from reports.options import LATENT_PAIRS
 from reports.record import Metric, Provenance, Record
 from reports.timing import milliseconds, quartiles
+from reports.truth_noise import with_noise
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
 
@@ -173,9 +174,13 @@ def _between(first: Yarn, second: Yarn, share: float) -> Yarn:
 def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:
     """Return the truth at every share: of the yarns in between, or the cross-fade of both drafts."""
     if pair.differs == "yarns":
-        return [estimate(between(pair, share), queries, truth, _SEED) for share in SHARES]
-    ends = estimate(pair.first, queries, truth, _SEED), estimate(pair.second, queries, truth, _SEED + 1)
+        return [_truth(between(pair, share), queries, truth, _SEED) for share in SHARES]
+    ends = _truth(pair.first, queries, truth, _SEED), _truth(pair.second, queries, truth, _SEED + 1)
     return [_faded(*ends, share) for share in SHARES]
+
+
+def _truth(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> Answers:
+    return with_noise(estimate(fabric, queries, options, seed), queries, options)
 
 
 def _faded(first: Answers, second: Answers, share: float) -> Answers:

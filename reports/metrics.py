@@ -3,10 +3,11 @@
 With a model's value m, the truth's estimate t, its standard error s, and means <.> over queries (pixels) and channels:
 
 MSE measured   <(m - t)^2> in linear RGB of the fabric's own colours: the error the papers report [Chen2024Woven].
-noise          <s^2>. Components are taken to be uncorrelated, s_rgb^2 = sum_j colour_j^2 s_j^2: an approximation, for
-               they share their points; the page says how much of an error the noise is.
+noise          <s^2>, s what the truth errs on average (`reports.truth_noise`). Components are taken to be
+               uncorrelated, s_rgb^2 = sum_j colour_j^2 s_j^2: an approximation, for they share their points; the page
+               says how much of an error the noise is.
 MSE            MSE measured - noise. The truth's error is independent of the model's, so E[(m - t)^2] = (m - f)^2 + s^2
-               and the difference estimates the model's own error (m - f)^2 without bias; it can fall below zero.
+               and the difference estimates the model's own error (m - f)^2; it can fall below zero.
 relative MSE   <((m - t)^2 - s^2) / (t^2 + eps <t>^2)>: every pixel counts by its share, the noise subtracted likewise;
                eps keeps dark pixels from counting without bound. As the weight holds the noisy t, a bias of relative
                size (s / t)^2 remains [Rousselle2011Adaptive].
@@ -122,13 +123,13 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resam
         A method's components.
     answers : Answers
         The truth's.
-    colours : float64 (4, channels)
-        Colour of each component: `pipeline.scenes.shade.colours`, or `COLOUR_WEIGHTS`.
+    colours : float64 (4, channels) or (N, 4, channels)
+        Colour of each component: `pipeline.scenes.shade.colours`, or `COLOUR_WEIGHTS`; of each query, if they differ.
     resamples : int
         As in `squared_error`.
     """
-    truth = answers.mean.astype(np.float64) @ colours
-    return squared_error(np.asarray(values, np.float64) @ colours, truth, colour_noise(answers, colours), resamples)
+    seen, truth = (_coloured(np.asarray(parts, np.float64), colours) for parts in (values, answers.mean))
+    return squared_error(seen, truth, colour_noise(answers, colours), resamples)
 
 
 def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
@@ -142,7 +143,12 @@ def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
 
 def colour_noise(answers: Answers, colours: Floats) -> Floats:
     """Return the standard error of the truth in colour, (N, channels), components taken to be uncorrelated."""
-    return np.asarray(np.sqrt(answers.standard_error.astype(np.float64) ** 2 @ colours**2))
+    return np.asarray(np.sqrt(_coloured(answers.standard_error.astype(np.float64) ** 2, colours**2)))
+
+
+def _coloured(components: Floats, colours: Floats) -> Floats:
+    """Return components (N, 4) in colours (4, channels) or (N, 4, channels)."""
+    return np.asarray(np.einsum("nj,jc->nc" if colours.ndim == 2 else "nj,njc->nc", components, colours))
 
 
 def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> tuple[float, float, float]:

@@ -24,6 +24,7 @@ from reports.exr import read_exr, write_exr
 from reports.metrics import colour_noise, squared_error
 from reports.options import BenchOptions
 from reports.record import TRUTH, Provenance, Record, Role
+from reports.truth_noise import with_noise
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def render_truth(fabric: Fabric, scene: View, options: BenchOptions, path: Path)
     """Write the truth's picture of a scene to `path`."""
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
-    answers = estimate(fabric, gbuffer.queries(fabric.weave.repeat), options.truth, seed)
+    queries = gbuffer.queries(fabric.weave.repeat)
+    answers = with_noise(estimate(fabric, queries, options.truth, seed), queries, options.truth)
     noise = compose(gbuffer, colour_noise(answers, colours(fabric)))
     picture = compose(gbuffer, shade(fabric, answers.mean))
     write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)

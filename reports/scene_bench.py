@@ -111,12 +111,15 @@ def _over_time(subject: Record, shown: Floats, reference: _Reference, options: S
     """Return what a method's frames show of aliasing, and FovVideoVDP's score where that is installed."""
     own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, reference.pictures, reference.noise))
     still, image = np.asarray(reference.lit.all(axis=0)), options.image
-    value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
-    scale = truth[:, still].mean() ** 2
-    rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
-    _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
+    records = []
+    if still.any():  # else no pixel shows lit cloth all the way
+        value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
+        scale = truth[:, still].mean() ** 2
+        rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
+        _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
+        records.append(subject.of("flicker", value, len(own), low=low, high=high))
     return [
-        subject.of("flicker", value, len(own), low=low, high=high),
+        *records,
         subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)),
         *fovvideovdp_records(subject, own, truth, options.display),
     ]

@@ -29,6 +29,7 @@ from pipeline.scenes.shade import colours, compose
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
 from reports.options import SceneBenchOptions
+from reports.truth_noise import with_noise
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -178,15 +179,16 @@ def shoot(name: str, options: SceneBenchOptions, path: Path) -> None:
         for key, gbuffer in found.gbuffers.items():
             fabric = loaded.cloths[key][1]
             truth = options.frame_truth if frame else options.truth
-            seed = int(fingerprint(["scene", name, key, frame, options.seed]), 16)
-            answers = estimate(fabric, gbuffer.queries(fabric.weave.repeat), truth, seed)
+            seed = int(fingerprint(["scene", loaded.scene.name, key, frame, options.seed]), 16)
+            queries = gbuffer.queries(fabric.weave.repeat)
+            answers = with_noise(estimate(fabric, queries, truth, seed), queries, truth)
             dark = np.zeros((len(gbuffer.place), 3))
             base = compose(gbuffer, dark, base, transparency=_transparency(gbuffer, answers.transparency))
             columns = {"frame": np.full(len(gbuffer.place), frame), "pixel": gbuffer.pixel[gbuffer.place]}
-            columns |= gbuffer.queries(fabric.weave.repeat)._asdict()
+            columns |= queries._asdict()
             columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
-            columns |= {"stand_in": _stand_in(fabric, gbuffer.queries(fabric.weave.repeat), seed)}
+            columns |= {"stand_in": _stand_in(fabric, queries, seed)}
             parts[key].append(columns)
         bases.append(base)
     arrays = {"base": np.array(bases, np.float32)}

@@ -48,8 +48,10 @@ class Contender(NamedTuple):
         return self.threads * sum(len(queries.u) for _, queries in self.questions)
 
     def first(self, rows: int) -> Contender:
-        """Return the same with the first queries of each fabric."""
-        return self._replace(questions=[(fabric, queries.take(slice(rows))) for fabric, queries in self.questions])
+        """Return the same with `rows` first queries of the fabric that has most, and of others in proportion."""
+        share = min(1.0, rows / max(len(queries.u) for _, queries in self.questions))
+        cut = [(fabric, queries.take(slice(math.ceil(share * len(queries.u))))) for fabric, queries in self.questions]
+        return self._replace(questions=cut)
 
 
 class Timing(NamedTuple):

@@ -42,8 +42,13 @@ def load_scene(name_or_path: str | Path) -> Scene:
         table = read_toml(path)
         if isinstance(table.get("source"), str):
             table["source"] = path.parent / table["source"]
-        return _with_fabrics(validated(Scene, table, str(path)), path.parent)
+        scene = _with_fabrics(validated(Scene, table, str(path)), path.parent)
+        if isinstance(scene.source, Path) and not scene.source.is_file():
+            raise BadInput(str(path), "source", str(scene.source), "does not exist; a Mitsuba XML is needed")
+        return scene
     if path.suffix == ".xml":
+        if not path.is_file():
+            raise BadInput("scene", "name", str(path), "does not exist; a Mitsuba XML is needed")
         name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60]
         return Scene(name=name, source=path)
     allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "

@@ -5,22 +5,19 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
-from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.scene import PREFIX, Cloth, Scene
 from pipeline.scenes.variant import mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 
 Floats = npt.NDArray[np.float64]
-
-PREFIX: Final = "fabric_"
-"""How the id of a BSDF that stands for a cloth begins."""
 
 
 @dataclass(frozen=True)

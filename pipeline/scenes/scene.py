@@ -12,9 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
+
+PREFIX: Final = "fabric_"
+"""How the id of a BSDF that stands for a cloth begins."""
 
 Yarns = Annotated[float, Field(gt=0, le=1e7)]
 Length = Annotated[float, Field(ge=-1e6, le=1e6)]

@@ -134,7 +134,7 @@ def _axial(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
 
 
 _TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}
-_KEPT: Final = 32  # of 1 to 5 MB each: those of a benchmark that asks about its cloths in turn
+_KEPT: Final = 48  # of 1 to 5 MB each: those of a benchmark that asks about a dozen cloths in turn
 _BUILDING: Final = Lock()
 
 

@@ -90,7 +90,7 @@ def model_of(fabric: Fabric, options: TruthOptions, behind: bool = False) -> Mod
     )
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _sides(fabric: Fabric, variation: Variation | None) -> tuple[HeightField, HeightField]:
     """Tabulate both sides, once for each fabric; the draft of a back repeats as that of the front does."""
     return height_field(fabric, variation), height_field(fabric.back(), variation)

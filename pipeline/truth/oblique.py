@@ -65,12 +65,14 @@ FINE_LINE: Final = Line(step=1.3, reach=4.2, three=0.0, two=0.0, half=64)
 
 _LITTLE: Final = 0.02  # correlation that is none to a method
 _NOTHING: Final = np.float32(0.0)
+_WIDEST: Final = np.float32(1e4)  # yarn spacings: even along that axis, and places on the line still have digits
 
 
 def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Singles, Singles, Singles]:
     """Return the deviations of N footprints along x and y and the correlation of both, each float32 (N,).
 
-    Correlations are 0 or such as a `COARSE_LINE` resolves: an ellipse thinner than that is taken wider.
+    Axes count as 1e4 yarn spacings at most. Correlations are 0 or such as a `COARSE_LINE` resolves: an ellipse thinner
+    than that is taken wider.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Singles,
     least : float32
         Deviation that both axes of a footprint have at least, in yarn spacings.
     """
-    major, minor = (np.maximum(side, least) for side in (queries.sigma, queries.sigma_minor))
+    major, minor = (np.clip(side, least, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
     if (major == minor).all():
         return major, major, np.zeros_like(major)
     found = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))

@@ -20,8 +20,10 @@ def test_a_setting_that_a_faster_one_beats_does_not_help_its_family():
     assert error_at([(100.0, 0.1), (200.0, 0.5), (400.0, 0.05)], 200.0) == pytest.approx(math.sqrt(0.1 * 0.05))
 
 
-def test_what_is_lost_in_noise_takes_no_part():
-    assert error_at([(100.0, 0.2), (200.0, 0.0)], 300.0) == pytest.approx(0.2)
+def test_from_what_is_lost_in_noise_on_nothing_is_left_to_beat():
+    curve = [(100.0, 0.2), (200.0, 0.0), (400.0, 0.1)]
+    assert error_at(curve, 150.0) == pytest.approx(0.2)
+    assert error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
 
 
 def records():
