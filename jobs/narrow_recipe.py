@@ -142,10 +142,14 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
         truth = truth.model_copy(update={"estimator": SAMPLED.estimator})
     if training is not None and not _knows(training, queries, fabrics):
         training = SAMPLED.model_copy(update=physics)
-    found = {"truth": truth.model_dump(mode="json", exclude_defaults=True)}
-    if training is not None:
-        found["training_truth"] = training.model_dump(mode="json", exclude_defaults=True)
-    return found
+    found = {"truth": _stated(truth)}
+    return found if training is None else found | {"training_truth": _stated(training)}
+
+
+def _stated(truth: TruthOptions) -> dict[str, Any]:
+    """Return a truth's table: its estimator and error in any case, the rest where it is not the default."""
+    stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
+    return stated | truth.model_dump(mode="json", exclude_defaults=True)
 
 
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from jobs.benching import measured_alone
 from jobs.ledger import Ledger
 from jobs.leftovers import left_to_quadrature
 from jobs.narrow_recipe import alone
@@ -122,6 +123,7 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]
     for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
         costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
         sides.append(costs | _measured(out, whole.name, scene, model, called))
+    _refuse_old_page(own, out, str(path))
     theirs, ours = sides
     found = [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
     found += _difference(scene, out, (general, own), model)
@@ -166,6 +168,13 @@ def _costs(
         ("training", "s"): Value(sum(ledger.seconds(task) for task in trainings)),
         ("weights", "bytes"): Value(weights),
     }
+
+
+def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
+    """Refuse a page that a scene's recipe wrote before it was written anew."""
+    page = plan(own, measured_alone(out))[-1]
+    if Ledger(out).state(page) != "done":
+        raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {run}`")
 
 
 def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:

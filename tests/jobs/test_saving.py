@@ -97,7 +97,15 @@ class Runs:
         folder = self.out / "report" / name
         folder.mkdir(parents=True, exist_ok=True)
         write_records(folder / OF_A_PAGE, records, this_machine(1))
+        if name != "wide":
+            self.finish_page()
         return self
+
+    def finish_page(self):
+        """Write the receipt of the page of the scene's recipe."""
+        page = plan(load_recipe(self.own))[-1]
+        (self.out / page.products[0]).write_text("<html>")
+        Ledger(self.out).finish(page, {"index.html": measure(self.out / page.products[0])}, 1.0)
 
 
 @pytest.fixture
@@ -214,6 +222,9 @@ def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):
     assert f"twillight run {runs.own}" in refused() and "4 of 4 tasks" in refused()
     runs.run(runs.own, 1.0).page("require-sphere", 1e-4, 1.0, "woven")
     assert "no mse of neumip there" in refused()
+    runs.page("require-sphere", 1e-4, 1.0)
+    runs.own.write_text(runs.own.read_text() + "seed = 7\n")
+    assert "its page is older than the recipe" in refused()
     runs.own.write_text(runs.own.read_text().replace('name = "neumip"', 'name = "other"'))
     assert "no such method" in refused()
 
