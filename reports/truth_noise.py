@@ -3,8 +3,9 @@
 A tabulated answer states an error that is to cover the true one: three of them do for 99 of 100 queries. On average the
 true one is smaller: over the nine fabrics of quick, 250 queries each, the stated variance of the colour is 3.1 to 4.7
 times the true one (plain weave 2.2, gabardine 12, all together 4.1; against 16,384 points a query and more), on
-herringbone 3.4, on open cloth (gauze, organza, voile) 1.1 to 2. What is subtracted from a method's error must be what the truth errs, and so the stated variance counts by a share. The errors
-of sampled answers are those of their replicates and count in full.
+herringbone 3.4, on open cloth (gauze, organza, voile) 1.1 to 2. What is subtracted from a method's error must be what
+the truth errs, and so the stated variance counts by a share. The errors of sampled answers are those of their
+replicates and count in full.
 """
 
 from __future__ import annotations

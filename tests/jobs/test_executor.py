@@ -99,7 +99,7 @@ def driver(out):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 30
-    while len(list((out / "ledger").glob("*.json"))) < 2:
+    while len(list((out / "ledger").glob("[!.]*.json"))) < 2:  # whole ones
         assert time.monotonic() < deadline and process.poll() is None
         time.sleep(0.02)
     return process, psutil.Process(process.pid).children(recursive=True)
