@@ -7,11 +7,13 @@ from pipeline.models.fallback import Fallback
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from reports import scene_bench
 from reports.exr import read_exr
 from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
 from reports.scene_bench import measure_scene, time_scene, write_truth
 from reports.scene_frames import read_shot, shoot
 from reports.summary import scene_table
+from reports.timing import Timing
 from weaves.errors import BadInput
 
 pytest.importorskip("mitsuba")
@@ -107,6 +109,28 @@ def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot,
     assert good.fallback_share == bad.fallback_share >= 0 and (table.frame_time > 0).all()
     shown = read_exr(picture).stack("R", "G", "B")
     np.testing.assert_allclose(shown[~frames.lit[0]], frames.base[0][~frames.lit[0]], rtol=1e-6)
+
+
+def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
+    """With a clock that says 1, 2, 3, ... microseconds a query of the first, second, third cloth of a method."""
+    frames, _ = shot
+    counts = [len(cloth.frame) for cloth in frames.first().cloths]
+    assert len(set(counts)) > 1
+
+    def readings(contenders, repeats, warm_up):
+        assert [len(contender.questions) for contender in contenders] == [1] * 2 * len(counts)
+        return [
+            Timing(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
+            for index, _ in enumerate(contenders)
+        ]
+
+    monkeypatch.setattr(scene_bench, "time_side_by_side", readings)
+    records = time_scene([Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)], frames, OPTIONS)
+    whole = 1e-3 * sum(count * (1 + index) for index, count in enumerate(counts))
+    for record in records:
+        assert record.samples == pytest.approx([whole * (1 + turn) for turn in range(20)])
+        assert record.value == pytest.approx(10.5 * whole) and record.low < record.value < record.high
+    assert time_scene([Fallback(Answers(1.0, covered=False), ALL)], frames, OPTIONS) == []
 
 
 def test_the_truths_picture_holds_its_noise(shot, tmp_path):
