@@ -105,7 +105,7 @@ def _timing_task(
     """Return the timing of a frame by all methods; nothing else may run meanwhile."""
     bench, scene = recipe.bench, load_scene(name).name
     spec = {
-        "measure": "time of a frame",
+        "measure": "time of a frame, cloth by cloth",
         "version": BENCH_VERSION,
         "frames": frames.id,
         "options": bench.model_dump(mode="json", include={"timing_repeats", "warm_up"}),

@@ -10,12 +10,14 @@ from pipeline.models.fallback import Fallback
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from reports import scene_bench
 from reports.exr import read_exr
 from reports.film import film
 from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
 from reports.scene_bench import measure_scene, time_scene, write_truth
 from reports.scene_frames import read_shot, shoot
 from reports.summary import SCENE_INTERVALS, scene_table
+from reports.timing import Timing
 from weaves.errors import BadInput
 
 pytest.importorskip("mitsuba")
@@ -146,6 +148,28 @@ def test_what_an_eye_sees_is_scored_where_it_can_be(shot, monkeypatch):
     methods = [Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)]
     table = scene_table(measure_scene(methods, frames, OPTIONS, {})).set_index("setting")
     assert 10 > table.loc["x 1", "fovvideovdp"] > table.loc["x 1.3", "fovvideovdp"]
+
+
+def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
+    """With a clock that says 1, 2, 3, ... microseconds a query of the first, second, third cloth of a method."""
+    frames, _ = shot
+    counts = [len(cloth.frame) for cloth in frames.first().cloths]
+    assert len(set(counts)) > 1
+
+    def readings(contenders, repeats, warm_up):
+        assert [len(contender.questions) for contender in contenders] == [1] * 2 * len(counts)
+        return [
+            Timing(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
+            for index, _ in enumerate(contenders)
+        ]
+
+    monkeypatch.setattr(scene_bench, "time_side_by_side", readings)
+    records = time_scene([Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)], frames, OPTIONS)
+    whole = 1e-3 * sum(count * (1 + index) for index, count in enumerate(counts))
+    for record in records:
+        assert record.samples == pytest.approx([whole * (1 + turn) for turn in range(20)])
+        assert record.value == pytest.approx(10.5 * whole) and record.low < record.value < record.high
+    assert time_scene([Fallback(Answers(1.0, covered=False), ALL)], frames, OPTIONS) == []
 
 
 def test_the_truths_picture_holds_its_noise(shot, tmp_path):
