@@ -30,6 +30,7 @@ Runner = Callable[[Task, Path, Progress], None]
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 _SECONDS_BETWEEN_SIGNS = 0.2
+_SECONDS_TO_RESTART = 600  # on a busy machine a worker takes minutes to load what it needs
 
 
 class Outcome(NamedTuple):
@@ -162,7 +163,8 @@ def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> lis
 def _submit(client: Any, runner: Runner, task: Task, out: Path) -> Any:
     """Hand a task to the cluster; one that must be alone gets a fresh process."""
     if task.alone and client.cluster is not None:
-        client.restart()  # which also forgets results: a worker's end would have dask compute them again
+        # Which also forgets results: a worker's end would have dask compute them again.
+        client.restart(timeout=_SECONDS_TO_RESTART)
     return client.submit(_work, runner, task, str(out), key=f"{task.stage}-{task.id}")
 
 

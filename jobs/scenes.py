@@ -32,7 +32,9 @@ def scene_tasks(recipe: Recipe, name: str, trained: Mapping[str, Mapping[str, Ta
     ]
     folders = [(model, _needed(name, model, trainings)) for model, trainings in entries]
     for model, trainings in folders:
-        yield _method_task(recipe, name, frames, model, trainings)
+        # A setting at a time: what one took is not lost with another, and a new one costs nothing but itself.
+        for options in model.options.single():
+            yield _method_task(recipe, name, frames, model.model_copy(update={"options": options}), trainings)
     yield _timing_task(recipe, name, frames, folders)
 
 
@@ -65,7 +67,7 @@ def _frames_task(recipe: Recipe, name: str) -> Task:
 
 
 def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, trainings: Sequence[Task]) -> Task:
-    """Return the measurements of all settings of a model on a scene."""
+    """Return the measurements of one setting of a model on a scene."""
     options, bench, scene = model.options, recipe.bench, load_scene(name).name
     spec = {
         "measure": [BENCH_VERSION, SCENE_BENCH_VERSION, options.version],
@@ -82,7 +84,7 @@ def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, tr
     return Task(
         "bench",
         f"{options.name}, scenes",
-        f"{options.name} on the scene {scene}",
+        " ".join([options.name, *(f"k = {knob}" for knob in options.knobs), f"on the scene {scene}"]),
         spec,
         (f"{stem}.json", f"{stem}.machine.json", *pictures.values()),
         (frames.id, *(training.id for training in trainings)),

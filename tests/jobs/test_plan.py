@@ -239,3 +239,16 @@ def test_rows_that_nobody_learns_from_are_not_drawn():
     assert drawn == {"test"}
     every = {task.setting["question"]["split"] for task in plan(quick) if task.stage == "generate"}
     assert every == {"train", "validation", "test"}
+
+
+def test_settings_are_measured_on_scenes_one_by_one():
+    """Of smoke, with one more number of points: what was there stays, but the timing of all side by side."""
+    smoke = load_recipe("smoke")
+    (points,) = (model for model in smoke.models if model.options.name == "point_sampled")
+    more = points.options.model_copy(update={"counts": [*points.options.counts, 128]})
+    models = [m.model_copy(update={"options": more}) if m is points else m for m in smoke.models]
+    before, after = plan(smoke), plan(dataclasses.replace(smoke, models=tuple(models)))
+    title = "on the scene curtain"
+    assert len(ids(before, "bench", title)) == len(ids(after, "bench", title)) - 1
+    assert set(ids(before, "bench", title)) < set(ids(after, "bench", title))
+    assert ids(after, "bench", f"point_sampled k = 128 {title}")

@@ -5,7 +5,7 @@ Fields are declared by each model, in its own order: a base would move them to t
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -55,10 +55,17 @@ class Options(BaseModel):
         """Which of `behind`, `stretch` and `curvature` (`QueryOptions`) its queries may have."""
         return frozenset()
 
+    knob: ClassVar[str] = ""
+    """Name of the field that holds the values of the speed-accuracy knob; empty if there is none."""
+
     @property
     def knobs(self) -> tuple[int, ...]:
         """Values k of the speed-accuracy knob, each a method of its own with the setting ``k = ...``; none: one method.
 
         The seconds of a prediction are then those of k = 1.
         """
-        return ()
+        return tuple(getattr(self, self.knob)) if self.knob else ()
+
+    def single(self) -> list[Self]:
+        """Return options of one setting each: these, or for every value of the knob these with that value alone."""
+        return [self.model_copy(update={self.knob: [value]}) for value in self.knobs] if self.knob else [self]

@@ -16,6 +16,7 @@ class PointSampledOptions(Options):
     """The point model at k random points of the footprint [Jin2022Woven]; nothing is trained."""
 
     learns: ClassVar[bool] = False
+    knob: ClassVar[str] = "counts"
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
 
     model: Literal["point_sampled"] = "point_sampled"
@@ -40,11 +41,6 @@ class PointSampledOptions(Options):
         if self.visibility == "horizon" and self.footprint != "gaussian":
             raise ValueError("visibility = 'horizon' needs footprint = 'gaussian'")
         return self
-
-    @property
-    def knobs(self) -> tuple[int, ...]:
-        """The numbers of points."""
-        return tuple(self.counts)
 
     @property
     def kinds(self) -> frozenset[str]:

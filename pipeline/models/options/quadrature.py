@@ -16,6 +16,7 @@ class QuadratureOptions(Options):
     """Gauss-Legendre rules on every piece of yarn, k nodes across it; nothing is trained."""
 
     learns: ClassVar[bool] = False
+    knob: ClassVar[str] = "nodes"
     seconds: ClassVar[tuple[float, float]] = (0.0, 3e-7)
 
     model: Literal["quadrature"] = "quadrature"
@@ -33,11 +34,6 @@ class QuadratureOptions(Options):
     """Nodes of the horizon map on each piece of yarn in a cell, across and along."""
     azimuths: int = Field(default=32, ge=8, le=512)
     """Directions of the horizon map; linear between them."""
-
-    @property
-    def knobs(self) -> tuple[int, ...]:
-        """The numbers of nodes."""
-        return tuple(self.nodes)
 
     @property
     def kinds(self) -> frozenset[str]:

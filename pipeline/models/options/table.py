@@ -16,6 +16,7 @@ class TableOptions(Options):
     """The ground truth's own table as a method: sums over k nodes a yarn spacing; nothing is trained."""
 
     learns: ClassVar[bool] = False
+    knob: ClassVar[str] = "nodes"
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
 
     model: Literal["table"] = "table"
@@ -27,11 +28,6 @@ class TableOptions(Options):
     """Numbers k of nodes a yarn spacing; each is a row of the tables."""
     azimuths: int = Field(default=128, ge=8, le=512)
     """Directions in which horizons are known."""
-
-    @property
-    def knobs(self) -> tuple[int, ...]:
-        """The numbers of nodes."""
-        return tuple(self.nodes)
 
     @property
     def kinds(self) -> frozenset[str]:
