@@ -29,7 +29,7 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
 
 
-SCENE_BENCH_VERSION: Final = 1
+SCENE_BENCH_VERSION: Final = 2
 """Version of what is measured and written on scenes (`reports.scene_frames`, `reports.scene_bench`), beside `VERSION`;
 their tasks have no number of it before 1."""
 

@@ -18,6 +18,7 @@ from pipeline.truth.auto import tabulated
 from pipeline.truth.cloth import Model, columns_of, model_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.nodes import sum_rows
+from pipeline.truth.oblique import COARSE_LINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.table import Table, tabulate
@@ -52,7 +53,7 @@ def stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.floa
             model, table = _TABLES[behind].of(fabric)
             rows, columns = rows[known], columns.take(known)
             # An error without bound: nothing is sampled again.
-            means, _, _ = sum_rows(model, table, columns, rows, 1.0, np.inf, np.uint64(seed))
+            means, _, _ = sum_rows(model, table, columns, rows, 1.0, np.inf, np.uint64(seed), COARSE_LINE)
             result[rows], left[rows] = np.maximum(means[:, :4], 0.0), False
     if left.any():
         result[left] = estimate(fabric, flat.take(left), QUADRATURE, seed).mean

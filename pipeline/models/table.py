@@ -17,6 +17,7 @@ from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
 from pipeline.truth.cloth import Model, columns_of, model_of
 from pipeline.truth.nodes import sum_rows
+from pipeline.truth.oblique import COARSE_LINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.table import Table, tabulate
@@ -55,7 +56,7 @@ class Tabulated:
         model, table = self._tables.of(fabric)
         rows = np.arange(len(queries.u))
         # An error without bound: nothing is sampled again.
-        means, _, _ = sum_rows(model, table, columns_of(queries), rows, 1.0, np.inf, np.uint64(seed))
+        means, _, _ = sum_rows(model, table, columns_of(queries), rows, 1.0, np.inf, np.uint64(seed), COARSE_LINE)
         return np.maximum(means[:, :4], 0.0).astype(np.float32)
 
     def bytes_stored(self, fabric: Fabric) -> int:

@@ -62,7 +62,7 @@ def _first_good(
         chosen = columns.take(asked)
         bound = _UNBOUNDED if coarse else (options.relative_error, options.absolute_error)
         mean, error, count = sum_rows(
-            model, _table(model, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed)
+            model, _table(model, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed), FINE_LINE
         )
         size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
@@ -101,7 +101,9 @@ def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opt
         asked = np.flatnonzero(wide == coarse)
         if asked.size:
             chosen = columns.take(asked)
-            answer = sum_rows(model, _table(model, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed))
+            answer = sum_rows(
+                model, _table(model, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed), FINE_LINE
+            )
             means[asked], errors[asked], counts[asked] = answer
     return means, errors, counts
 

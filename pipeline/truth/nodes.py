@@ -20,7 +20,7 @@ from pipeline.truth.footprint import GAUSSIAN
 from pipeline.truth.heightfield import ALPHA, BLEND, GAP
 from pipeline.truth.kernel import kernel
 from pipeline.truth.lanes import borders, crossing, reflected, transmitted, weigh
-from pipeline.truth.oblique import FINE_LINE
+from pipeline.truth.oblique import Line
 from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.refine import UNSEEN, refine
 from pipeline.truth.replicates import query_scene
@@ -29,7 +29,6 @@ from pipeline.truth.table import COLUMNS, FAMILY, FINE, FINE_START, ROWS, START,
 from pipeline.truth.weights import any_weight, fill_weights
 
 _SUBDIVISIONS: Final = (2, 4)
-_POINTS: Final = FINE_LINE.points
 
 _0 = np.float32(0.0)
 _STEEPEST = 1e4
@@ -50,8 +49,9 @@ def sum_rows(
     relative_error: float,
     absolute_error: float,
     seed: np.uint64,
+    line: Line,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Answer every row: means and standard errors (N, 5), and nodes visited.
+    """Answer every row: means and standard errors (N, 5), and nodes visited; ellipses at an angle by a `line`.
 
     Footprints are Gaussian or lie along the axes, the cloth is flat, cosines go to the ply normal, points hide one
     another, and light comes from behind only if the table has horizons there.
@@ -65,7 +65,7 @@ def sum_rows(
     cells = max(table.repeat[0], table.repeat[1])
     scratch = np.zeros((2, cells, len(table.edges), table.edges.shape[1] - 1), np.float32)
     touched = np.zeros((2, cells, len(table.edges)), np.bool_)
-    line = np.zeros((2, _POINTS), np.float32)
+    points = np.zeros((2, 2 * line.half + 1), np.float32)
     azimuths = len(table.slope)
     moved, known, known_error = np.zeros(5), np.zeros(5), np.zeros(5)
     thickness = np.float32(front.thickness)
@@ -90,7 +90,7 @@ def sum_rows(
 
         even = model.shape == GAUSSIAN and min(columns.sigma[row], columns.sigma_minor[row]) >= table.uniform
         if not even:
-            fill_weights(table, model.shape, columns, row, scratch, touched, line, weight)
+            fill_weights(table, model.shape, columns, row, scratch, touched, line, points, weight)
         shares = table.evenly if even else weight
 
         area, area_error, moved_area = np.float64(0.0), np.float64(0.0), np.float64(0.0)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from pipeline.truth.cloth import Columns
 from pipeline.truth.footprint import interval_masses
 from pipeline.truth.kernel import fast_kernel, kernel
-from pipeline.truth.oblique import FINE_LINE, along_axes, line_points
+from pipeline.truth.oblique import Line, along_axes, line_points
 from pipeline.truth.table import COLUMNS, KIND_X, KIND_Y, ROWS, START, Single, Table
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
@@ -24,13 +24,14 @@ def fill_weights(
     row: int,
     scratch: Single,
     touched: npt.NDArray[np.bool_],
-    line: Single,
+    line: Line,
+    points: Single,
     weight: Single,
 ) -> None:
-    """Write the share of a footprint that falls on each node and its copies.
+    """Write the share of a footprint that falls on each node and its copies; one at an angle by a `line` (oblique).
 
     `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any;
-    `line` (2, FINE_LINE.points) is for points of a footprint at an angle (oblique).
+    `points` (2, line.points) is scratch too.
     """
     weight[:] = _0
     u, v, sigma_x, sigma_y = columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row]
@@ -40,10 +41,10 @@ def fill_weights(
     sigma_x, sigma_y, correlation = along_axes(sigma_x, sigma_y, columns.angle[row])
     blur, shift = math.sqrt(1.0 - abs(correlation)), math.sqrt(abs(correlation))
     shift_x, shift_y = shift * sigma_x, math.copysign(shift, correlation) * sigma_y
-    for point in range(line_points(correlation, FINE_LINE, line[0], line[1])):
-        z = line[0, point]
+    for point in range(line_points(correlation, line, points[0], points[1])):
+        z = points[0, point]
         _add(
-            table, shape, u + z * shift_x, v + z * shift_y, blur * sigma_x, blur * sigma_y, line[1, point], scratch,
+            table, shape, u + z * shift_x, v + z * shift_y, blur * sigma_x, blur * sigma_y, points[1, point], scratch,
             touched, weight,
         )  # fmt: skip
 
