@@ -42,7 +42,7 @@ def _frames_task(recipe: Recipe, name: str) -> Task:
     """Return the task that works out the frames with the truth's answers."""
     options = recipe.bench.scenes
     scene = load_scene(name)
-    source = {path.name: file_sha256(path) for path in files(scene)} or name
+    source = [file_sha256(path) for path in files(scene)] or name
     fabrics = worn(scene)
     spec = {
         "versions": [TRUTH_VERSION, BENCH_VERSION, SCENE_VERSION, SCENE_BENCH_VERSION],

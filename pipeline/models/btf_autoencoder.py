@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.domain import Domain
+from pipeline.models.domain import Domain, joined_domain
 from pipeline.models.method import Trained
 from pipeline.models.options import BtfAutoencoderOptions
 from pipeline.models.per_fabric import PerFabric
@@ -69,11 +69,9 @@ def build(options: BtfAutoencoderOptions, fabrics: Sequence[Fabric]) -> UnifiedB
 
 def restore(options: BtfAutoencoderOptions, trained: Trained) -> list[BtfAutoencoder]:
     """Return one method that holds all trained fabrics."""
-    methods, domains = {}, []
+    methods = {}
     for card, weights in trained:
         network, domain = restored(options, card, weights)
         (fabric,) = card["fabrics"]
         methods[fabric["optics"]] = UnifiedBtf(network, domain)
-        domains.append(domain)
-    known = [domain for domain in domains if domain is not None]
-    return [BtfAutoencoder(options.name, methods, Domain.joined(known) if known else None)]
+    return [BtfAutoencoder(options.name, methods, joined_domain([card for card, _ in trained]))]

@@ -206,7 +206,7 @@ class Curved(OneMaterial[CurvedNetwork]):
         network = self._asked(fabric, queries)
         return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
 
-    def steepest(self, fabric: Fabric) -> float:
+    def _steepest(self, fabric: Fabric) -> float:
         """Return the largest curvature that the fabric's network answers for, in 1/yarn spacings."""
         limit = self.network_of(fabric).options.largest_curvature
         return limit if self.domain is None else min(limit, self.domain.queries.curvature[1])
@@ -216,7 +216,7 @@ class Curved(OneMaterial[CurvedNetwork]):
         network = self.network_of(fabric)
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
-        limit = self.steepest(fabric)
+        limit = self._steepest(fabric)
         beyond = np.flatnonzero(queries.curvature > limit * (1.0 + 1e-6))
         if beyond.size:
             where, value = f"curvature[{beyond[0]}]", float(queries.curvature[beyond[0]])

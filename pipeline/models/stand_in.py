@@ -25,7 +25,7 @@ from pipeline.truth.table import Table, tabulate
 from weaves.fabric import Fabric
 
 NODES: Final = 15
-"""Nodes a yarn spacing: typically 1 % off, at some microseconds a query."""
+"""Nodes a yarn spacing: 1 to 3 % off in the shipped scenes (RMSE over the mean), at some 30 microseconds a query."""
 
 AZIMUTHS: Final = 96
 """Directions in which horizons are known."""

@@ -1,10 +1,10 @@
-"""The estimators `table` and `auto`: sums over tabulated nodes, and sampling for what the table cannot say well enough.
+"""The estimators `table`, `auto`, `elliptic`: sums over tabulated nodes, and sampling for what these cannot say well.
 
 `auto` asks a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a query
 and samples its own doubtful nodes where the error it states is above the one asked for (nodes, refine). What is still
 above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, cloths of more
 than `_MOST_CELLS` different cells, and models other than the default. Footprints at an angle, which the table takes as
-mixtures (oblique), are `auto`'s to sample: the errors that a table states were fitted to footprints along the axes.
+mixtures (oblique), are `auto`'s to sample, as in all shards so far; `elliptic` asks the tables about them too.
 """
 
 from __future__ import annotations
