@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.scenes.shade import colours
+from pipeline.scenes.shade import colours_of
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -78,7 +77,7 @@ def measure_errors(
         scene="queries",
         provenance=provenance or Provenance(),
     )
-    records = subject.of_error(colour_error(values, truth, _colours(cloth, queries)))
+    records = subject.of_error(colour_error(values, truth, colours_of(cloth, queries)))
     relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
     relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
     black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
@@ -184,14 +183,6 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
     low, median, high = quartiles(times)
     found = subject.of("prepare_time", median, len(times), unit="ms", low=low, high=high, samples=tuple(times))
     return [found]
-
-
-def _colours(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
-    """Return the colours of the components, (4, 3), or (N, 4, 3) if some light is transmitted."""
-    through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
-    if not through.any():
-        return colours(fabric)
-    return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
 def _held_out(manifest: Manifest, folder: Path, name: str, options: BenchOptions) -> tuple[Fabric, Queries, Answers]:

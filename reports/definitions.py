@@ -9,9 +9,9 @@ DEFINITIONS: Final = {
     "noise of the truth subtracted: MSE as measured minus noise. The truth's error is independent of the method's, "
     "so this estimates the method's own error. A row is the mean over its fabrics, each weighing alike.",
     "95 % interval": "Of the MSE, from the spread over queries. It says nothing of other fabrics or other trainings.",
-    "noise": "Mean squared standard error of the truth in the same colours, as its estimator states it, as a share of "
-    "the MSE as measured. The standard error of every component is a column of the data set; components are taken to "
-    "be uncorrelated.",
+    "noise": "Mean squared error of the truth in the same colours, as a share of the MSE as measured. The standard "
+    "error of every component is a column of the data set; of tabulated answers, which state an error that covers, the "
+    "square counts by a third, for that much they err on average. Components are taken to be uncorrelated.",
     "× lower": "MSE of point sampling at 2 points over the method's, on the very fabrics that the method covers, with "
     "a 95 % interval (delta method). Above 1 the method is better.",
     "colour": "Relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft): root of the MSE over the mean of the "

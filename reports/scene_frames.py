@@ -25,7 +25,7 @@ from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import load
-from pipeline.scenes.shade import colours, compose
+from pipeline.scenes.shade import colours_of, compose
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
 from reports.options import SceneBenchOptions
@@ -73,23 +73,23 @@ class Questions:
 
     def light(self, components: npt.ArrayLike) -> Floats:
         """Return the light of each question, (M, 3), from components (M, 4)."""
-        return np.asarray(self.weight * np.einsum("mc,mcx->mx", np.asarray(components, np.float64), self._colours()))
+        return np.asarray(
+            self.weight
+            * np.einsum("mc,mcx->mx", np.asarray(components, np.float64), colours_of(self.fabric, self.queries))
+        )
 
     def noise(self) -> Floats:
         """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
         squared = np.square(self.standard_error.astype(np.float64))
-        return np.asarray(self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(self._colours()))))
+        return np.asarray(
+            self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(colours_of(self.fabric, self.queries))))
+        )
 
     def of_frame(self, frame: int) -> Questions:
         """Return the questions of one frame."""
         rows = np.flatnonzero(self.frame == frame)
         parts = (getattr(self, name)[rows] for name in _COLUMNS)
         return Questions(self.fabric, self.queries.take(rows), *parts)
-
-    def _colours(self) -> Floats:
-        """Return the colour of each component of each question, (M, 4, 3): transmitted light has its own."""
-        through = self.queries.wi[:, 2] * self.queries.wo[:, 2] < 0.0
-        return np.where(through[:, None, None], colours(self.fabric, transmitted=True), colours(self.fabric))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.scenes.gbuffer import GBuffer
+from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 
@@ -21,6 +22,12 @@ def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64
     yarns = (fabric.warp, fabric.weft)
     diffuse = [yarn.diffuse_transmission_rgb if transmitted else yarn.diffuse_rgb for yarn in yarns]
     return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
+
+
+def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
+    """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own."""
+    through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
+    return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
 def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: npt.ArrayLike = False) -> npt.NDArray[np.float64]:
