@@ -44,8 +44,8 @@ def list_() -> None:
     """List the fabrics and the recipes that come with the package."""
     from rich.console import Console
 
-    from jobs.recipe import load_recipe, recipe_names
-    from jobs.tables import fabrics_table, recipes_table
+    from jobs.recipe.load import load_recipe, recipe_names
+    from jobs.verbs.tables import fabrics_table, recipes_table
     from weaves.fabric import load_fabric, preset_names
 
     console = Console()
@@ -63,14 +63,14 @@ def show(
     """Show a fabric: its drawdown and its yarns."""
     from rich.console import Console
 
-    from jobs.tables import fabric_page
+    from jobs.verbs.tables import fabric_page
     from weaves.fabric import load_fabric
 
     cloth = load_fabric(fabric)
     console = Console()
     console.print(fabric_page(cloth))
     if out is not None:
-        from jobs.pictures import write_pictures
+        from jobs.verbs.show import write_pictures
 
         console.print(*write_pictures(cloth, out), sep="\n", soft_wrap=True)
 
@@ -86,7 +86,7 @@ def export(
     """Write a fabric's surface as triangles with the colours of its yarns, for any 3D program."""
     from rich.console import Console
 
-    from jobs.exporting import write_mesh
+    from jobs.verbs.export import write_mesh
     from weaves.fabric import load_fabric
 
     triangles = write_mesh(load_fabric(fabric), mesh, vertices, repeats)
@@ -98,9 +98,9 @@ def plan(recipe: RecipeName) -> None:
     """Show the tasks of a recipe with their rows, bytes and estimated time; nothing is computed."""
     from rich.console import Console
 
-    from jobs.plan import plan as tasks_of
-    from jobs.recipe import load_recipe
-    from jobs.tables import plan_table
+    from jobs.plan.plan import plan as tasks_of
+    from jobs.recipe.load import load_recipe
+    from jobs.verbs.tables import plan_table
 
     Console().print(plan_table(tasks_of(load_recipe(recipe))))
 
@@ -108,7 +108,7 @@ def plan(recipe: RecipeName) -> None:
 @app.command(sort_key=4)
 def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Compute the ground truth: the shards of a recipe's data set."""
-    from jobs.work import work
+    from jobs.verbs.run import work
 
     work(recipe, ["generate"], out, scheduler, workers)
 
@@ -133,8 +133,8 @@ def evaluate(
     skip_bad: Annotated[bool, Parameter(help="List rows without an answer, instead of stopping at them.")] = False,
 ) -> None:
     """Answer any list of questions about a fabric: the file's rows with their answers."""
-    from jobs.evaluating import evaluate as answer
-    from jobs.evaluating import truth_options
+    from jobs.verbs.evaluate import evaluate as answer
+    from jobs.verbs.evaluate import truth_options
     from weaves.fabric import load_fabric
 
     chosen = {
@@ -148,7 +148,7 @@ def evaluate(
     }
     options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
     if model is not None:
-        from jobs.answering import answerer, refuse_options_of_the_truth
+        from jobs.verbs.answerer import answerer, refuse_options_of_the_truth
 
         refuse_options_of_the_truth(chosen | {"seed": seed or None, "workers": workers or None})
         other = answerer(model, cloth, extrapolate)
@@ -160,7 +160,7 @@ def check(
     subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")], *, out: Out = OUT
 ) -> int:
     """Read every finished shard again, or test a fabric's ground truth against the laws of physics."""
-    from jobs.checking import check_dataset, check_fabric, resolve
+    from jobs.verbs.check import check_dataset, check_fabric, resolve
     from weaves.fabric import Fabric
 
     found = resolve(subject, out)
@@ -176,7 +176,7 @@ def check(
 @app.command(sort_key=7)
 def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Train the models of a recipe on its data set."""
-    from jobs.work import work
+    from jobs.verbs.run import work
 
     work(recipe, ["train"], out, scheduler, workers)
 
@@ -195,12 +195,12 @@ def bench(
     workers: Workers = 0,
 ) -> None:
     """Measure error, aliasing and time of every method, or how stable, fast and accurate the truth itself is."""
-    from jobs.benching import BENCHES, bench_alone
+    from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
         bench_alone(recipe, out, scheduler, workers)
         return
-    from jobs.work import work
+    from jobs.verbs.run import work
 
     work(recipe, ["bench"], out, scheduler, workers)
 
@@ -208,7 +208,7 @@ def bench(
 @app.command(sort_key=9)
 def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Write the page: pictures, tables and plots of everything measured."""
-    from jobs.work import work
+    from jobs.verbs.run import work
 
     work(recipe, ["report"], out, scheduler, workers)
 
@@ -216,8 +216,8 @@ def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", wor
 @app.command(sort_key=10)
 def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
     """Generate, train, bench and report, skipping what is done."""
-    from jobs.task import STAGES
-    from jobs.work import work
+    from jobs.plan.task import STAGES
+    from jobs.verbs.run import work
 
     work(recipe, STAGES, out, scheduler, workers)
 
@@ -227,11 +227,11 @@ def status(recipe: RecipeName, *, out: Out = OUT) -> None:
     """Show what is done, what failed and why, and what is missing."""
     from rich.console import Console
 
-    from jobs.benching import measured_alone
-    from jobs.ledger import Ledger
-    from jobs.plan import plan as tasks_of
-    from jobs.recipe import load_recipe
-    from jobs.tables import status_table
+    from jobs.plan.plan import plan as tasks_of
+    from jobs.recipe.load import load_recipe
+    from jobs.run.ledger import Ledger
+    from jobs.verbs.bench import measured_alone
+    from jobs.verbs.tables import status_table
 
     Console().print(status_table(tasks_of(load_recipe(recipe), measured_alone(out)), Ledger(out)))
 
@@ -245,7 +245,7 @@ def compare(
     other_machine: Annotated[bool, Parameter(help="Compare measurements of different machines, too.")] = False,
 ) -> None:
     """Compare two benchmarks and mark which differences are real."""
-    from jobs.comparing import compare as compared
+    from jobs.verbs.compare import compare as compared
 
     compared(a, b, recipe, other_machine)
 
@@ -267,7 +267,7 @@ def require(
     out: Out = OUT,
 ) -> None:
     """Tell what a scene requires and write the cheapest recipe that meets a wish."""
-    from jobs.requiring import require as required
+    from jobs.verbs.require import require as required
 
     required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
 
@@ -280,7 +280,7 @@ def savings(
     out: Out = OUT,
 ) -> None:
     """Tell what scenes' own recipes saved against the general one, and at which error."""
-    from jobs.saving import savings as saved
+    from jobs.verbs.savings import savings as saved
 
     saved(scenes, out, recipe)
 

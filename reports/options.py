@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from pipeline.models.options.base import RoundFootprint
+from pipeline.models.options import RoundFootprint
 from pipeline.scenes.options import SceneOptions, View, ViewOptions
 from pipeline.truth.options import TruthOptions
 
@@ -30,21 +30,21 @@ Side = Annotated[int, Field(ge=16, le=4096)]
 
 
 SCENE_BENCH_VERSION: Final = 2
-"""Version of what is measured and written on scenes (`reports.scene_frames`, `reports.scene_bench`), beside `VERSION`;
+"""Version of what is measured and written on scenes (`reports.measure.scene`), beside `VERSION`;
 their tasks have no number of it before 1."""
 
 EXTREMES_VERSION: Final = 1
-"""Version of the numbers of `reports.stability_methods`, which have tasks of their own."""
+"""Version of the numbers of `reports.measure.extremes`, which have tasks of their own."""
 
 RuntimeName = Literal["eager-bf16", "eager-fp16", "compile", "compile-bf16", "onnx", "onnx-int8"]
 """Ways to run a trained method, `pipeline.models.runtimes` says which."""
 
 EXTREME_PRECISIONS: Final[tuple[RuntimeName, ...]] = ("eager-bf16", "eager-fp16")
-"""Those in which every trained method is asked the extremes, beside single precision (`reports.stability_methods`)."""
+"""Those in which every trained method is asked the extremes, beside single precision (`reports.measure.extremes`)."""
 
 
 class EdgeOptions(BaseModel):
-    """The edge of a cloth cylinder (`reports.silhouette`): cylinder, camera, light and truth."""
+    """The edge of a cloth cylinder (`reports.measure.silhouette`): cylinder, camera, light and truth."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -66,12 +66,12 @@ class EdgeOptions(BaseModel):
 
 
 class ImageOptions(BaseModel):
-    """How a picture is compared with the truth's (`reports.image_error`)."""
+    """How a picture is compared with the truth's (`reports.measure.scene.image_error`)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     exposure: float = Field(default=1.6, gt=0)
-    """Factor on linear values before they are shown, as on the page (`reports.tiles`); HDR-FLIP chooses its own."""
+    """Factor on linear values before they are shown, as on the page (`tiles`); HDR-FLIP chooses its own."""
     relative_epsilon: float = Field(default=0.01, gt=0)
     """What keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
     ssim_sigma: float = Field(default=1.5, ge=0.5, le=8)
@@ -94,7 +94,7 @@ class ImageOptions(BaseModel):
 
 
 class DisplayOptions(BaseModel):
-    """The display and the place from which FovVideoVDP looks at frames (`reports.fovvideovdp`)."""
+    """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.fovvideovdp`)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -115,7 +115,7 @@ class DisplayOptions(BaseModel):
 
 
 class SceneBenchOptions(BaseModel):
-    """Scenes that every method renders (`reports.scene_frames`), and how true their truth is."""
+    """Scenes that every method renders (`reports.measure.scene.frames`), and how true their truth is."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -173,7 +173,7 @@ class BenchOptions(BaseModel):
     """Width and height of those frames, in pixels."""
     timing_rows: int = Field(default=4096, ge=64)
     """Queries a fabric in one timed call; fewer of the same for a method that would take longer than
-    `reports.timing.LONGEST`."""
+    `reports.measure.timing.LONGEST`."""
     timing_repeats: int = Field(default=25, ge=20, le=10_000)
     """Timed calls of each method, interleaved with those of the others."""
     warm_up: int = Field(default=3, ge=1, le=1000)

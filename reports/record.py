@@ -20,7 +20,7 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from pipeline.atomic import atomic_write
-from reports.metrics import Error
+from reports.error import Error
 from reports.options import VERSION
 from weaves.errors import BadInput
 
@@ -126,7 +126,7 @@ Metric = Literal[
     "extreme_not_finite",
     "extreme_negative",
 ]
-"""Everything that is measured; defined in `reports.page`, from `worst_error` on in `reports.stability`, `throughput`,
+"""Everything that is measured; defined in the page, from `worst_error` on in `reports.truth.stability`, `throughput`,
 `accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error`,
 `fovvideovdp` and `scene_bench`, from `extreme_error` on in `stability_methods`; `not_run` is 1 for a runtime that the
 machine lacks, its `note` the reason."""

@@ -11,7 +11,7 @@ The yarn beneath is bent the other way, k < 0: its inner side ends at |y| = (1 +
 straight, inclined by u_max, to the end of the float. The relief beta scales height and slopes. Written with the
 curvature k instead of the radius R, everything stays finite and exact as the bend goes to 0.
 
-A weft's frame is the warp's turned by 90°: (x, y) -> (y, -x). Fabric axes: pipeline.truth.frames.
+A weft's frame is the warp's turned by 90°: (x, y) -> (y, -x). Fabric axes: pipeline.truth.conventions.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Never more light than arrives: any method's answers, cut at what the cloth returns without shadows.
 
-Beside each component, the sums (pipeline.truth.sums.features) know what it would be without shadows of the light: a
-mean of the point model over nodes whose weights do not depend on wi. For every node the diffuse lobe
-(w_d <i.n_p> + (1 - w_d) i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean of them. Hence
+Beside each component, the sums (pipeline.analytic.soft_nodes.features) know what it would be without shadows of the
+light: a mean of the point model over nodes whose weights do not depend on wi. For every node the diffuse lobe (w_d
+<i.n_p> + (1 - w_d) i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean of them. Hence
 
     answer <= bound  for every wi   implies   integral of C_warp + C_weft over wi <= 1
 
@@ -16,13 +16,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.method import CHUNK, Method
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
-from pipeline.models.selvage import Selvage
+from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
-from pipeline.truth.sums.features import read_queries
-from pipeline.truth.sums.table import tabulate
 from weaves.fabric import Fabric
 
 BOUNDED, UNBOUNDED = "bounded", "unbounded"

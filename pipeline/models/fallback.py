@@ -5,7 +5,7 @@ had nothing else would ask them so: the ellipse becomes the round footprint of e
 blurs and never aliases), the curvature is left out. Nothing stands in for light from behind, nor for yarns unlike those
 that a network was trained on, such as open cloth where it saw solid cloth alone, nor for footprints and directions
 beyond the ranges that it was trained on (`pipeline.models.domain`): such a query is answered by the truth's own
-quadrature (`pipeline.models.stand_in`) and never guessed at. How many those are is part of every result.
+quadrature (`pipeline.models.fallback_table`) and never guessed at. How many those are is part of every result.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.models.domain import Domain
+from pipeline.models.fallback_table import stand_in
 from pipeline.models.method import Method
-from pipeline.models.options.base import RoundFootprint
-from pipeline.models.stand_in import stand_in
+from pipeline.models.options import RoundFootprint
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

@@ -18,8 +18,8 @@ from pydantic import TypeAdapter, ValidationError
 from safetensors import SafetensorError
 from torch import Tensor
 
+from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.method import Method
-from pipeline.models.options import CLASSES, ModelOptions
 from weaves.errors import BadInput, nearest
 
 WEIGHTS, CARD = "model.safetensors", "card.json"
@@ -29,7 +29,17 @@ def module_of(model: str) -> ModuleType:
     """Import the file of a model; BadInput, with the nearest name, if there is none."""
     if model not in CLASSES:
         raise BadInput("models", "model", model, nearest(model, CLASSES))
-    return import_module(f"pipeline.models.{model}")
+    return import_module(f"pipeline.models.{model}.model")
+
+
+def pretrained_folder(model: str) -> Path:
+    """Return the folder of the weights that come with the package for a model."""
+    return Path(__file__).parent / model / "pretrained"
+
+
+def pretrained_names() -> list[str]:
+    """Return the names of the models that come with the package, trained."""
+    return sorted(path.parents[1].name for path in Path(__file__).parent.glob(f"*/pretrained/{CARD}"))
 
 
 def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:

@@ -1,7 +1,8 @@
 """Directions drawn from what a patch of cloth returns, with their exact density: what a path tracer needs of a model.
 
 An analytic proxy, no network: the flakes' lobes at a few points of the footprint and a cosine on either side
-(pipeline.truth.lobes). It knows the fabric's colours, because they decide how much of the light is specular.
+(pipeline.analytic.importance.lobes). It knows the fabric's colours, because they decide how much of the light is
+specular.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.importance.lobes import Lobes, densities, draw, find_lobes
 from pipeline.models.method import Method
 from pipeline.truth.cloth import columns_of, model_of
-from pipeline.truth.lobes import Lobes, densities, draw, find_lobes
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.colour import luminance

@@ -2,8 +2,8 @@
 
 A pixel that shows the fabric is a *place*: a footprint on the cloth and a direction to the viewer, in the local frame
 x along the weft, y along the warp, z = normal. A place under one light is a *question*; its answer f_P, which already
-contains the incident cosine (pipeline.truth.frames), times the light's irradiance is added to the pixel. So N places
-under several lights are M questions, and one light that reaches every place gives M = N.
+contains the incident cosine (pipeline.truth.conventions), times the light's irradiance is added to the pixel. So N
+places under several lights are M questions, and one light that reaches every place gives M = N.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """From components to pictures: colour is applied last, so editing it costs nothing.
 
 f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft already contains the incident cosine
-(pipeline.truth.frames): under a light of irradiance E a pixel's radiance is E f_P.
+(pipeline.truth.conventions): under a light of irradiance E a pixel's radiance is E f_P.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def compose(
     transparency : array_like
         Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
     coverage : array_like
-        Share of each place that the curved fabric hides (`pipeline.truth.curved.opacity`), for cloth without gaps: a
-        number or (N,).
+        Share of each place that the curved fabric hides (`pipeline.truth.geometry.opacity.opacity`), for cloth without
+        gaps: a number or (N,).
     """
     light = np.zeros((len(gbuffer.pixel), 3))
     np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))

@@ -11,7 +11,7 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.schema import SCHEMA, STANDARD_ERRORS
 from pipeline.shards.store import read_table
-from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
+from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import STEEPEST_CURVATURE
 from weaves.errors import BadInput
 

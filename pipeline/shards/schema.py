@@ -1,7 +1,8 @@
 """The columns of a shard: one row is one query with its answer.
 
-Flat named columns, 32-bit floats; conventions (who is `wi`, is the cosine inside) are those of pipeline.truth.frames.
-The file's own metadata repeats the choices that shaped it, so that a shard read alone is still understood.
+Flat named columns, 32-bit floats; conventions (who is `wi`, is the cosine inside) are those of
+pipeline.truth.conventions. The file's own metadata repeats the choices that shaped it, so that a shard read alone is
+still understood.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Final
 
 import pyarrow as pa
 
-from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
+from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 
 SCHEMA_VERSION: Final = 2
 

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
 from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION, STANDARD_ERRORS
-from pipeline.truth.frames import COMPONENTS, TRANSPARENCY
+from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 

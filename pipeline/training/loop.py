@@ -22,8 +22,8 @@ from torch import nn
 
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
+from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
-from pipeline.models.options import ModelOptions
 from pipeline.models.registry import CARD, WEIGHTS, module_of
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State

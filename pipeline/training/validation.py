@@ -17,7 +17,7 @@ from torch import Tensor
 
 from pipeline.models.registry import module_of
 from pipeline.shards.manifest import Manifest
-from pipeline.truth.frames import COMPONENTS
+from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.query import Answers, Queries
 
 FOOTPRINTS = (0.1, 0.3, 1.0, 4.0)

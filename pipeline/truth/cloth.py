@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth.footprint import BOX, GAUSSIAN
-from pipeline.truth.heightfield import HeightField, height_field
+from pipeline.truth.footprint.place import BOX, GAUSSIAN
+from pipeline.truth.geometry.heightfield import HeightField, height_field
 from pipeline.truth.options import TruthOptions, Variation
-from pipeline.truth.patch import Choices
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.point import Choices
 from weaves.fabric import Fabric
 
 AREA: Final = 5

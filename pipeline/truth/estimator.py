@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.truth import replicates
-from pipeline.truth.auto import auto_rows, elliptic_rows, table_rows
+from pipeline.truth import monte_carlo
 from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
+from pipeline.truth.node_table.cascade import auto_rows, elliptic_rows, table_rows
 from pipeline.truth.options import EstimatorName, TruthOptions
-from pipeline.truth.quadrature import quadrature_rows
+from pipeline.truth.quadrature.adaptive import quadrature_rows
 from pipeline.truth.query import Answers, Queries, validate
 from weaves.fabric import Fabric
 
@@ -26,7 +26,7 @@ from weaves.fabric import Fabric
 def _sampled(
     method: int, model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
 ) -> Raw:
-    return replicates.sample_rows(
+    return monte_carlo.sample_rows(
         model,
         columns,
         index,
@@ -42,10 +42,10 @@ def _sampled(
 Estimator = Callable[[Model, Columns, npt.NDArray[np.int64], TruthOptions, int], Raw]
 
 ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
-    "mc": partial(_sampled, replicates.INDEPENDENT),
-    "jittered": partial(_sampled, replicates.JITTERED),
-    "r2": partial(_sampled, replicates.R2),
-    "owen": partial(_sampled, replicates.OWEN),
+    "mc": partial(_sampled, monte_carlo.INDEPENDENT),
+    "jittered": partial(_sampled, monte_carlo.JITTERED),
+    "r2": partial(_sampled, monte_carlo.R2),
+    "owen": partial(_sampled, monte_carlo.OWEN),
     "quadrature": quadrature_rows,
     "table": table_rows,
     "auto": auto_rows,

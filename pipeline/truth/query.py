@@ -1,7 +1,7 @@
 """Queries and answers: what a patch BSDF is asked, and what comes back.
 
-A query is one patch seen from one direction and lit from another (pipeline.truth.frames says who is who); an answer
-holds the four components.
+A query is one patch seen from one direction and lit from another (pipeline.truth.conventions says who is who); an
+answer holds the four components.
 """
 
 from __future__ import annotations

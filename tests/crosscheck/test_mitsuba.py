@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from pipeline.truth.estimator import estimate
-from pipeline.truth.microflake import density, sigma
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.microflake import density, sigma
 from weaves.fabric import load_fabric
 from weaves.mesh import repeat_mesh
 from weaves.satin import Satin

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from jobs.task import Task
+from jobs.plan.task import Task
 
 
 def task(name, stage="generate", needs=(), cost=1.0, alone=False, **spec):
@@ -54,6 +54,6 @@ def chain():
 
 
 if __name__ == "__main__":
-    from jobs.executor import execute
+    from jobs.run.executor import execute
 
     execute(chain(), Path(sys.argv[1]), run, workers=2)

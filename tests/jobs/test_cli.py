@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-import jobs.work
+import jobs.verbs.run
 from jobs.cli import main
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import write_shard
-from pipeline.truth import invariants
+from pipeline.truth.checks import invariants
+from pipeline.truth.checks.check_result import exact, worst
 from pipeline.truth.query import Answers
-from pipeline.truth.verdict import exact, worst
-from reports.exr import read_exr
+from reports.images.exr import read_exr
 from weaves.errors import WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
@@ -123,7 +123,7 @@ def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code
     def burst(*arguments, **options):
         raise error
 
-    monkeypatch.setattr(jobs.work, "work", burst)
+    monkeypatch.setattr(jobs.verbs.run, "work", burst)
     assert words in complaint(twillight("run", "quick", "--out", "products"), code)
     crashes = list((tmp_path / "products").glob("crash-*.txt"))
     assert len(crashes) == isinstance(error, ZeroDivisionError)

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from jobs.answering import PRETRAINED, pretrained_names
-from pipeline.models.registry import load_model
+from jobs.verbs.answerer import pretrained_names
+from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.furnace import measure_furnace
+from reports.measure.furnace import measure_furnace
 from weaves.fabric import load_fabric
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
@@ -22,7 +22,7 @@ def test_a_model_that_comes_with_the_package(name):
 
     400 queries of footprints from .3 yarn on, where single queries do not decide: 4 % seen, 6 % unseen.
     """
-    folder = PRETRAINED / name
+    folder = pretrained_folder(name)
     assert sum(path.stat().st_size for path in folder.iterdir()) < 5e6
     card = json.loads((folder / "card.json").read_text())
     assert card["name"] == name and card["dataset"]["name"] == "pretrained"

@@ -1,9 +1,9 @@
 """The whole way, from fabrics to the page, on the smallest recipe; then again, and again with a shard cut in half."""
 
 from jobs.cli import main
-from jobs.ledger import Ledger
-from jobs.plan import plan
-from jobs.recipe import load_recipe
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
 
 
 def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):

@@ -2,14 +2,14 @@
 
 import pytest
 
+from pipeline.analytic.exact_points import PointSampler
 from pipeline.shards.generate import ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.point_sampler import PointSampler
 from reports.options import BenchOptions
 from reports.record import Record
-from reports.summary import COMPONENTS
+from reports.tables.summary import COMPONENTS
 from weaves.fabric import load_fabric
 
 COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)

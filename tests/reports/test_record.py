@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from reports.metrics import squared_error
+from reports.error import squared_error
 from reports.record import (
     Provenance,
     Record,

@@ -6,11 +6,11 @@ from typing import Final
 
 from pipeline.scenes.scene import Scene
 from pipeline.scenes.shipped.curtain import CURTAIN
+from pipeline.scenes.shipped.dinner_table import TABLE
 from pipeline.scenes.shipped.drape import DRAPE
 from pipeline.scenes.shipped.plane import PLANE
 from pipeline.scenes.shipped.roll import ROLL
 from pipeline.scenes.shipped.sphere import SPHERE
-from pipeline.scenes.shipped.table import TABLE
 
 SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in (PLANE, SPHERE, DRAPE, ROLL, CURTAIN, TABLE)}
 """Every shipped scene by its name."""

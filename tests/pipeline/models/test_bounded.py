@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.models.bounded import Bounded, counterpart
-from pipeline.models.sums import Sums
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
-from reports.furnace import measure_furnace
+from reports.measure.furnace import measure_furnace
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -41,7 +41,7 @@ def test_what_is_below_the_bound_stays_as_it_is():
     # Shadows only take light away: the sums themselves lie below their bound.
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 500)
-    sums = Sums()
+    sums = SoftNodes()
     np.testing.assert_allclose(Bounded(sums).predict(fabric, queries), sums.predict(fabric, queries), rtol=1e-6)
 
 

@@ -1,24 +1,19 @@
 """A method for any query: nearest forms where there are any, quadrature where there are none."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import pipeline.models
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
-from pipeline.models.options import PointSampledOptions
-from pipeline.models.registry import load_methods, load_model
-from pipeline.models.stand_in import FLAT, stand_in
-from pipeline.models.sums import Sums
+from pipeline.models.fallback_table import FLAT, stand_in
+from pipeline.models.point_sampled.options import PointSampledOptions
+from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
-
-PRETRAINED = Path(pipeline.models.__file__).parent / "pretrained" / "selvage"
 
 
 class Seen:
@@ -95,7 +90,7 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
 
 
 def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
-    (selvage,) = load_model(PRETRAINED)
+    (selvage,) = load_model(pretrained_folder("selvage"))
     fallback = Fallback(selvage, ())
     denim = load_fabric("denim")
     rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
@@ -154,7 +149,7 @@ def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own()
 
 @pytest.mark.parametrize("rows", [0, 7])
 def test_plain_queries_are_the_methods_alone(rows):
-    fabric, sums = load_fabric("denim"), Sums()
+    fabric, sums = load_fabric("denim"), SoftNodes()
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, rows)
     np.testing.assert_array_equal(Fallback(sums, ()).predict(fabric, queries), sums.predict(fabric, queries))
 

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.curved import Curved, CurvedNetwork
+from pipeline.models.curved.model import Curved, CurvedNetwork
+from pipeline.models.curved.options import CurvedOptions
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
-from pipeline.models.neumip import NeumipNetwork, restore
+from pipeline.models.fallback_table import stand_in
+from pipeline.models.neumip.model import NeumipNetwork, restore
+from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.one_material import restored
-from pipeline.models.options import CurvedOptions, NeumipOptions
-from pipeline.models.stand_in import stand_in
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric
 

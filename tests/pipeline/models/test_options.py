@@ -5,7 +5,10 @@ from importlib.util import find_spec
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.models.options import CLASSES, ModelOptions, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.models.catalogue import CLASSES, ModelOptions
+from pipeline.models.neumip.options import NeumipOptions
+from pipeline.models.point_sampled.options import PointSampledOptions
+from pipeline.models.woven.options import WovenOptions
 from pipeline.training.options import TrainingOptions
 
 MODEL = TypeAdapter(ModelOptions)

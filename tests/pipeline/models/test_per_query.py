@@ -4,22 +4,20 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.btf_autoencoder import BtfAutoencoder
-from pipeline.models.curved import Curved, CurvedNetwork
-from pipeline.models.neumip import Neumip, NeumipNetwork
-from pipeline.models.options import (
-    CurvedOptions,
-    NeumipOptions,
-    PointSampledOptions,
-    SelvageOptions,
-    UnifiedBtfOptions,
-    WovenOptions,
-)
+from pipeline.models.btf_autoencoder.model import BtfAutoencoder
+from pipeline.models.curved.model import Curved, CurvedNetwork
+from pipeline.models.curved.options import CurvedOptions
+from pipeline.models.neumip.model import Neumip, NeumipNetwork
+from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.per_query import Portable
+from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods
-from pipeline.models.selvage import Selvage, SelvageNetwork
-from pipeline.models.unified_btf import UnifiedBtf, UnifiedBtfNetwork
-from pipeline.models.woven import Woven, WovenNetwork
+from pipeline.models.selvage.model import Selvage, SelvageNetwork
+from pipeline.models.selvage.options import SelvageOptions
+from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork
+from pipeline.models.unified_btf.options import UnifiedBtfOptions
+from pipeline.models.woven.model import Woven, WovenNetwork
+from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric
 

@@ -2,14 +2,17 @@ import json
 
 import pytest
 
-from pipeline.models.options import CLASSES, NeumipOptions, PointSampledOptions, WovenOptions
+from pipeline.models.catalogue import CLASSES
+from pipeline.models.neumip.options import NeumipOptions
+from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods, load_model, module_of
+from pipeline.models.woven.options import WovenOptions
 from weaves.errors import BadInput
 
 
-def test_every_model_is_the_file_of_its_name():
+def test_every_model_is_the_folder_of_its_name():
     for model in CLASSES:
-        assert module_of(model).__name__ == f"pipeline.models.{model}"
+        assert module_of(model).__name__ == f"pipeline.models.{model}.model"
 
 
 def test_an_unknown_model_names_the_nearest():

@@ -11,12 +11,13 @@ from torch import nn
 from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
 from pipeline.models.method import CHUNK
-from pipeline.models.neumip import Neumip, NeumipNetwork
-from pipeline.models.options import NeumipOptions, WovenOptions
+from pipeline.models.neumip.model import Neumip, NeumipNetwork
+from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.runtimes import RUNTIMES, TOLERANCE, RunBy, Runtime, not_run, runs
-from pipeline.models.sums import Sums
-from pipeline.models.woven import Woven, WovenNetwork
+from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.models.woven.model import Woven, WovenNetwork
+from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.options import RuntimeName
 from weaves.errors import BadInput, WorkFailed
@@ -161,7 +162,7 @@ def test_what_the_machine_lacks_is_left_out_with_its_reason(monkeypatch):
     names, method = ["eager-bf16", "compile"], Linear(np.eye(4, 3))
     assert [run.setting for run in runs(method, names)] == ["eager-bf16"]
     assert not_run(method, names) == {"compile": "no compiler"}
-    assert not runs(Sums(), names) and not not_run(Sums(), names)
+    assert not runs(SoftNodes(), names) and not not_run(SoftNodes(), names)
 
 
 def test_lacking_packages_are_named(monkeypatch):

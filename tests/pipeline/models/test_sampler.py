@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.models.options import TableOptions
 from pipeline.models.sampler import Sampler
-from pipeline.models.table import restore as restore_table
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
@@ -82,7 +81,7 @@ def test_patches_that_nobody_sees_still_have_samples():
 
 def test_value_and_density_come_together():
     fabric, wo = FABRICS[0], unit(40.0, 10.0)
-    (method,) = restore_table(TableOptions(nodes=[8]), [])
+    method = SoftNodes()
     wi = np.tile(unit(20.0, 200.0), (5, 1))
     queries = asked(wi, wo, 0.5, 5)
     values, pdf = Sampler().eval_pdf(method, fabric, queries)

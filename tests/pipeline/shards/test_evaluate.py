@@ -13,8 +13,8 @@ import pipeline.shards.evaluate as evaluate_module
 import pipeline.shards.questions as questions_module
 from pipeline.shards.evaluate import Summary, bad_list, evaluate_file
 from pipeline.shards.schema import QUERY_COLUMNS, STANDARD_ERRORS
+from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
-from pipeline.truth.frames import COMPONENTS
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput

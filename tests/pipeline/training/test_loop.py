@@ -7,8 +7,10 @@ import safetensors.torch
 import torch
 
 from pipeline.models.method import Method
-from pipeline.models.options import NeumipOptions, SelvageOptions, WovenOptions
+from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
+from pipeline.models.selvage.options import SelvageOptions
+from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
 from pipeline.training.loop import rate_factor, train

@@ -7,10 +7,10 @@ import pytest
 
 from pipeline.truth.cloth import model_of
 from pipeline.truth.estimator import estimate
-from pipeline.truth.heightfield import height_field
+from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.patch import point_share, scene
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.point import point_share, scene
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, WARP, WEFT, surface_at
 
@@ -49,7 +49,7 @@ def _free(fabric, x, y, z, w, curvature):
 
 
 def _brute(fabric, wi, wo, curvature, x, y):
-    """Return area, F_specular V A and F_diffuse V A of points, the formulas of pipeline.truth.patch written anew."""
+    """Return area, F_specular V A and F_diffuse V A of points, the formulas of scattering.point written anew."""
     point, back = surface_at(fabric, x, y), surface_at(fabric.back(), x, y)
     n, t = point.normal, point.tangent
     across = (wi[:2] @ wo[:2]) ** 2 / ((wi[:2] @ wi[:2]) * (wo[:2] @ wo[:2]))

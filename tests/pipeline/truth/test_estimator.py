@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.analytic.exact_points import PointSampler
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import ESTIMATORS, estimate
-from pipeline.truth.footprint import BOX_SIDE
+from pipeline.truth.footprint.place import BOX_SIDE
+from pipeline.truth.monte_carlo import REPLICATES
 from pipeline.truth.options import EstimatorName, TruthOptions
-from pipeline.truth.point_sampler import PointSampler
 from pipeline.truth.query import Queries
-from pipeline.truth.replicates import REPLICATES
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric, preset_names
 from weaves.surface import surface_at as oracle

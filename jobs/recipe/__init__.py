@@ -1,0 +1,1 @@
+"""Recipes: TOML in, a frozen Recipe out; every key is checked here."""

@@ -1,0 +1,120 @@
+"""Loading a recipe: TOML in, a frozen Recipe out; what it names is found, and what contradicts itself is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from jobs.recipe.recipe import Recipe, RecipeFile
+from jobs.recipe.trained_by import refuse_unlike, with_teachers
+from jobs.recipe.validation import refuse_contradictions
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.shipped import SHIPPED
+from reports.options import BenchOptions
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.population import population_fabrics
+from weaves.validation import read_toml, validated
+
+RECIPES = Path(__file__).parents[1] / "recipes"
+
+
+def recipe_names() -> list[str]:
+    """Return the names of the recipes that come with the package."""
+    return sorted(path.stem for path in RECIPES.glob("*.toml"))
+
+
+def load_recipe(name_or_path: str | Path) -> Recipe:
+    """Read a recipe.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
+
+    Raises
+    ------
+    BadInput
+        If there is no such recipe, or anything in it or in its fabrics cannot be used.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        if str(name_or_path) not in (known := recipe_names()):
+            allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
+            raise BadInput("recipe", "name", str(name_or_path), allowed)
+        path = RECIPES / f"{name_or_path}.toml"
+    return _load(path, ())
+
+
+def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
+    """Read a recipe for those that ask for it, each of which is named in the one before."""
+    where, read = str(path), dict[Path, Recipe]()
+
+    def load(name: object, key: str) -> Recipe:
+        found = _beside(path, name, key)
+        if found in read:
+            return read[found]
+        chain = (*asking, path, found)
+        if found.resolve() in [one.resolve() for one in chain[:-1]]:
+            told = " → ".join(one.stem for one in chain)
+            raise BadInput(where, key, name, f"recipes must not wait for one another: {told}")
+        read[found] = _load(found, chain[:-1])
+        return read[found]
+
+    content, teachers = with_teachers(read_toml(path), where, load)
+    file = validated(RecipeFile, content, where)
+    dataset = file.dataset
+    recipe = Recipe(
+        file.name,
+        file.about,
+        dataset,
+        file.models,
+        _with_scenes(file.bench, path),
+        seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
+        population=tuple(population_fabrics(dataset.population)),
+        unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
+        teachers=teachers,
+    )
+    refuse_contradictions(recipe, where)
+    refuse_unlike(recipe, where)
+    return recipe
+
+
+def _beside(recipe: Path, name: object, key: str) -> Path:
+    """Return the path of a recipe that another one names: of the package, or beside it."""
+    if name in (known := recipe_names()):
+        return RECIPES / f"{name}.toml"
+    if isinstance(name, str) and name.endswith(".toml") and "\0" not in name and (recipe.parent / name).is_file():
+        return recipe.parent / name
+    allowed = f"a recipe's name or the path of a .toml file beside this one is needed; {nearest(str(name), known)}"
+    raise BadInput(str(recipe), key, name, allowed)
+
+
+def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
+    """Load the fabrics that a recipe names."""
+    for index, name in enumerate(names):
+        known = preset_names()
+        if name in known:
+            yield load_fabric(name)
+        elif name.endswith(".toml") and "\0" not in name and (path := recipe.parent / name).is_file():
+            yield load_fabric(path)
+        else:
+            allowed = f"a preset or the path of a .toml file beside the recipe is needed; {nearest(name, known)}"
+            raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
+
+
+def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
+    """Return measurements whose scenes are there, paths being found from wherever the recipe is read."""
+    found = []
+    for index, name in enumerate(bench.scenes.names):
+        path = recipe.parent / name if "\0" not in name else Path()
+        if name not in SHIPPED and not (path.suffix in (".toml", ".xml") and path.is_file()):
+            allowed = "a scene of the package or the path of a .toml or .xml file beside the recipe is needed; "
+            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED))
+        found.append(name if name in SHIPPED else str(path.resolve()))
+    scenes = [load_scene(name).name for name in found]
+    for index, name in enumerate(scenes):
+        if name in scenes[:index]:
+            allowed = "names of scenes must differ, because files are called by them"
+            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed)
+    return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(found)})})

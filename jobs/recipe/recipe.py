@@ -1,0 +1,172 @@
+"""Recipes: which fabrics, how many rows, which models, which measurements.
+
+Three kinds of fabrics: `seen` ones are named, trained on and measured; members of the `population` are drawn at random
+and only trained on; `unseen` ones are only measured. An unseen fabric has training rows too when a model of a single
+material (`neumip`) is in the recipe, and no other model ever reads them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
+
+from pipeline.models.catalogue import ModelOptions
+from pipeline.shards.queries import QueryOptions
+from pipeline.training.options import TrainingOptions
+from pipeline.truth.options import TruthOptions
+from reports.options import BenchOptions, RuntimeName
+from weaves.fabric import Fabric
+from weaves.population import Population
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+class Rows(_Section):
+    """Queries for each fabric."""
+
+    train: StrictInt = Field(ge=1, le=10**10)
+    """For training, each named fabric."""
+    population: StrictInt = Field(default=0, ge=0, le=10**10)
+    """For training, each member of the population."""
+    validation: StrictInt = Field(default=2048, ge=1, le=10**10)
+    """For the figures on model cards, each named fabric."""
+    test: StrictInt = Field(default=8192, ge=1, le=10**10)
+    """For the benchmark, each named fabric; no model ever reads them."""
+
+
+class DatasetOptions(_Section):
+    """What is computed once, for all models."""
+
+    seen: tuple[StrictStr, ...] = Field(min_length=1)
+    """Fabrics to train on and measure: preset names, or paths to TOML files relative to the recipe."""
+    unseen: tuple[StrictStr, ...] = ()
+    """Fabrics that general models are measured on and never trained on."""
+    population: Population = Population()
+    """Random fabrics, only trained on."""
+    rows: Rows
+    """Queries for each fabric."""
+    shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)
+    """Most rows of one shard, which is one task."""
+    seed: StrictInt = Field(default=0, ge=0, lt=2**63)
+    """Seed of all queries and points."""
+    queries: QueryOptions = QueryOptions()
+    """Distribution of the queries."""
+    truth: TruthOptions = TruthOptions()
+    """How they are answered."""
+    training_truth: TruthOptions | None = None
+    """How training rows are answered; left out: as all others. A training averages noise away that a measurement must
+    not have, so that for the same time many coarse rows teach more than few fine ones."""
+
+    def truth_of(self, split: str) -> TruthOptions:
+        """Return how the rows of a split are answered."""
+        return self.training_truth or self.truth if split == "train" else self.truth
+
+
+class ModelRecipe(_Section):
+    """A model and how it is trained; in TOML the options stand beside the table ``training``.
+
+    An entry with the key ``recipe`` names a model of another recipe, which trains it (`jobs.recipe.trained_by`).
+    """
+
+    options: ModelOptions
+    """The design."""
+    training: TrainingOptions = TrainingOptions()
+    """How it is trained."""
+    runtimes: tuple[RuntimeName, ...] | None = None
+    """Ways to run it that are measured too; left out: those of ``bench.runtimes``."""
+
+    @property
+    def of_one_material(self) -> bool:
+        """Whether a trained model knows a single fabric."""
+        return self.options.of_one_material
+
+    @property
+    def learns(self) -> bool:
+        """Whether there is anything to train."""
+        return self.options.learns
+
+    @model_validator(mode="before")
+    @classmethod
+    def _split(cls, table: Any) -> Any:
+        if not isinstance(table, Mapping):
+            return table
+        beside = {key: table[key] for key in ("training", "runtimes") if key in table}
+        return {"options": {key: value for key, value in table.items() if key not in beside}} | beside
+
+    @model_validator(mode="after")
+    def _nothing_idle(self) -> ModelRecipe:
+        if not self.learns and "training" in self.model_fields_set:
+            raise ValueError(f"{self.options.model} has nothing to train: leave [models.training] out")
+        if not self.learns and self.runtimes is not None:
+            raise ValueError(f"{self.options.model} is no network: leave runtimes out")
+        return self
+
+    def measured(self, bench: BenchOptions) -> BenchOptions:
+        """Return what is measured of this model: ways to run a network are no matter of the others."""
+        runtimes = (bench.runtimes if self.runtimes is None else self.runtimes) if self.learns else ()
+        return bench.model_copy(update={"runtimes": runtimes})
+
+
+class RecipeFile(_Section):
+    """A recipe's TOML file, key by key."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
+    about: str = Field(default="", max_length=200)
+    dataset: DatasetOptions
+    models: tuple[ModelRecipe, ...] = Field(default=(), max_length=32)
+    bench: BenchOptions = BenchOptions()
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A whole piece of work, validated, with its fabrics loaded.
+
+    Attributes
+    ----------
+    name, about : str
+        Names the data set and the page; a sentence for `twillight list`.
+    dataset : DatasetOptions
+        Rows, queries and truth.
+    models : tuple of ModelRecipe
+        Designs and trainings.
+    bench : BenchOptions
+        Measurements.
+    seen, population, unseen : tuple of Fabric
+        The fabrics in the order of the recipe.
+    teachers : mapping
+        From the names of models that another recipe trains to that recipe.
+    """
+
+    name: str
+    about: str
+    dataset: DatasetOptions
+    models: tuple[ModelRecipe, ...]
+    bench: BenchOptions
+    seen: tuple[Fabric, ...]
+    population: tuple[Fabric, ...]
+    unseen: tuple[Fabric, ...]
+    teachers: Mapping[str, Recipe] = field(default_factory=dict)
+
+    @property
+    def fabrics(self) -> tuple[Fabric, ...]:
+        """All fabrics."""
+        return self.seen + self.population + self.unseen
+
+    @property
+    def own_models(self) -> list[ModelRecipe]:
+        """The models that no other recipe trains."""
+        return [model for model in self.models if model.options.name not in self.teachers]
+
+    @property
+    def together(self) -> list[Recipe]:
+        """The recipes whose rows are read: itself and those that train models of it, each once."""
+        return list({id(recipe): recipe for recipe in (self, *self.teachers.values())}.values())
+
+    def teacher_of(self, model: ModelRecipe) -> Recipe:
+        """Return the recipe that trains a model: this one, unless the model names another."""
+        return self.teachers.get(model.options.name, self)

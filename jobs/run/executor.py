@@ -1,0 +1,275 @@
+"""Execution: ready tasks go to dask.distributed, most urgent first, and the driver alone writes the ledger.
+
+A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
+only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry). At most one task
+a core is handed out at a time: dask, which cannot know how long a task takes, would park short ones behind a training.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from jobs.plan.task import STAGES, Stage, Task, urgencies
+from jobs.run.ledger import Ledger, Product, measure
+from jobs.run.progress import TOPIC, Board
+from weaves.errors import BadInput, WorkFailed
+
+Progress = Callable[[float], None]
+Runner = Callable[[Task, Path, Progress], None]
+
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+_SECONDS_BETWEEN_SIGNS = 0.2
+_SECONDS_TO_RESTART = 600  # on a busy machine a worker takes minutes to load what it needs
+
+
+class Outcome(NamedTuple):
+    """What a worker sends back: the products of a task, or the reason why there are none."""
+
+    files: dict[str, Product]
+    seconds: float
+    reason: str = ""
+    traceback: str = ""
+
+
+class Summary(NamedTuple):
+    """What a run did: tasks that were done before, tasks done by it, and those that failed."""
+
+    before: list[Task]
+    ran: list[Task]
+    failed: list[Task]
+    waiting: list[Task]
+
+
+def execute(
+    tasks: Sequence[Task],
+    out: Path,
+    runner: Runner,
+    *,
+    stages: Sequence[Stage] = STAGES,
+    scheduler: str = "",
+    workers: int = 0,
+    prepare: Callable[[], None] | None = None,
+    recorded: Callable[[Task], None] = lambda task: None,
+    console: Console | None = None,
+) -> Summary:
+    """Do what is not done yet of some stages.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        The whole plan.
+    out : Path
+        Output folder; every worker must see it under this name.
+    runner : callable
+        Does one task in a worker: ``runner(task, out, progress)``; importable there.
+    stages : sequence of str
+        Stages to work on; what they need of others must be done.
+    scheduler : str
+        Address of a running dask scheduler; empty: a cluster on this machine, which ends with this process.
+    workers : int
+        Worker processes of the local cluster, one thread each; 0: one a core.
+    prepare : callable, optional
+        Called once in one worker before all others, such as to compile kernels.
+    recorded : callable
+        Called in this process after a receipt is written, or products are taken from another data set.
+    console : Console, optional
+        Where progress is shown.
+
+    Raises
+    ------
+    WorkFailed
+        If a needed task of another stage is not done, or the scheduler is lost.
+    """
+    out = out.resolve()
+    ledger = Ledger(out)
+    before = []
+    for task in tasks:
+        done = ledger.state(task) == "done"
+        if not done and ledger.adopt(task):
+            recorded(task)  # to whom it was not there a moment ago
+            done = True
+        if done:
+            before.append(task)
+    finished = {task.id for task in before}
+    todo = {task.id: task for task in tasks if task.id not in finished and task.stage in stages}
+    _refuse_gaps(list(todo.values()), tasks, finished)
+    summary = Summary(before, [], [], [])
+    if not todo:
+        return summary
+
+    console = console or Console(stderr=True)
+    urgency = urgencies(list(todo.values()))
+    with _client(scheduler, min(workers or os.cpu_count() or 1, len(todo))) as client:
+        if prepare:
+            with console.status("compiling kernels"):
+                client.submit(prepare, key="prepare").result()
+        with Board(list(todo.values()), console) as board:
+            client.subscribe_topic(TOPIC, board.hear)
+            running: dict[Any, Task] = {}
+            while todo or running:
+                ready = [task for task in todo.values() if finished.issuperset(task.needs)]
+                ready.sort(key=lambda task: (task.alone, -urgency[task.id]))
+                for task in _admitted(ready, list(running.values()), slots=sum(client.nthreads().values())):
+                    running[_submit(client, runner, todo.pop(task.id), out)] = task
+                    board.begin(task)
+                if not running:
+                    break  # what is left waits for tasks that failed
+                for future in _first_ended(running):
+                    task = running.pop(future)
+                    outcome = _outcome(future)
+                    if outcome.reason:
+                        ledger.fail(task, outcome.reason, outcome.traceback)
+                        summary.failed.append(task)
+                    else:
+                        ledger.finish(task, outcome.files, outcome.seconds)
+                        finished.add(task.id)
+                        recorded(task)
+                        summary.ran.append(task)
+                    board.end(task)
+    summary.waiting.extend(todo.values())
+    return summary
+
+
+def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
+    """Refuse to start when a stage that is not to run has left out something needed."""
+    planned = {task.id: task for task in tasks}
+    own = {task.id for task in todo}
+    gaps = {need for task in todo for need in task.needs if need not in finished and need not in own}
+    if gaps:
+        stage = min((planned[need].stage for need in gaps), key=STAGES.index)
+        count = sum(planned[need].stage == stage for need in gaps)
+        raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; run `twillight {stage}` first")
+
+
+def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> list[Task]:
+    """Return the tasks to hand out now: one a free slot, and a task that must be alone only when nothing runs."""
+    if any(task.alone for task in running):
+        return []
+    admitted = [task for task in ready if not task.alone][: max(0, max(1, slots) - len(running))]
+    return admitted if admitted or running else list(ready[:1])
+
+
+def _submit(client: Any, runner: Runner, task: Task, out: Path) -> Any:
+    """Hand a task to the cluster; one that must be alone gets a fresh process."""
+    if task.alone and client.cluster is not None:
+        # Which also forgets results: a worker's end would have dask compute them again.
+        client.restart(timeout=_SECONDS_TO_RESTART)
+    return client.submit(_work, runner, task, str(out), key=f"{task.stage}-{task.id}")
+
+
+def _work(runner: Runner, task: Task, out: str) -> Outcome:
+    """Do one task in a worker and measure its products; a failure becomes a reason, never an exception."""
+    from distributed import get_worker
+
+    worker, last = get_worker(), 0.0
+
+    def progress(fraction: float) -> None:
+        nonlocal last
+        if (now := time.monotonic()) - last >= _SECONDS_BETWEEN_SIGNS:
+            worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
+            last = now
+
+    start = time.perf_counter()
+    try:
+        runner(task, Path(out), progress)
+        files = {Path(path).name: measure(Path(out) / path) for path in task.products}
+    except (BadInput, WorkFailed) as error:
+        return Outcome({}, time.perf_counter() - start, str(error))
+    except Exception as error:
+        return Outcome({}, time.perf_counter() - start, _sentence(error), traceback.format_exc())
+    return Outcome(files, time.perf_counter() - start)
+
+
+def _outcome(future: Any) -> Outcome:
+    """Return what became of a task, also when its worker could not tell."""
+    from distributed import KilledWorker
+
+    error = future.exception()
+    if error is None:
+        outcome: Outcome = future.result()
+        return outcome
+    if isinstance(error, KilledWorker):
+        return Outcome({}, 0.0, "the process that ran it was killed several times over; is there enough memory?")
+    return Outcome({}, 0.0, _sentence(error))
+
+
+def _first_ended(running: dict[Any, Task]) -> list[Any]:
+    """Wait until at least one task has ended."""
+    from distributed import CancelledError, wait
+
+    try:
+        return list(wait(list(running), return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
+    except (CancelledError, OSError) as error:
+        raise WorkFailed(
+            "the dask scheduler is gone; what was finished is kept, run the same command to go on"
+        ) from error
+
+
+@contextmanager
+def _client(scheduler: str, workers: int) -> Iterator[Any]:
+    """Connect to a scheduler, or start a cluster that listens on the loopback alone and ends with this process."""
+    os.environ.setdefault(
+        "DASK_LOGGING__DISTRIBUTED", "critical"
+    )  # inherited by workers; dask tells every shutdown as a warning
+    import dask.config
+    from distributed import Client, LocalCluster
+
+    if scheduler:
+        try:
+            client = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:
+            raise BadInput("--scheduler", "", scheduler, "no dask scheduler answers at this address") from error
+        with client:
+            yield client
+        return
+    resource_tracker.ensure_running()  # when it is started later, it lets Ctrl-C through again
+    # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
+    with _interrupts_held(), dask.config.set({"distributed.nanny.pre-spawn-environ": _ONE_THREAD}):
+        cluster = LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
+            silence_logs=logging.CRITICAL,
+        )
+        client = Client(cluster)  # type: ignore[no-untyped-call]
+    try:
+        yield client
+    finally:
+        with _interrupts_held():
+            client.close()  # type: ignore[no-untyped-call]
+            cluster.close()
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back until the end of the block.
+
+    Threads and processes started within inherit this for good: of a terminal's Ctrl-C, which goes to every process,
+    only the driver hears, and it stops the workers.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _sentence(error: BaseException) -> str:
+    """Say in one line what an unexpected exception was."""
+    lines = str(error).strip().splitlines() or [""]
+    return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__

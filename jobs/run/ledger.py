@@ -1,0 +1,162 @@
+"""What is done, what failed and why, and what is missing: read from the files alone.
+
+A receipt ``ledger/<task id>.json`` lists a task's products with their sizes and hashes; it is written after them,
+whole or not at all. A task is done exactly when its receipt and every product, of the listed size, are there. No other
+state is kept, so nothing has to be repaired after a kill.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from jobs.plan.task import Task
+from pipeline.atomic import atomic_path, atomic_write
+from pipeline.fingerprint import file_sha256
+from weaves.errors import BadInput, WorkFailed
+
+State = Literal["done", "failed", "missing"]
+
+
+class Product(NamedTuple):
+    """A finished file: its hash and its size in bytes."""
+
+    sha256: str
+    bytes: int
+
+
+class Ledger:
+    """The receipts and failure notes of one output folder."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.folder = out / "ledger"
+
+    def state(self, task: Task) -> State:
+        """Return what the files say about a task."""
+        receipt = self._read(self._receipt(task))
+        if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products):
+            return "done"
+        return "failed" if self._note(task).exists() else "missing"
+
+    def products(self, task: Task) -> dict[str, Product]:
+        """Return the products of a done task by file name, as its receipt lists them."""
+        return {name: Product(**facts) for name, facts in self._read(self._receipt(task)).get("files", {}).items()}
+
+    def seconds(self, task: Task) -> float:
+        """Return how long a done task took; 0 when it is not done."""
+        return float(self._read(self._receipt(task)).get("seconds", 0.0))
+
+    def reason(self, task: Task) -> str:
+        """Return why a task failed; empty when it did not."""
+        return str(self._read(self._note(task)).get("reason", ""))
+
+    def finish(self, task: Task, files: Mapping[str, Product], seconds: float) -> None:
+        """Write a task's receipt and forget that it ever failed."""
+        listed = {name: product._asdict() for name, product in files.items()}
+        self._write(self._receipt(task), {**_heading(task), "files": listed, "seconds": round(seconds, 3)})
+        self._note(task).unlink(missing_ok=True)
+
+    def fail(self, task: Task, reason: str, traceback: str = "") -> None:
+        """Note why a task failed."""
+        self._write(self._note(task), {**_heading(task), "reason": reason, "traceback": traceback})
+
+    def adopt(self, task: Task) -> bool:
+        """Take a task's products from where another data set has them; say whether that made the task done.
+
+        Data sets share shards (the same id is the same bytes), yet each folder is whole, so that it can be copied
+        away; a hard link costs no space.
+        """
+        receipt = self._read(self._receipt(task))
+        for path in map(Path, task.products) if receipt else ():
+            if self._is_whole(self.out / path, receipt):
+                continue
+            sources = sorted(self.out.glob(f"{path.parent.parent}/*/{path.name}"))
+            source = next((file for file in sources if self._is_whole(file, receipt, verify=True)), None)
+            if source is None:
+                return False
+            link(source, self.out / path)
+        return self.state(task) == "done"
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep other runs out of this folder for as long as this process lives.
+
+        Raises
+        ------
+        BadInput
+            If the folder cannot be created or written.
+        WorkFailed
+            If another run is at work there.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = (self.folder / "lock").open("a")
+        except OSError as error:
+            raise BadInput(
+                str(self.out), "", error.strerror or error, "--out must name a folder that can be written"
+            ) from error
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise WorkFailed(
+                    f"{self.out}: another run is at work in this folder; wait for it, or choose another --out"
+                ) from error
+            yield
+
+    def _receipt(self, task: Task) -> Path:
+        return self.folder / f"{task.id}.json"
+
+    def _note(self, task: Task) -> Path:
+        return self.folder / f"{task.id}.failed.json"
+
+    @staticmethod
+    def _is_whole(path: Path, receipt: Mapping[str, Any], verify: bool = False) -> bool:
+        expected = receipt.get("files", {}).get(path.name)
+        try:
+            return (
+                expected is not None
+                and path.stat().st_size == expected["bytes"]
+                and (not verify or file_sha256(path) == expected["sha256"])
+            )
+        except OSError:
+            return False
+
+    @staticmethod
+    def _read(path: Path) -> dict[str, Any]:
+        """Return a file of the ledger; one that is missing or not readable as such says nothing."""
+        try:
+            content = json.loads(path.read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    @staticmethod
+    def _write(path: Path, content: Mapping[str, Any]) -> None:
+        atomic_write(path, json.dumps(content, indent=1).encode() + b"\n")
+
+
+def measure(path: Path) -> Product:
+    """Return the hash and size of a finished file."""
+    return Product(file_sha256(path), path.stat().st_size)
+
+
+def _heading(task: Task) -> dict[str, str]:
+    return {"task": task.id, "stage": task.stage, "title": task.title}
+
+
+def link(source: Path, target: Path) -> None:
+    """Let a second path, whole or not at all, name the same bytes; a copy of them where there are no links."""
+    with atomic_path(target) as temporary:
+        temporary.unlink(missing_ok=True)
+        try:
+            os.link(source, temporary)
+        except OSError:  # another file system, or one without links
+            shutil.copyfile(source, temporary)

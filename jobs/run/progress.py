@@ -1,0 +1,77 @@
+"""One progress bar a stage, weighted by what each task is expected to cost, with the time left."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from jobs.plan.task import STAGES, Stage, Task
+
+TOPIC = "progress"
+"""Dask topic on which workers tell how far a task is: {"task": id, "fraction": share done}."""
+
+
+class Board:
+    """The bars of a run; a context manager. Fractions may arrive from another thread than the driver's."""
+
+    def __init__(self, tasks: Sequence[Task], console: Console) -> None:
+        self._bars = Progress(
+            TextColumn("{task.description:<9}"),
+            BarColumn(bar_width=None),
+            TextColumn("{task.fields[count]:>11}"),
+            TextColumn("elapsed"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=console,
+            expand=True,
+        )
+        self._tasks = {task.id: task for task in tasks}
+        self._fractions = dict.fromkeys(self._tasks, 0.0)
+        self._planned = Counter(task.stage for task in tasks)
+        self._ended: Counter[Stage] = Counter()
+        self._rows: dict[Stage, TaskID] = {}
+        for stage in STAGES:
+            if total := sum(task.cost for task in tasks if task.stage == stage):
+                self._rows[stage] = self._bars.add_task(stage, total=total, start=False, count=self._count(stage))
+
+    def __enter__(self) -> Board:
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bars.stop()
+
+    def begin(self, task: Task) -> None:
+        """Start the clock of a task's stage."""
+        if not self._bars.tasks[self._rows[task.stage]].started:
+            self._bars.start_task(self._rows[task.stage])
+
+    def hear(self, event: tuple[float, Any]) -> None:
+        """Take a message of a worker about a task under way."""
+        _, message = event
+        if task := self._tasks.get(message["task"]):
+            self._advance(task, min(1.0, float(message["fraction"])))
+
+    def end(self, task: Task) -> None:
+        """Count a task as ended, done or failed."""
+        self._ended[task.stage] += 1
+        self._advance(task, 1.0)
+        del self._tasks[task.id]
+
+    def _advance(self, task: Task, fraction: float) -> None:
+        step = fraction - self._fractions[task.id]
+        self._fractions[task.id] = fraction
+        self._bars.update(self._rows[task.stage], advance=task.cost * step, count=self._count(task.stage))
+        if self._ended[task.stage] == self._planned[task.stage]:  # rounding must not leave a bar short of its end
+            self._bars.update(self._rows[task.stage], completed=self._bars.tasks[self._rows[task.stage]].total)
+
+    def _count(self, stage: Stage) -> str:
+        return f"{self._ended[stage]}/{self._planned[stage]} tasks"

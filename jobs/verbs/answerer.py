@@ -1,0 +1,64 @@
+"""Trained models as they are asked on the command line: by name, if one comes with the package, or by folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.models.registry import load_model, pretrained_folder, pretrained_names
+from pipeline.shards.evaluate import Answerer
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric
+
+
+def refuse_options_of_the_truth(chosen: Mapping[str, object]) -> None:
+    """Refuse what means nothing to a model: it answers as it was trained."""
+    for name, value in chosen.items():
+        if value is not None:
+            allowed = "leave it out with --model: a model answers as it was trained"
+            raise BadInput("evaluate", f"--{name.replace('_', '-')}", value, allowed)
+
+
+def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
+    """Return a trained model ready to answer about a fabric.
+
+    Parameters
+    ----------
+    model : str
+        Name of one that comes with the package, or path of a folder with ``model.safetensors`` and ``card.json``.
+    fabric : Fabric
+        What will be asked about.
+    extrapolate : bool
+        Ask even if its yarns lie outside of what the model was trained on.
+
+    Raises
+    ------
+    BadInput
+        If there is no such model, its files are damaged, or it does not know the fabric.
+    """
+    known = pretrained_names()
+    folder = pretrained_folder(model) if model in known else Path(model)
+    if not (folder / "card.json").is_file():
+        allowed = f"the folder of a trained model or a name is needed; {nearest(model, known)}"
+        raise BadInput("evaluate", "--model", model, allowed)
+    (method,) = load_model(folder)
+    if not method.covers(fabric):
+        raise BadInput("evaluate", "--model", model, f"this model was not trained on {fabric.name}")
+    domain = getattr(method, "domain", None)
+    if domain is not None and not extrapolate:
+        domain.refuse_fabric(fabric, method.name)
+    method.prepare(fabric)
+    through: Any = getattr(method, "transparency", None)
+
+    def answer(queries: Queries) -> tuple[np.typing.NDArray[np.float32], np.typing.NDArray[np.float32]]:
+        shares = through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
+        return method.predict(fabric, queries), shares
+
+    about = {"model": method.name, "card": (folder / "card.json").read_text(encoding="utf-8")}
+    if domain is None:
+        return Answerer(answer, about)
+    return Answerer(answer, about, lambda queries: domain.faults(queries, method.name))

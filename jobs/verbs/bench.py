@@ -1,0 +1,172 @@
+"""The measurements that need no recipe: `twillight bench NAME` with one of the names here.
+
+They write their Records beside those of the recipes, so that the next page shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TypeVar
+
+from pipeline.fingerprint import file_sha256
+from weaves.errors import BadInput, WorkFailed
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from reports.truth.finding import Finding
+
+Measurement = TypeVar("Measurement")
+
+STABILITY: Final = "records/stability.json"
+"""File of the Records of `bench stability`, under the folder of all products."""
+
+TRUTH: Final = "records/truth.json"
+"""File of the Records of `bench truth`."""
+
+SAMPLER: Final = "records/sampler.json"
+"""File of the Records of `bench sampler`."""
+
+RECORDS: Final = (STABILITY, TRUTH, SAMPLER)
+"""Files of Records that any page shows, if they exist."""
+
+
+def measured_alone(out: Path) -> dict[str, str]:
+    """Return the files of `RECORDS` that exist, each with its hash: a page is made of them."""
+    return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
+
+
+def bench_alone(name: str, out: Path, scheduler: str = "", workers: int = 0) -> None:
+    """Do one of `BENCHES`.
+
+    Raises
+    ------
+    BadInput
+        If a scheduler or workers are given.
+    WorkFailed
+        If what is measured does not hold.
+    """
+    for option, value in (("--scheduler", scheduler), ("--workers", workers)):
+        if value:
+            raise BadInput(f"bench {name}", option, value, "leave it out: this process on this machine is measured")
+    BENCHES[name](out)
+
+
+def stability(out: Path) -> None:
+    """Compute every expression at its extremes, print the table and write the Records.
+
+    Raises
+    ------
+    WorkFailed
+        If an expression does not hold.
+    """
+    from rich.console import Console
+
+    from reports.record import this_machine, write_records
+    from reports.truth.finding import failures, to_records
+    from reports.truth.stability import stability as findings_of
+
+    console = Console()
+    with console.status("stability") as status:
+        findings = findings_of(lambda about: status.update(f"stability: {about}"))
+    path = out / STABILITY
+    write_records(path, to_records(findings), this_machine(1))
+    console.print(_table(findings))
+    console.print(f"\n{path}: {len(findings)} expressions", soft_wrap=True, highlight=False)
+    if wrong := failures(findings):
+        first, more = wrong[0], f"; {len(wrong) - 1} more do not hold" if len(wrong) > 1 else ""
+        raise WorkFailed(
+            f"stability: {first.expression} in {first.arithmetic}, {first.corner}: {first.fault} at {first.at}{more}"
+        )
+
+
+def truth(out: Path) -> None:
+    """Measure speed, accuracy, bias and where the time goes; print the tables and write the Records."""
+    from rich.console import Console
+
+    from reports.record import this_machine, write_records
+    from reports.tables import truth_cells
+    from reports.truth import accuracy, bias, effort, throughput
+
+    console = Console()
+    with console.status("the truth") as status:
+
+        def all_of(about: str, found: Iterable[Measurement]) -> list[Measurement]:
+            result = []
+            status.update(f"the truth: {about}")
+            for one in found:
+                result.append(one)
+                status.update(f"the truth: {about}, {len(result)} numbers")
+            return result
+
+        rates = all_of("speed", throughput.measure())
+        accuracies = all_of("accuracy", accuracy.measure())
+        biases = all_of("bias", bias.measure())
+        efforts = all_of("where the time goes", effort.measure())
+    records = throughput.to_records(rates) + accuracy.to_records(accuracies)
+    records += bias.to_records(biases) + effort.to_records(efforts)
+    path = out / TRUTH
+    write_records(path, records, this_machine(1))
+    console.print(_columns(("what", "fabric", "rate", "note"), truth_cells.rate_rows(records)))
+    for fabric, rows in truth_cells.accuracy_rows(accuracies).items():
+        console.print(_columns((fabric, *truth_cells.ACCURACY), rows))
+    console.print(_columns(("fabric", *truth_cells.BIAS), truth_cells.bias_rows(biases)))
+    console.print(_columns(("fabric", *truth_cells.EFFORT), truth_cells.effort_rows(efforts)))
+    console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
+
+
+def sampler(out: Path) -> None:
+    """Measure what drawing directions by lobes saves; print the table and write the Records."""
+    from rich.console import Console
+
+    from reports.record import this_machine, write_records
+    from reports.tables import truth_cells
+    from reports.truth import sampling
+
+    console = Console()
+    with console.status("the sampler") as status:
+        found = []
+        for one in sampling.measure():
+            found.append(one)
+            status.update(f"the sampler: {one.fabric}, {one.sampler}")
+    path = out / SAMPLER
+    write_records(path, sampling.to_records(found), this_machine(1))
+    console.print(_columns(("fabric", *truth_cells.SAMPLERS), truth_cells.sampler_rows(found)))
+    console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
+    """Show rows of cells, each table after an empty line."""
+    from rich.padding import Padding
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    for name in names:
+        text = name == names[0] or name in ("fabric", "rate", "note", "light", "how")
+        table.add_column(name, justify="left" if text else "right")
+    for row in rows:
+        table.add_row(*row)
+    return Padding(table, (1, 0, 0, 0))
+
+
+def _table(findings: Sequence[Finding]) -> RenderableType:
+    """Show findings: worst error, limit, the textbook's error, what cannot be, and where what does not hold fails."""
+    from rich.table import Table
+
+    from reports.tables.truth_cells import stability_rows
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    for name in ("expression", "corner", "worst", "limit", "textbook", "NaN", "< 0", ""):
+        table.add_column(name, justify="left" if name in ("expression", "corner", "") else "right")
+    for arithmetic, rows in stability_rows(findings).items():
+        table.add_section()
+        table.add_row(f"[bold]{arithmetic}")
+        for row in rows:
+            where = "" if row["holds"] else f"\nat {row['at']}"
+            table.add_row(row["expression"], f"{row['corner']}{where}", *row["cells"], row["verdict"])
+    return table
+
+
+BENCHES: Final[dict[str, Callable[[Path], None]]] = {"stability": stability, "truth": truth, "sampler": sampler}
+"""Measurements by name; no recipe of such a name can be asked for."""

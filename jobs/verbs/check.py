@@ -1,0 +1,95 @@
+"""Checking: every shard that a data set's manifest lists is read again, or a fabric is held against the physics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+
+from jobs.plan.dataset import folder_of, shards
+from jobs.recipe.load import load_recipe, recipe_names
+from pipeline.shards.check import check_shard
+from pipeline.shards.manifest import Manifest
+from weaves.errors import BadInput, WorkFailed, nearest
+from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.validation import read_toml
+
+WHERE = "check"
+
+
+def resolve(subject: str, out: Path) -> Path | Fabric:
+    """Return what is meant: a data set's own folder, that of a recipe in the output folder, or a fabric.
+
+    A folder is one whatever it is called, unless a recipe or a preset has the same name. A .toml file is known by its
+    tables.
+
+    Raises
+    ------
+    BadInput
+        If nothing is called so, or more than one thing is, or the file cannot be used.
+    """
+    presets, recipes = preset_names(), recipe_names()
+    kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", Path(subject).is_dir())]
+    if len(meant := [kind for kind, found in kinds if found]) > 1:
+        # A path with a slash is never the name of a preset or a recipe.
+        where = f"{'the folder ./' + subject if 'folder' in meant else 'the path of a .toml file'}"
+        raise BadInput(WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it")
+    match meant:
+        case ["folder"]:
+            return Path(subject)
+        case ["preset"]:
+            return load_fabric(subject)
+        case ["recipe"]:
+            return _dataset_folder(subject, out)
+    if not subject.endswith(".toml"):
+        allowed = "a recipe, a folder of a data set or a fabric is needed"
+        raise BadInput(WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
+    tables = read_toml(Path(subject)).keys() & {"dataset", "draft"}
+    if len(tables) != 1:
+        found = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"
+        raise BadInput(subject, "", found, "a recipe has the one, a fabric the other")
+    return load_fabric(subject) if "draft" in tables else _dataset_folder(subject, out)
+
+
+def _dataset_folder(recipe: str, out: Path) -> Path:
+    return out / folder_of(shards(load_recipe(recipe)))
+
+
+def check_dataset(folder: Path) -> list[str]:
+    """Check every shard of a data set, print what was found sound, and return the faults as sentences.
+
+    Raises
+    ------
+    BadInput
+        If the folder has no manifest.
+    """
+    manifest = Manifest.load(folder)
+    console = Console(stderr=True)
+    faults = []
+    for entry in track(manifest.shards, "checking", console=console, disable=not console.is_terminal):
+        faults += check_shard(folder, entry, manifest)
+    rows = sum(entry.rows for entry in manifest.shards)
+    if not faults:
+        Console().print(f"{folder}: {len(manifest.shards)} shards with {rows:,} rows are sound")
+    return faults
+
+
+def check_fabric(fabric: Fabric) -> None:
+    """Test a fabric's ground truth against the invariants of the physics and print what was found.
+
+    Raises
+    ------
+    WorkFailed
+        If an invariant does not hold.
+    """
+    from jobs.verbs.tables import invariants_table
+    from pipeline.truth.checks.invariants import INVARIANTS
+
+    console = Console(stderr=True)
+    found = []
+    for invariant in track(INVARIANTS, "checking", console=console, disable=not console.is_terminal, transient=True):
+        found += invariant(fabric)
+    Console().print(invariants_table(fabric.name, found))
+    if broken := [item.name for item in found if item.verdict == "broken"]:
+        raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(found)} invariants do not hold: {', '.join(broken)}")

@@ -1,0 +1,119 @@
+"""Comparing two benchmarks: where their Records are, and the table of what differs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from weaves.errors import BadInput
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from reports.record import Record
+    from reports.tables.compare import Difference
+
+WHERE = "compare"
+
+
+def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> None:
+    """Print how B differs from A.
+
+    Raises
+    ------
+    BadInput
+        If one of them has no Records or no machine, the machines differ and that was not asked for, or nothing can be
+        compared.
+    """
+    from rich.console import Console
+
+    from reports.record import read_machine, read_records
+    from reports.tables.compare import LEVEL, refuse_other_machine
+    from reports.tables.compare import compare as differences
+    from reports.tables.waiting import busy
+
+    files = [records_file(path, recipe) for path in (a, b)]
+    first, second = (read_records([file]) for file in files)
+    machine_a, machine_b = (read_machine(file) for file in files)
+    unlike = refuse_other_machine(machine_a, machine_b, other_machine)
+    found = differences(first, second)
+    console = Console()
+    for title, rows in (("time", found.times), ("MSE, 95 % interval", found.errors)):
+        if rows:
+            console.print(_table(title, rows), "")
+    for sentence in [*unlike, *found.unlike, *busy(first, second)]:
+        console.print(f"{sentence}.", soft_wrap=True, highlight=False)
+    left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
+    marked = sum(one.verdict not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
+    said = (
+        f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
+    )
+    level = f"the scatter of the readings marks any by chance at most once in {1 / LEVEL:.0f} comparisons (Holm)"
+    load = "Load on the machine is not part of that scatter: compare two runs of A first, on a quiet machine."
+    console.print(f"{said}; {level}.", *([load] if found.times else []), soft_wrap=True, highlight=False)
+
+
+def records_file(path: Path, recipe: str = "") -> Path:
+    """Return the file of Records that is meant: itself, that of a page's folder, or of a page of a folder of products.
+
+    Raises
+    ------
+    BadInput
+        If there is none, or there are several.
+    """
+    from reports.record import OF_A_PAGE
+
+    if path.is_file():
+        return path
+    if not path.is_dir():
+        raise BadInput(WHERE, "", f"{path} does not exist", "a folder of products, of a page, or a file of Records")
+    if not recipe and (path / OF_A_PAGE).is_file():
+        return path / OF_A_PAGE
+    found = sorted(path.glob(f"report/{recipe or '*'}/{OF_A_PAGE}"))
+    if not found:
+        what = f"no page of the recipe {recipe}" if recipe else "no page"
+        raise BadInput(WHERE, "", f"{path} holds {what} with Records", "write one with `twillight report` first")
+    if len(found) > 1:
+        pages = ", ".join(file.parent.name for file in found)
+        raise BadInput(WHERE, "", f"{path} holds several pages", f"choose one with --recipe: {pages}")
+    return found[0]
+
+
+def _table(title: str, rows: Sequence[Difference]) -> Table:
+    """Show differences: what was measured, A, B, B over A, p-value and verdict, what differs in bold."""
+    from rich.table import Table
+
+    from reports.tables.numbers import display
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    for name in ("method", title, "A", "B", "B / A", "p", ""):
+        table.add_column(name, justify="right" if name in ("A", "B", "B / A", "p") else "left")
+    for row in rows:
+        p = "" if math.isnan(row.p) else f"{row.p:.2g}" if row.p >= 1e-3 else "< .001"
+        style = "" if row.verdict in ("no difference shown", "not tested") else "bold"
+        values = [_value(one) for one in (row.a, row.b)]
+        method = display(row.a.method, row.a.setting)
+        table.add_row(method, _what(row), *values, _number(row.ratio), p, row.verdict, style=style)
+    return table
+
+
+def _what(row: Difference) -> str:
+    """Say what was measured, beside the method."""
+    one = row.a
+    if one.metric == "time":
+        return f"a query, {one.threads} thread{'' if one.threads == 1 else 's'}" if one.threads else "a query"
+    return {"prepare_time": "to add a fabric", "encode_time": f"to edit {one.note}"}.get(one.metric, one.fabric)
+
+
+def _value(one: Record) -> str:
+    """Return a time with its unit, or an error with half its 95 % interval."""
+    if one.unit != "1":
+        return f"{one.value:,.4g} {one.unit.split('/')[0]}"
+    half = "" if one.standard_error is None else f" ± {1.96 * one.standard_error:.1e}"
+    return f"{one.value:.2e}{half}"
+
+
+def _number(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.3g}"

@@ -1,0 +1,88 @@
+"""The work of `twillight evaluate`: options from the command line, a bar while it runs, a summary at the end."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from jobs.verbs.tables import evaluation_table
+from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file
+from pipeline.truth.estimator import ESTIMATORS
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric
+from weaves.validation import validated
+
+WHERE = "evaluate"
+
+
+def truth_options(**chosen: object) -> TruthOptions:
+    """Return the options that were given on the command line; the others keep their defaults.
+
+    Raises
+    ------
+    BadInput
+        If one cannot be used, named as it is spelt on the command line.
+    """
+    given = {name: value for name, value in chosen.items() if value is not None}
+    estimator = given.get("estimator", TruthOptions().estimator)
+    if estimator not in ESTIMATORS:
+        raise BadInput(WHERE, "--estimator", estimator, nearest(str(estimator), ESTIMATORS))
+    try:
+        return validated(TruthOptions, given, WHERE)
+    except BadInput as error:
+        if not error.key:
+            raise
+        raise BadInput(WHERE, f"--{error.key.replace('_', '-')}", error.value, error.allowed) from error
+
+
+def evaluate(
+    fabric: Fabric,
+    queries: Path,
+    out: Path,
+    options: TruthOptions,
+    seed: int,
+    workers: int,
+    skip_bad: bool,
+    other: Answerer | None = None,
+) -> None:
+    """Answer the questions of a file on some threads, 0: one a core, and tell in a few lines what was done.
+
+    `other` answers in place of the ground truth.
+
+    Raises
+    ------
+    BadInput
+        As `pipeline.shards.evaluate.evaluate_file`, and if the seed or the number of threads cannot be used.
+    """
+    if workers < 0:
+        raise BadInput(WHERE, "--workers", workers, "must be 0, for one a core, or more")
+    if not 0 <= seed < 2**64:
+        raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
+    console = Console(stderr=True)
+    columns = TextColumn("evaluating"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bars:
+        bar = bars.add_task("evaluating", total=1.0)
+        try:
+            summary = evaluate_file(
+                fabric,
+                queries,
+                out,
+                options,
+                seed,
+                skip_bad,
+                threads=workers or os.cpu_count() or 1,
+                progress=lambda share: bars.update(bar, completed=share),
+                other=other,
+            )
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"stopped; {out} was not written") from None
+    Console().print(evaluation_table(summary))
+    Console().print(str(out), soft_wrap=True, highlight=False)
+    if summary.bad:
+        rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
+        told = f"{rows} no answer; see {bad_list(out)}"
+        Console().print(told, soft_wrap=True, highlight=False)

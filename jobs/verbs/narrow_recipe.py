@@ -1,0 +1,209 @@
+"""A recipe for one scene: its fabrics, its distribution of queries, one method, and a training cut down to that.
+
+Of a general recipe it keeps the truth, the model's options, the training and the measurements, so that a page of either
+says the same of the scene. Fewer fabrics in a narrower domain are learnt from fewer rows in fewer steps; how many is
+the option `effort`. A truth that cannot answer the scene's questions (`table` knows flat cloth and footprints along the
+axes only) makes way for one that samples, at the error that `SAMPLED` states.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.recipe.recipe import ModelRecipe, Recipe
+from jobs.verbs.toml_text import toml
+from pipeline.atomic import atomic_write
+from pipeline.models.domain import PHYSICS
+from pipeline.scenes.requirement import Requirement
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+from weaves.validation import validated
+
+EFFORT: Final = 0.25
+"""Share of the general recipe's training rows a fabric, and of its steps, that a scene's recipe takes."""
+
+SAMPLED: Final = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
+"""What answers training rows where the general recipe's own estimator cannot: coarse, for a training averages noise."""
+
+_TEST_ROWS: Final = 4096
+_FEWEST_ROWS: Final = 1024
+_BASELINE: Final = "point_sampled"
+
+
+def write_recipe(
+    path: Path,
+    requirement: Requirement,
+    general: Recipe,
+    method: str,
+    setting: str,
+    scene: str,
+    fabrics: Mapping[str, tuple[str, Fabric]],
+    effort: float = EFFORT,
+    options: Mapping[str, Any] = MappingProxyType({}),
+) -> None:
+    """Write the recipe of one method in the scene's domain, and read it back: it must be one.
+
+    Parameters
+    ----------
+    path : Path
+        Where it goes.
+    requirement : Requirement
+        What the scene asks.
+    general : Recipe
+        Whose method, truth and training are taken.
+    method, setting : str
+        The method, by its name there, and its setting; empty for all of its settings.
+    scene : str
+        Name of a scene of the package, or path of one, from the current folder.
+    fabrics : mapping
+        For each fabric's name what names it, a preset or a path from the current folder, and itself.
+    effort : float
+        Share of the training rows a fabric and of the steps, > 0; 1: all of them.
+    options : mapping
+        Options of the model that are other than in the general recipe, such as a smaller width.
+
+    Raises
+    ------
+    BadInput
+        If the model has no such options, or the recipe cannot be used.
+    """
+    model = next(model for model in general.models if model.options.name == method)
+    general = general.teacher_of(model)
+    queries = requirement.queries(model.options.kinds)
+    worn = {name: fabrics[name] for name in requirement.fabrics}
+    table: dict[str, Any] = {
+        "name": f"require-{requirement.scene}",
+        "about": f"What the scene {requirement.scene} requires, by {method}.",
+        "dataset": {
+            "seen": [_beside(path, reference) for reference, _ in worn.values()],
+            "shard_rows": general.dataset.shard_rows,
+            "seed": general.dataset.seed,
+            "rows": _rows(general, effort if model.learns else 1.0),
+            "queries": queries.model_dump(mode="json", exclude_defaults=True),
+            **_truths(general, queries, [fabric for _, fabric in worn.values()]),
+        },
+        "models": [_model(model, setting, effort, options), *_baseline(general, method)],
+        "bench": _bench(general, _beside(path, scene)),
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    atomic_write(path, toml(table).encode())
+    load_recipe(path)
+
+
+def alone(general: Recipe, names: set[str]) -> Recipe:
+    """Return a general recipe with some of its methods alone: what it takes to have just them."""
+    return Recipe(**{**vars(general), "models": tuple(m for m in general.models if m.options.name in names)})
+
+
+def effort_of(recipe: Recipe) -> tuple[int, int]:
+    """Return the rows that a recipe generates, and the queries that its trainings learn from, repeats counted."""
+    rows = sum(task.rows for task in plan(recipe) if task.stage == "generate")
+    learnt = sum(
+        model.training.steps * model.training.batch * (len(recipe.seen + recipe.unseen) if model.of_one_material else 1)
+        for model in recipe.models
+        if model.learns
+    )
+    return rows, learnt
+
+
+def savings(path: Path, general: Recipe) -> str:
+    """Say what the recipe saves against the general one: rows to generate, queries to learn from."""
+    own = load_recipe(path)
+    same = alone(general, {model.options.name for model in own.models})
+    (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
+    said = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
+    if learnt:
+        said += (
+            f", {learnt:,} queries to learn from in place of {learnt_general:,} ({learnt_general / learnt:.1f} times)"
+        )
+    return f"Against {general.name} with this method alone: {said}{'' if learnt else ', nothing to train'}."
+
+
+def _rows(general: Recipe, effort: float) -> dict[str, int]:
+    """Return the rows of each split, a fabric."""
+    rows = general.dataset.rows
+    train = min(rows.train, max(_FEWEST_ROWS, round(effort * rows.train)))
+    return {"train": train, "validation": rows.validation, "test": min(rows.test, _TEST_ROWS)}
+
+
+def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> dict[str, Any]:
+    """Return how rows are answered: as in the general recipe, where its estimators know the queries."""
+    dataset = general.dataset
+    physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
+    truth, training = dataset.truth, dataset.training_truth
+    if not _knows(truth, queries, fabrics):
+        truth = truth.model_copy(update={"estimator": SAMPLED.estimator})
+    if training is not None and not _knows(training, queries, fabrics):
+        training = SAMPLED.model_copy(update=physics)
+    found = {"truth": _stated(truth)}
+    return found if training is None else found | {"training_truth": _stated(training)}
+
+
+def _stated(truth: TruthOptions) -> dict[str, Any]:
+    """Return a truth's table: its estimator and error in any case, the rest where it is not the default."""
+    stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
+    return stated | truth.model_dump(mode="json", exclude_defaults=True)
+
+
+def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
+    """Tell whether an estimator answers the distribution's queries, the smallest footprints, about all fabrics."""
+    if truth.estimator == SAMPLED.estimator:
+        return True
+    from pipeline.shards.queries import draw_queries
+    from pipeline.truth.estimator import estimate
+
+    smallest = queries.model_copy(update={"sigma": (queries.sigma[0], queries.sigma[0])})
+    try:
+        for fabric in fabrics:
+            estimate(fabric, draw_queries(smallest, fabric.weave.repeat, 0, 0, 2), truth, 0)
+    except BadInput:
+        return False
+    return True
+
+
+def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
+    """Return point sampling at 2 points, which others are measured by, where the general recipe has it."""
+    found = [model for model in general.models if model.options.name == _BASELINE != method]
+    return [_model(model, "k = 2", 1.0) for model in found]
+
+
+def _model(
+    model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
+    """Return a model's table, with one setting alone where one is wished, and its training cut down."""
+    options = model.options.model_dump(mode="json", exclude_defaults=True) | dict(other)
+    options = {"model": model.options.model, "name": model.options.name} | options
+    validated(type(model.options), options, "--set")
+    if setting.startswith("k = "):
+        options[model.options.knob] = [int(setting.removeprefix("k = "))]
+    if model.learns:
+        training = model.training
+        # The running average of the weights spans the same share of the training.
+        shorter = {
+            "steps": max(1, round(effort * training.steps)),
+            "average": round(training.average ** (1 / effort), 6),
+        }
+        options["training"] = training.model_dump(mode="json", exclude_defaults=True) | shorter
+    return options
+
+
+def _bench(general: Recipe, scene: str) -> dict[str, Any]:
+    """Return the general recipe's measurements, of this scene and of the method as it is."""
+    bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
+    found = bench.model_dump(mode="json", exclude_defaults=True)
+    return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
+
+
+def _beside(path: Path, reference: str) -> str:
+    """Return what names a fabric or scene in a recipe: a path as it is seen from where the recipe lies, or a name."""
+    if Path(reference).suffix not in (".toml", ".xml"):
+        return reference
+    return Path(os.path.relpath(Path(reference).resolve(), path.parent.resolve())).as_posix()

@@ -1,0 +1,77 @@
+"""One verb's work on a recipe: plan, hold the output folder, execute, keep the manifest in step, tell what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from jobs.plan.dataset import shards
+from jobs.plan.plan import plan
+from jobs.plan.task import Stage, Task
+from jobs.recipe.load import load_recipe
+from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile
+from jobs.run.stages import compile_kernels, run
+from jobs.verbs.bench import measured_alone
+from jobs.verbs.tables import methods_table, summary_table
+from weaves.errors import WorkFailed
+
+
+def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, workers: int) -> None:
+    """Do what is not done yet of some stages of a recipe and print a summary.
+
+    Raises
+    ------
+    BadInput
+        If the recipe, the folder or the scheduler cannot be used.
+    WorkFailed
+        If any task failed; the others were done nevertheless.
+    """
+    recipe = load_recipe(recipe_name)
+    tasks = plan(recipe, measured_alone(out))
+    console = Console()
+    ledger = Ledger(out)
+    with ledger.held():
+        manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]
+
+        def recorded(task: Task) -> None:
+            for manifest in manifests:
+                manifest.add(task)
+
+        summary = execute(
+            tasks,
+            out,
+            run,
+            stages=stages,
+            scheduler=scheduler,
+            workers=workers,
+            prepare=compile_kernels if {"generate", "bench"}.intersection(stages) else None,
+            recorded=recorded,
+        )
+    chosen = [task for task in tasks if task.stage in stages]
+    if not summary.ran and not summary.failed:
+        console.print(f"nothing to do: {len(chosen)} tasks done")
+    else:
+        console.print(summary_table(chosen, {task.id: ledger.seconds(task) for task in summary.ran}))
+    page = next(task for task in tasks if task.stage == "report")
+    if "report" in stages and ledger.state(page) == "done":
+        console.print()
+        console.print(methods_table(summary_of([out / path for path in page.setting["records"]])))
+        console.print(f"\nthe page: {(out / page.products[0]).resolve()}", soft_wrap=True)
+    if summary.failed:
+        first, *others = summary.failed
+        more = f"; {len(others)} more failed" if others else ""
+        waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
+        raise WorkFailed(f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}`")
+
+
+def summary_of(records: Sequence[Path]) -> Any:
+    """Return the benchmark's summary, one row a method, from the files of its records."""
+    from reports.record import read_records
+    from reports.tables.summary import summary_table as condensed
+
+    return condensed(read_records(records))

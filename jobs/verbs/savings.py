@@ -1,0 +1,282 @@
+"""What a scene's own recipe saves against the general one, measured: both have run, and nothing is computed here.
+
+Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
+errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
+alone: the rows that this method learns from and is measured on, and its own training. Seconds depend on what else a
+machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
+frames of point sampling at 2 points, timed in turns with it. Last comes what either model leaves to quadrature in the
+general recipe's other scenes: a scene's own model answers for its domain, and for no other.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from jobs.plan.plan import plan
+from jobs.plan.task import Task
+from jobs.recipe.load import load_recipe
+from jobs.recipe.recipe import ModelRecipe, Recipe
+from jobs.run.ledger import Ledger
+from jobs.verbs.bench import measured_alone
+from jobs.verbs.fallback_share import left_to_quadrature
+from jobs.verbs.narrow_recipe import alone
+from weaves.errors import BadInput
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from reports.record import Record
+
+ENOUGH: Final = 3.0
+"""How many times less a scene's recipe should generate or learn from."""
+
+MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
+"""Records of a method on a scene that are held side by side."""
+
+
+DIFFERENCE: Final = "mse, own less general"
+"""Quantity that pairs both pictures, pixel by pixel (`reports.measure.paired_error`)."""
+
+
+_WIDTH: Final = 110  # columns that a table with its intervals takes
+
+
+class Value(NamedTuple):
+    """A number and, where it has one, its 95 % interval (of times the quartiles)."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+class Saving(NamedTuple):
+    """One quantity of a scene by both recipes."""
+
+    scene: str
+    method: str
+    quantity: str
+    unit: str
+    general: Value
+    narrow: Value
+
+    @property
+    def ratio(self) -> float:
+        """How many times less it is by the scene's own recipe; infinite where it takes nothing, nan of nothing."""
+        a, b = self.general.value, self.narrow.value
+        return math.nan if not a else a / b if b else math.inf
+
+
+def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
+    """Print what scenes' own recipes save, and write it to ``report/savings.csv``.
+
+    Parameters
+    ----------
+    scenes : sequence of str
+        Names of scenes of the package, or paths of scenes, for which `twillight require` wrote a recipe that has run.
+    out : Path
+        Folder of products of both recipes.
+    recipe : str
+        The general recipe.
+
+    Raises
+    ------
+    BadInput
+        If a recipe is not there, has not run, or did not measure the scene.
+    """
+    from rich.console import Console
+
+    from pipeline.atomic import atomic_write
+    from pipeline.scenes.catalogue import load_scene
+
+    general = load_recipe(recipe)
+    found = {
+        name: saved(name, out, general, recipe) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
+    }
+    console = Console()
+    console.width = max(console.width, _WIDTH)
+    for rows in found.values():
+        console.print(_table(rows), "")
+    for rows in found.values():
+        console.print(verdict(rows), soft_wrap=True, highlight=False)
+    path = out / "report" / "savings.csv"
+    atomic_write(path, _csv([row for rows in found.values() for row in rows]).encode())
+    console.print(f"the numbers: {path}", soft_wrap=True, highlight=False)
+
+
+def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]:
+    """Return what a scene, by its name, takes by the general recipe, which is run by the name `run`, and by its own."""
+    path = out / "recipes" / f"require-{scene}.toml"
+    if not path.is_file():
+        raise BadInput("savings", "scene", scene, f"there is no {path}; write it with `twillight require {scene}`")
+    own = load_recipe(path)
+    model = own.models[0]
+    name, worn = model.options.name, {fabric.name for fabric in own.seen}
+    if name not in {one.options.name for one in general.models}:
+        raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
+    same = next(one for one in general.models if one.options.name == name)
+    sides = []
+    for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
+        costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
+        sides.append(costs | _measured(out, whole.name, scene, model, called))
+    _refuse_old_page(own, out, str(path))
+    theirs, ours = sides
+    found = [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    found += _difference(scene, out, (general, own), model)
+    return found + list(_elsewhere(scene, out, general, same, own, model))
+
+
+def verdict(rows: Sequence[Saving]) -> str:
+    """Say in a sentence what a scene's recipe saves, and at which error."""
+    by = {row.quantity: row for row in rows}
+    generated, learnt, error = by["queries generated"], by["queries learnt from"], by["mse"]
+    fewer = [f"{generated.ratio:.1f} times fewer queries to generate"]
+    if not math.isnan(learnt.ratio):
+        fewer.append(f"{learnt.ratio:.1f} times fewer to learn from")
+    ratio = f"MSE {error.narrow.value:.2g} in place of {error.general.value:.2g}"
+    if DIFFERENCE in by:
+        low, high = by[DIFFERENCE].narrow[1:]
+        proven = "less" if (high or 0.0) < 0.0 else "more" if (low or 0.0) > 0.0 else "no difference shown"
+        ratio += f", paired: {proven}"
+    most = max(one.ratio for one in (generated, learnt) if not math.isnan(one.ratio))
+    short = "" if most >= ENOUGH else f"; less than {ENOUGH:g} times"
+    return f"{rows[0].scene}, {rows[0].method}: {', '.join(fewer)}; {ratio}{short}."
+
+
+def _costs(
+    recipe: Recipe, model: ModelRecipe, worn: set[str], ledger: Ledger, whole: Sequence[Task], run: str
+) -> dict[tuple[str, str], Value]:
+    """Return what data and training of one method took, as the receipts say, and the weights that a scene needs."""
+    # The same tasks, by the folders that the whole recipe puts them in.
+    asked = {task.id for task in plan(recipe)}
+    tasks = [task for task in whole if task.id in asked and task.stage in ("generate", "train")]
+    if left := [task for task in tasks if ledger.state(task) != "done"]:
+        allowed = f"{len(left)} of {len(tasks)} tasks behind {model.options.name} are not done; `twillight run {run}`"
+        raise BadInput("savings", "recipe", recipe.name, allowed)
+    shards, trainings = ([task for task in tasks if task.stage == stage] for stage in ("generate", "train"))
+    cards = [json.loads((ledger.out / task.products[1]).read_bytes()) for task in trainings]
+    needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.spec["fabrics"])]
+    weights = sum(ledger.products(task)[Path(task.products[0]).name].bytes for task in needed)
+    return {
+        ("queries generated", "1"): Value(sum(task.rows for task in shards)),
+        ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),
+        ("queries learnt from", "1"): Value(sum(card["steps_taken"] * model.training.batch for card in cards)),
+        ("training", "s"): Value(sum(ledger.seconds(task) for task in trainings)),
+        ("weights", "bytes"): Value(weights),
+    }
+
+
+def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
+    """Refuse a page that a scene's recipe wrote before it was written anew."""
+    page = plan(own, measured_alone(out))[-1]
+    if Ledger(out).state(page) != "done":
+        raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {run}`")
+
+
+def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:
+    """Return what a page says of a method on a scene, and the time of its frame in those of 2 points."""
+    from reports.record import OF_A_PAGE, read_records
+    from reports.tables.summary import BASELINE
+
+    method, setting = model.options.name, _setting(model)
+    path = out / "report" / page / OF_A_PAGE
+    if not path.is_file():
+        raise BadInput("savings", "recipe", page, f"it has no page in {out / 'report'}; `twillight run {run}` first")
+    here = [record for record in read_records([path]) if record.scene == scene and not record.fabric]
+    found = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
+    if lacking := [metric for metric in MEASURED if metric not in found]:
+        allowed = f"the page of {page} has no {lacking[0]} of {method} there; `twillight run {run}`"
+        raise BadInput("savings", "scene", scene, allowed)
+    values = {(metric, found[metric].unit): _value(found[metric]) for metric in MEASURED}
+    base = next((one for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"), None)
+    relative = found["frame_time"].value / base.value if base else math.nan
+    return values | {("frame_time over 2 points", "1"): Value(relative)}
+
+
+def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
+    """Return how much more the scene's own model errs; nothing where a picture or the truth's frames are not there."""
+    from reports.images.exr import RGB, read_exr
+    from reports.measure.paired_error import mse_difference
+    from reports.measure.scene.frames import read_shot
+
+    name, setting = model.options.name, _setting(model)
+    pictures, frames = [], None
+    for task in (task for recipe in recipes for task in plan(recipe)):
+        if task.setting.get("make") == "shot" and task.spec["scene"]["name"] == scene:
+            frames = out / task.products[0]
+        asked = task.setting.get("scene") == scene and task.setting.get("model", {}).get("name") == name
+        if task.setting.get("make") == "scene" and asked and setting in task.setting["pictures_of"]:
+            pictures.append(out / task.setting["pictures_of"][setting])
+    if len(pictures) != 2 or frames is None or not all(path.is_file() for path in (*pictures, frames)):
+        return []
+    first = read_shot(frames).first()
+    a, b = (read_exr(path).stack(*RGB) for path in pictures)
+    difference = mse_difference(a, b, first.pictures()[0], first.lit[0], recipes[0].bench.scenes.image)
+    return [Saving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
+
+
+def _setting(model: ModelRecipe) -> str:
+    """Return the first of a model's settings, of which a scene's recipe has one."""
+    return f"k = {model.options.knobs[0]}" if model.options.knobs else ""
+
+
+def _elsewhere(
+    scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
+) -> Iterator[Saving]:
+    """Yield what either model leaves to quadrature in the general recipe's other scenes, whose frames are there."""
+    from reports.measure.scene.frames import read_shot
+
+    for task in plan(general):
+        if task.setting.get("make") != "shot" or Ledger(out).state(task) != "done":
+            continue
+        shot = read_shot(out / task.products[0])
+        if shot.name != scene:
+            asked = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
+            shares = (Value(left_to_quadrature(*of, asked)) for of in ((same, general), (model, own)))
+            yield Saving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
+
+
+def _value(record: Record) -> Value:
+    return Value(record.value, record.low, record.high)
+
+
+def _table(rows: Sequence[Saving]) -> Table:
+    """Show a scene's quantities by both recipes."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
+    for name in (f"{rows[0].scene}, {rows[0].method}", "general", "own", "times less"):
+        table.add_column(name, justify="left" if name.startswith(rows[0].scene) else "right")
+    for row in rows:
+        unit = "" if row.unit == "1" else f", {row.unit}"
+        ratio = "–" if math.isnan(row.ratio) else f"{row.ratio:.3g}"
+        table.add_row(f"{row.quantity}{unit}", _shown(row.general), _shown(row.narrow), ratio)
+    return table
+
+
+def _shown(value: Value) -> str:
+    number = f"{value.value:,.0f}" if abs(value.value) >= 1e4 else f"{value.value:.3g}"
+    return number if value.low is None else f"{number} ({value.low:.2g} to {value.high:.2g})"
+
+
+def _csv(rows: Sequence[Saving]) -> str:
+    """Return all rows as CSV, RFC 4180."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(("scene", "method", "quantity", "unit", *_columns("general"), *_columns("own"), "ratio"))
+    for row in rows:
+        writer.writerow((*row[:4], *_cells(row.general), *_cells(row.narrow), row.ratio))
+    return text.getvalue()
+
+
+def _columns(name: str) -> Iterator[str]:
+    yield from (name, f"{name}_low", f"{name}_high")
+
+
+def _cells(value: Value) -> tuple[object, ...]:
+    return tuple("" if number is None else number for number in value)

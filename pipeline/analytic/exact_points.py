@@ -1,0 +1,60 @@
+"""Point sampling with a fixed number of points, independent or of the R2 sequence: it aliases [Jin2022Woven]."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.cloth import AREA, SUMS, Columns, Model, columns_of, model_of
+from pipeline.truth.footprint.sequences import derive, independent_pair, r2_pair
+from pipeline.truth.monte_carlo import add_point, place_point, query_scene
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+
+class PointSampler:
+    """The baseline with its fabric tabulated once, as a renderer would hold it.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        What is asked about.
+    options : TruthOptions
+        Footprint, frame, normaliser and geometry; the estimator and its limits play no part. Left out: the defaults.
+    """
+
+    def __init__(self, fabric: Fabric, options: TruthOptions | None = None) -> None:
+        self.model = model_of(fabric, options or TruthOptions())
+
+    def sample(self, queries: Queries, count: int, seed: int, r2: bool = False) -> npt.NDArray[np.float32]:
+        """Return the components from `count` points a query, (N, 4); the viewer is in front.
+
+        The points are independent, or with `r2` the first of that sequence, shifted at random once a query
+        [Roberts2018R2].
+        """
+        return _sample(self.model, columns_of(queries), count, np.uint64(seed), r2)
+
+    def bytes_stored(self) -> int:
+        """Return the bytes of the tables that the point model reads."""
+        return sum(array.nbytes for array in self.model.front if isinstance(array, np.ndarray))
+
+
+@kernel
+def _sample(model: Model, columns: Columns, count: int, seed: np.uint64, r2: bool) -> npt.NDArray[np.float32]:
+    rows = len(columns.u)
+    mean = np.zeros((rows, 4), np.float32)
+    sums = np.zeros((1, SUMS))
+    for row in range(rows):
+        key = derive(seed, row)
+        query = query_scene(columns, row)
+        sums[:] = 0.0
+        for k in range(count):
+            first, second = r2_pair(key, k) if r2 else independent_pair(key, k)
+            x, y, weight = place_point(columns, row, model, first, second)
+            add_point(model, x, y, weight, query, sums, 0)
+        if sums[0, AREA] > 0.0:
+            for c in range(4):
+                mean[row, c] = sums[0, c] / sums[0, AREA]
+    return mean

@@ -1,0 +1,269 @@
+"""Gauss-Legendre nodes on every piece of yarn, in single precision: few of them, with soft shadows.
+
+A wide footprint weighs fixed nodes, a tensor rule on every piece of each different cell (x = r sin v across a yarn);
+their weights are the Gaussian at the node, summed over all cells alike and over all images of the repeat, a product
+of one sum an axis. A node stands for a box: its horizon is the mean of the map's over that box, and what hides it is
+a ramp as wide as the horizon spreads there. A narrow footprint places the nodes anew in what it covers of each piece.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.axis_densities import NARROW, axis_densities
+from pipeline.analytic.gauss_nodes.footprint_nodes import BANDS, REACH, place_nodes
+from pipeline.analytic.gauss_nodes.nodes import GaussNodes, gauss_nodes
+from pipeline.analytic.gauss_nodes.weights import even_densities, product_weights
+from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
+from pipeline.analytic.horizon_points.shading import (
+    AREA,
+    BOTH,
+    CURVATURE,
+    DIFFUSE,
+    DISTANCE,
+    INTEGERS,
+    IX,
+    IY,
+    IZ,
+    LIMIT,
+    NODE,
+    OX,
+    OY,
+    OZ,
+    ROWS,
+    SEEN,
+    SINE,
+    SIZE,
+    SPECULAR,
+    STEEPNESS,
+    STEP_V,
+    STEP_Y,
+    WARPNESS,
+    WEFTNESS,
+    WEIGHT,
+    X,
+    Y,
+    fill_lanes,
+    gather,
+    plain_sum,
+    query_rows,
+    shade,
+    shade_all,
+)  # fmt: skip
+from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
+from pipeline.compiled.decorators import fast_kernel, kernel
+from pipeline.truth.cloth import model_of
+from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
+from pipeline.truth.footprint.place import EVENLY
+from pipeline.truth.geometry.azimuths import azimuth_rows
+from pipeline.truth.node_table.build import Single
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import HIDDEN_SHARE, Queries
+from weaves.fabric import Fabric
+
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_POINTS = COARSE_LINE.points
+
+
+class GaussQuadrature:
+    """A fabric's nodes, tabulated once.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        What is asked about.
+    across, along : int
+        Nodes across a yarn and along a cell.
+    shadows, soft : bool
+        Whether anything hides anything, and whether softly.
+    grid, azimuths : int
+        Resolution of the horizon map.
+    """
+
+    def __init__(
+        self,
+        fabric: Fabric,
+        across: int,
+        along: int,
+        shadows: bool = True,
+        soft: bool = True,
+        grid: int = 16,
+        azimuths: int = 32,
+    ) -> None:
+        model = model_of(fabric, TruthOptions())
+        self.shadows, self.soft, self.across, self.along = shadows, soft, across, along
+        self.map = horizon_map(model.front, model.back, grid, azimuths)
+        self.nodes = gauss_nodes(model.front, self.map, across, along)
+
+    def answer(self, queries: Queries) -> npt.NDArray[np.float32]:
+        """Return the components (N, 4); queries are flat and lit from the front."""
+        u, v, wi, wo = (
+            np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
+        )
+        footprints, finest = deviations(queries), np.float32(min(NARROW, 1.0 / self.across))
+        return _answer(self.map, self.nodes, u, v, *footprints, wi, wo, self.along, finest, self.shadows, self.soft)
+
+    def bytes_stored(self) -> int:
+        """Return the bytes of map and nodes."""
+        return self.map.bytes_stored() + sum(array.nbytes for array in self.nodes)
+
+
+@kernel
+def _answer(
+    table: HorizonMap,
+    fixed: GaussNodes,
+    u: Single,
+    v: Single,
+    deviation_x: Single,
+    deviation_y: Single,
+    correlation: Single,
+    wi: Single,
+    wo: Single,
+    along: int,
+    finest: np.float32,
+    shadows: bool,
+    soft: bool,
+) -> npt.NDArray[np.float32]:
+    rows, count = len(u), len(fixed.evenly)
+    result = np.zeros((rows, 4), np.float32)
+    ends, picks = table.repeat[0], table.repeat[1]
+    nodes = table.grid * table.grid
+    flat = table.pieces.reshape(table.pieces.size)
+    wide, own_weight = fixed.lanes.copy(), np.zeros(count, np.float32)
+    values, shared = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
+    kinds, most = fixed.positions.shape
+    room = BANDS * fixed.own_positions.shape[1] ** 2
+    narrow, places = np.zeros((ROWS, room), np.float32), np.zeros((INTEGERS, room), np.int32)
+    of_x, of_y = np.zeros((ends, kinds, most), np.float32), np.zeros((picks, kinds, most), np.float32)
+    touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
+    cells = np.zeros(max(ends, picks), np.uint32)
+    line = np.zeros((4, most), np.float32)
+    line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
+    # Rows of the fixed nodes, taken once: counting references to slices would cost more than few nodes do.
+    ix, iy, iz, ox, oy, oz, size = wide[IX], wide[IY], wide[IZ], wide[OX], wide[OY], wide[OZ], wide[SIZE]
+    sine, distance, curvature, limit = wide[SINE], wide[DISTANCE], wide[CURVATURE], wide[LIMIT]
+    warpness, weftness, step_v, step_y = wide[WARPNESS], wide[WEFTNESS], wide[STEP_V], wide[STEP_Y]
+    seen, both, areas, diffuse, specular = wide[SEEN], wide[BOTH], wide[AREA], wide[DIFFUSE], wide[SPECULAR]
+    warp, weft, thickness = table.yarn[0], table.yarn[1], table.thickness
+    positions, weights, pieces, copies = fixed.positions, fixed.weights, fixed.pieces, fixed.copies
+    mean, steepness, evenly = fixed.mean, fixed.steepness, fixed.evenly
+    azimuths, sharpness = table.azimuths, np.float32(1.0 if soft else 1e9)
+    for row in range(rows):
+        dx, dy, oblique = deviation_x[row], deviation_y[row], correlation[row]
+        # Narrow footprints that are not round count as round ones of the same area.
+        s = dx if dx == dy and oblique == _0 else np.sqrt(dx * dy * np.sqrt(_1 - oblique * oblique))
+        x = np.float32(u[row] - ends * np.floor(np.float64(u[row]) / ends))
+        y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
+        if s >= np.float32(NARROW):
+            weight = own_weight
+            blur, line_x = np.sqrt(_1 - abs(oblique)), np.sqrt(abs(oblique)) * dx
+            line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+            # Of a footprint that is not round an axis may be narrower than the nodes are apart.
+            blur_x, blur_y = max(blur * dx, finest), max(blur * dy, finest)
+            even_x, even_y = blur_x >= np.float32(EVENLY * ends), blur_y >= np.float32(EVENLY * picks)
+            if even_x and even_y:
+                weight = evenly
+            else:
+                weight[:] = _0
+                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                    z, share = line_places[point], line_shares[point]
+                    _densities(positions, weights, x + z * line_x, blur_x, even_x, of_x, touched_x, cells)
+                    _densities(positions, weights, y + z * line_y, blur_y, even_y, of_y, touched_y, cells)
+                    product_weights(pieces, copies, of_x, of_y, touched_x, touched_y, share, weight)
+            ix[:], iy[:], iz[:], ox[:], oy[:], oz[:] = (
+                wi[row, 0],
+                wi[row, 1],
+                wi[row, 2],
+                wo[row, 0],
+                wo[row, 1],
+                wo[row, 2],
+            )
+            dot = wi[row, 0] * wo[row, 0] + wi[row, 1] * wo[row, 1]
+            size[:] = _HALF / max(_1 + dot + wi[row, 2] * wo[row, 2], np.float32(1e-6))
+            if shadows:
+                i0, i1, turn_i = azimuth_rows(wi[row, 0], wi[row, 1], azimuths)
+                o0, o1, turn_o = azimuth_rows(wo[row, 0], wo[row, 1], azimuths)
+                alike, right, opposite = azimuths_apart(wi[row, 0], wi[row, 1], wo[row, 0], wo[row, 1])
+                _uncover(
+                    mean[i0], mean[i1], np.float32(turn_i), wi[row, 2], mean[o0], mean[o1], np.float32(turn_o),
+                    wo[row, 2], steepness[i0], steepness[o0], sharpness, alike, right, opposite, seen, both,
+                )  # fmt: skip
+            else:
+                seen[:], both[:] = _1, _1
+            shade(
+                count, weight, ix, iy, iz, ox, oy, oz, size, sine, distance, curvature, limit, warpness, weftness, seen,
+                both, step_v, step_y, warp, weft, thickness, areas, diffuse, specular,
+            )  # fmt: skip
+            total_weight = plain_sum(weight, count)
+            area, a, b, c, d = gather(count, 0, areas, diffuse, specular, warpness, weftness)
+        else:
+            lanes = narrow
+            total = place_nodes(table, fixed, x, y, s, along, line, lanes)
+            lanes[STEEPNESS, :total] = sharpness_of_points(s) if soft else np.float32(1e9)
+            query_rows(wi[row], wo[row], azimuths, nodes, values, shared, 0)
+            fill_lanes(lanes, places, values, shared, 1, total)
+            locate(
+                total, lanes[X], lanes[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top, flat,
+                table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], lanes[SINE], lanes[DISTANCE],
+                lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], places[NODE],
+            )  # fmt: skip
+            shade_all(table, total, lanes, places, shadows)
+            total_weight = plain_sum(lanes[WEIGHT], total)
+            area, a, b, c, d = gather(
+                total, 0, lanes[AREA], lanes[DIFFUSE], lanes[SPECULAR], lanes[WARPNESS], lanes[WEFTNESS]
+            )
+        if area > np.float32(HIDDEN_SHARE) * wo[row, 2] * total_weight:
+            inverse = _1 / area
+            result[row, 0], result[row, 1], result[row, 2], result[row, 3] = (
+                a * inverse,
+                b * inverse,
+                c * inverse,
+                d * inverse,
+            )
+    return result
+
+
+@fast_kernel
+def _densities(
+    positions: Single,
+    weights: Single,
+    centre: np.float32,
+    s: np.float32,
+    even: bool,
+    out: Single,
+    touched: npt.NDArray[np.bool_],
+    cells: npt.NDArray[np.uint32],
+) -> None:
+    """Write the footprint's densities in all cells of one axis; `cells` is scratch."""
+    if even:
+        touched[:] = True
+        even_densities(weights, s, out)
+    else:
+        axis_densities(positions, weights, positions.shape[1], centre, s, np.float32(REACH), out, touched, cells)
+
+
+@fast_kernel
+def _uncover(
+    low_i: Single,
+    high_i: Single,
+    turn_i: np.float32,
+    iz: np.float32,
+    low_o: Single,
+    high_o: Single,
+    turn_o: np.float32,
+    oz: np.float32,
+    steep_i: Single,
+    steep_o: Single,
+    sharpness: np.float32,
+    alike: np.float32,
+    right: np.float32,
+    opposite: np.float32,
+    seen: Single,
+    both: Single,
+) -> None:
+    """Write which share of each node's box is seen, and which is seen and lit."""
+    for k in range(len(seen)):
+        o = ramp(above(oz, low_o[k], high_o[k], turn_o, steep_o[k]) * sharpness)
+        i = ramp(above(iz, low_i[k], high_i[k], turn_i, steep_i[k]) * sharpness)
+        seen[k], both[k] = o, seen_and_lit(o, i, alike, right, opposite)

@@ -1,0 +1,48 @@
+"""Which share of a wide footprint falls on each fixed node.
+
+The weight of a node is the Gaussian there, summed over all cells alike and over all images of the repeat: products of
+one sum an axis, or a mixture of these where a footprint lies at an angle (oblique).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.gauss_nodes.nodes import COPIES, COPY, COUNT_X, COUNT_Y, FIRST, RULE_X, RULE_Y
+from pipeline.compiled.decorators import fast_kernel
+from pipeline.truth.node_table.build import Index, Single
+
+
+@fast_kernel
+def even_densities(weights: Single, s: np.float32, out: Single) -> None:
+    """Write what `axis_densities` tends to for a wide Gaussian: the nodes' weights, as high as its mean."""
+    share = s * np.float32(math.sqrt(2.0 * math.pi)) / np.float32(len(out))
+    for c in range(len(out)):
+        out[c] = weights * share
+
+
+@fast_kernel
+def product_weights(
+    pieces: Index,
+    copies: Index,
+    of_x: Single,
+    of_y: Single,
+    touched_x: npt.NDArray[np.bool_],
+    touched_y: npt.NDArray[np.bool_],
+    share: np.float32,
+    weight: Single,
+) -> None:
+    """Add `share` times each node's weight: products of both axes, summed over the cells that are alike."""
+    for p in range(len(pieces)):
+        first, nx, ny = pieces[p, FIRST], pieces[p, COUNT_X], pieces[p, COUNT_Y]
+        for c in range(pieces[p, COPY], pieces[p, COPY] + pieces[p, COPIES]):
+            end, pick = copies[c, 0], copies[c, 1]
+            if touched_x[end] and touched_y[pick]:
+                along_x, along_y = of_x[end, pieces[p, RULE_X]], of_y[pick, pieces[p, RULE_Y]]
+                for j in range(ny):
+                    line, factor = weight[first + j * nx : first + (j + 1) * nx], share * along_y[j]
+                    for i in range(len(line)):
+                        line[i] += factor * along_x[i]

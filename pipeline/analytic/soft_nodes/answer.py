@@ -1,0 +1,200 @@
+"""The sums of every query: fixed nodes for a wide footprint, nodes placed by the query for a narrow one.
+
+deviations                           weights
+both >= `Table.uniform`              the cloth evenly
+both >= `Table.waves_from`           waves
+the narrower one < `NARROW`,
+    the wider one < `LONG`           placed nodes
+else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
+
+Deviations are those of a footprint's own axes where they are compared. At an angle to the yarns densities are a mixture
+(oblique), waves are exact, and placed nodes take a footprint along the yarns of the same area.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pipeline.analytic.axis_densities import NARROW, axis_densities
+from pipeline.analytic.soft_horizons import sharpness_of_points
+from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
+from pipeline.analytic.soft_nodes.footprint_nodes import LINE_ROWS, MOST_ACROSS, fill_block, gap_area, place_nodes
+from pipeline.analytic.soft_nodes.kinds import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, LANES, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
+from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_gaps, shade_placed
+from pipeline.analytic.soft_nodes.waves import HIGHEST
+from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_axis
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
+from pipeline.truth.node_table.build import Single
+
+LONG: Final = 0.75
+"""Largest deviation along the wider axis for which a footprint narrow along the other places its own nodes: these are
+counted."""
+
+RESOLVED: Final = 0.12
+"""Least deviation whose density fixed nodes resolve; a narrower one is taken as this."""
+
+# Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
+_MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
+_MOST_NODES = 3 * _MOST_CELLS * MOST_ACROSS**2
+_POINTS = COARSE_LINE.points
+_LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+
+
+@kernel
+def sum_queries(
+    table: Table,
+    u: Single,
+    v: Single,
+    deviation_x: Single,
+    deviation_y: Single,
+    correlation: Single,
+    wi: Single,
+    wo: Single,
+) -> tuple[Single, Single]:
+    """Return the sums of N queries, light and viewer in front.
+
+    Parameters
+    ----------
+    table : Table
+        The cloth.
+    u, v, deviation_x, deviation_y, correlation : float32 (N,)
+        Footprints: centre and deviations along the axes in yarn spacings, correlation of the axes.
+    wi, wo : float32 (N, 3)
+        Directions.
+
+    Returns
+    -------
+    float32 (N, 2, SUMS), float32 (N,)
+        The sums of warp and weft, and the area seen through gaps.
+    """
+    count = len(u)
+    result, gaps = np.zeros((count, 2, SUMS), np.float32), np.zeros(count, np.float32)
+    ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
+    yarn, starts, nodes, evenly = table.yarn, table.starts, table.nodes, table.evenly
+    mean, sharpness, thickness = table.mean, table.sharpness, np.float32(table.thickness)
+    piece_starts, pieces, bounds = table.piece_starts, table.pieces, table.bounds
+    per_azimuth, per_grid = size * size, AZIMUTHS * size * size
+    grid = table.grid.reshape(table.grid.size)
+
+    # Scratch: weights of fixed nodes, and placed nodes of both families.
+    weight = np.zeros((starts[3], LANES), np.float32)
+    lines = weight.reshape(starts[3] * LANES // COLUMNS, COLUMNS)
+    turns = np.zeros((TURN_ROWS, HIGHEST + 1), np.float32)
+    density_x = np.zeros((ends, len(table.places), COLUMNS), np.float32)
+    density_y = np.zeros((picks, len(table.places), COLUMNS), np.float32)
+    touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
+    columns, rows = np.zeros(ends, np.uint32), np.zeros(picks, np.uint32)
+    most = (_MOST_NODES + LANES - 1) // LANES
+    placed = np.zeros((2, most, ROWS, LANES), np.float32)
+    cells = np.zeros((2, most, LANES), np.uint32)
+    flat_cells = cells.reshape(2, most * LANES)
+    line = np.zeros((LINE_ROWS, 8), np.float32)
+    stops = np.zeros(2, np.int64)
+    line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
+
+    for n in range(count):
+        ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
+        low_i, high_i, turn_i = around(ix, iy)
+        low_o, high_o, turn_o = around(ox, oy)
+        # Reduced in double precision: single would lose the place of a far centre within the repeat.
+        x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
+        y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
+        dx, dy, oblique = deviation_x[n], deviation_y[n], correlation[n]
+        narrowest, near_x, near_y = min(dx, dy), dx, dy
+        if oblique != _0:
+            narrowest, blur = np.float32(narrow_axis(dx, dy, oblique)), np.sqrt(np.sqrt(_1 - oblique * oblique))
+            near_x, near_y = blur * dx, blur * dy
+        if min(near_x, near_y) >= NARROW or max(near_x, near_y) >= LONG:
+            shares = weight
+            if narrowest >= table.uniform:
+                shares = evenly
+            elif narrowest >= table.waves_from:
+                wave_weights(
+                    table.waves, table.wave_size, table.wave_nodes, evenly, np.float32(x), np.float32(y), dx, dy,
+                    oblique, narrowest, np.float32(ends), np.float32(picks), turns, weight,
+                )  # fmt: skip
+            else:
+                # Beyond `uniform` an axis is even; the images of a huge footprint are not to be counted.
+                blur = np.sqrt(_1 - abs(oblique))
+                widest_x = np.float32(min(max(blur * dx, RESOLVED), max(table.uniform, LONG)))
+                widest_y = np.float32(min(max(blur * dy, RESOLVED), max(table.uniform, LONG)))
+                line_x = np.sqrt(abs(oblique)) * dx
+                line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+                lines[:, :] = _0
+                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                    across = axis_densities(
+                        table.places, table.weights, COLUMNS, np.float32(x + line_places[point] * line_x), widest_x,
+                        np.float32(REACH), density_x, touched_x, columns,
+                    )  # fmt: skip
+                    along = axis_densities(
+                        table.places, table.weights, COLUMNS, np.float32(y + line_places[point] * line_y), widest_y,
+                        np.float32(REACH), density_y, touched_y, rows,
+                    )  # fmt: skip
+                    product_weights(
+                        table.kind_starts, table.cell_kinds, table.kinds, density_x, density_y, columns[:across],
+                        rows[:along], ends, line_shares[point], lines,
+                    )  # fmt: skip
+            near_i, near_o = (high_i if turn_i > _HALF else low_i), (high_o if turn_o > _HALF else low_o)
+            for family in range(2):
+                a, b = starts[family], starts[family + 1]
+                d = directions(ix, iy, iz, ox, oy, oz, family)
+                found = shade_fixed(
+                    nodes[a:b], shares[a:b], mean[low_i, a:b], mean[high_i, a:b], sharpness[near_i, a:b], turn_i,
+                    mean[low_o, a:b], mean[high_o, a:b], sharpness[near_o, a:b], turn_o, d, yarn[family, ALPHA],
+                    thickness, yarn[family, BLEND],
+                )  # fmt: skip
+                for q in range(SUMS):
+                    result[n, family, q] = found[q]
+            a, b = starts[2], starts[3]
+            if b > a:
+                gaps[n] = shade_gaps(
+                    shares[a:b], mean[low_o, a:b], mean[high_o, a:b], sharpness[near_o, a:b], turn_o, oz
+                )
+            continue
+
+        # Place nodes in every piece touched; a footprint at an angle counts as one of its area along the axes.
+        dx, dy = near_x, near_y
+        stops[:] = 0
+        sharp = sharpness_of_points(max(dx, dy))
+        left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
+        for row in range(math.floor(lower), math.floor(upper) + 1):
+            for column in range(math.floor(left), math.floor(right) + 1):
+                cell = (row % picks) * ends + column % ends
+                for p in range(piece_starts[cell], piece_starts[cell + 1]):
+                    x_low, x_high = max(left - column, bounds[p, X_LOW]), min(right - column, bounds[p, X_HIGH])
+                    y_low, y_high = max(lower - row, bounds[p, Y_LOW]), min(upper - row, bounds[p, Y_HIGH])
+                    if x_high - x_low < _LEAST * dx or y_high - y_low < _LEAST * dy:
+                        continue
+                    family, first = pieces[p, FAMILY], pieces[p, BLOCK] * per_grid
+                    if family == GAP:
+                        gaps[n] += gap_area(
+                            bounds[p], grid, first, size, low_o * per_azimuth, high_o * per_azimuth, turn_o, sharp, oz,
+                            np.float32(x - column), np.float32(y - row), dx, dy, np.float32(x_low),
+                            np.float32(x_high), np.float32(y_low), np.float32(y_high),
+                        )  # fmt: skip
+                    else:
+                        stops[family] = place_nodes(
+                            bounds[p], first, size, yarn[family, RADIUS], family, np.float32(x - column),
+                            np.float32(y - row), dx, dy, np.float32(x_low), np.float32(x_high), np.float32(y_low),
+                            np.float32(y_high), placed[family], flat_cells[family], stops[family], line,
+                        )  # fmt: skip
+        for family in range(2):
+            if stops[family] == 0:
+                continue
+            blocks = fill_block(placed[family], flat_cells[family], stops[family])
+            d = directions(ix, iy, iz, ox, oy, oz, family)
+            found = shade_placed(
+                placed[family, :blocks], cells[family, :blocks], grid, np.uint32(low_i * per_azimuth),
+                np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
+                np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
+            )  # fmt: skip
+            for q in range(SUMS):
+                result[n, family, q] = found[q]
+    return result, gaps

@@ -1,0 +1,180 @@
+"""What a network reads of the sums of a query, and the components that the sums alone give.
+
+Ratios and bounded numbers only. Mirror images of a query, x -> -x and y -> -y, are the same query of a mirrored cloth:
+the half vector is brought to x, y >= 0, and what remains of the cloth is the sense of its twists. Exchanging x and y
+exchanges warp and weft: that is a permutation of the features and of the components.
+
+The components of a patch hidden almost wholly fade to 0: the truth of most such patches is that nothing at all is seen.
+
+Beside each component stands what it would be without shadows of the light. That is a mean of the point model over nodes
+whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
+every node, so the diffuse components without shadows integrate to at most 1, and nothing below them makes light. The
+specular ones, scattered once, stay far below 1 (the slab reflects less than half of what it meets).
+
+    0-7, 8-15   of warp, of weft: share of the area seen; how much is seen of the bare area, diffuse and specular; how
+                much of the latter two is in doubt; specular and diffuse component
+    16-24       wi, wo; slopes of the half vector; wi.wo
+    25-27       how much of the footprint is seen (twice, the second resolving patches almost hidden); its size
+    28-29       senses of the twists
+    30-39       of the cloth alone, warp and weft by turns: roughness, bend, relief, length of floats, width
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pipeline.analytic.soft_nodes.answer import sum_queries
+from pipeline.analytic.soft_nodes.nodes import Table
+from pipeline.analytic.soft_nodes.shade import (
+    AREA,
+    BARE_AREA,
+    BARE_DIFFUSE,
+    BARE_SPECULAR,
+    DIFFUSE,
+    DIFFUSE_DOUBT,
+    OPEN_DIFFUSE,
+    OPEN_SPECULAR,
+    SPECULAR,
+    SPECULAR_DOUBT,
+)
+from pipeline.compiled.decorators import fast_kernel
+from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
+from pipeline.truth.node_table.build import Single
+from pipeline.truth.query import Queries
+
+FEATURES: Final = 40
+"""Numbers a query."""
+
+OF_QUERY: Final = 30
+"""The first of them; the others are the same for all queries of a cloth."""
+
+EXCHANGED: Final = np.array(
+    [*range(8, 16), *range(8), 17, 16, 18, 20, 19, 21, 23, 22, 24, 25, 26, 27, 29, 28]
+    + [k + 1 - 2 * (k % 2) for k in range(OF_QUERY, FEATURES)]
+)
+"""Where each feature comes from when x and y are exchanged."""
+
+EXCHANGED_SIGN: Final = np.array([-1.0 if k in (28, 29) else 1.0 for k in range(FEATURES)], np.float32)
+"""What it is then multiplied with: a mirror reverses the twists."""
+
+_0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
+_LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least
+_FADED = np.float32(1e-4)  # of the bare area: of patches of which less is seen, most are hidden, and answer 0
+_TINY = np.float32(1e-18)
+_SMALLEST = np.float32(1e-3)  # standard deviation, in yarn spacings
+_STEEPEST = np.float32(3.0)  # slope of a half vector
+_INVERSE_PI = np.float32(1.0 / math.pi)
+_DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
+
+
+@fast_kernel
+def _assemble(
+    found: Single,
+    gaps: Single,
+    size: Single,
+    wi: Single,
+    wo: Single,
+    cloth: Single,
+    twists: Single,
+    features: Single,
+    components: Single,
+    bounds: Single,
+) -> None:
+    """Turn sums into features (N, FEATURES), components (N, 4), and what these are without shadows (N, 4)."""
+    for n in range(len(found)):
+        bare = found[n, 0, BARE_AREA] + found[n, 1, BARE_AREA] + gaps[n]
+        area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], _LEAST * bare) + _TINY
+        inverse, faded = _1 / area, area / (area + _FADED * bare)
+        ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
+        hx, hy, sense = ix + ox, iy + oy, _1
+        if hx < _0:
+            ix, ox, hx, sense = -ix, -ox, -hx, -sense
+        if hy < _0:
+            iy, oy, hy, sense = -iy, -oy, -hy, -sense
+        slope = _1 / (iz + oz)
+        row = features[n]
+        for f in range(2):
+            own = found[n, f]
+            specular, diffuse = own[SPECULAR] * inverse, own[DIFFUSE] * inverse * _INVERSE_PI
+            components[n, f], components[n, 2 + f] = faded * specular, faded * diffuse
+            bounds[n, f] = faded * own[OPEN_SPECULAR] * inverse
+            bounds[n, 2 + f] = faded * own[OPEN_DIFFUSE] * inverse * _INVERSE_PI
+            per_diffuse, per_specular = _1 / (own[BARE_DIFFUSE] + _TINY), _1 / (own[BARE_SPECULAR] + _TINY)
+            k = 8 * f
+            row[k] = own[AREA] * inverse
+            row[k + 1] = own[AREA] / (own[BARE_AREA] + _TINY)
+            row[k + 2] = own[DIFFUSE] * per_diffuse
+            row[k + 3] = own[SPECULAR] * per_specular
+            row[k + 4] = own[DIFFUSE_DOUBT] * per_diffuse * _2
+            row[k + 5] = own[SPECULAR_DOUBT] * per_specular * _2
+            row[k + 6] = specular / (specular + _DARK)
+            row[k + 7] = diffuse / (diffuse + _DARK)
+        row[16], row[17], row[18], row[19], row[20], row[21] = ix, iy, iz, ox, oy, oz
+        row[22], row[23] = min(hx * slope, _STEEPEST), min(hy * slope, _STEEPEST)
+        row[24] = ix * ox + iy * oy + iz * oz
+        row[25] = area / (bare + _TINY)
+        row[26] = size[n] / (size[n] + _SMALL)
+        root = np.sqrt(area / (bare + _TINY))
+        row[27] = root / (root + _HIDDEN)
+        row[28], row[29] = sense * twists[0], sense * twists[1]
+        for k in range(FEATURES - OF_QUERY):
+            row[OF_QUERY + k] = cloth[k]
+
+
+class Reading(NamedTuple):
+    """What is read of N queries.
+
+    Attributes
+    ----------
+    features : float32 (N, FEATURES)
+        For the network.
+    components : float32 (N, 4)
+        What the sums alone answer.
+    bounds : float32 (N, 4)
+        The same without shadows of the light.
+    """
+
+    features: Single
+    components: Single
+    bounds: Single
+
+
+def cloth_features(table: Table) -> Single:
+    """Return what is the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
+    yarn = table.yarn.astype(np.float64)
+    by_family = [
+        np.log(yarn[:, ALPHA]) / 2.0 + 0.5,
+        yarn[:, BEND],
+        yarn[:, BETA] - 1.0,
+        np.log(table.float_length),
+        2.0 * yarn[:, RADIUS] - 1.0,
+    ]
+    return np.ascontiguousarray(np.stack(by_family), np.float32).ravel()
+
+
+def read_queries(table: Table, queries: Queries) -> Reading:
+    """Read N queries about flat cloth, light and viewer in front.
+
+    Parameters
+    ----------
+    table : Table
+        The cloth.
+    queries : Queries
+        Footprints of any kind.
+    """
+    # A thousandth of a yarn is a point: smaller footprints would fall between the digits of a place.
+    footprints = deviations(queries, _SMALLEST)
+    size = np.sqrt(np.maximum(queries.sigma, _SMALLEST) * np.maximum(queries.sigma_minor, _SMALLEST))
+    u, v, x, y, correlation, wi, wo = (
+        np.ascontiguousarray(column, np.float32)
+        for column in (queries.u, queries.v, *footprints, queries.wi, queries.wo)
+    )
+    found, gaps = sum_queries(table, u, v, x, y, correlation, wi, wo)
+    reading = Reading(*(np.empty((len(u), width), np.float32) for width in (FEATURES, 4, 4)))
+    twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
+    _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, *reading)
+    return reading

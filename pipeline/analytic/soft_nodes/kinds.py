@@ -1,0 +1,118 @@
+"""Kinds: which pieces of a repeat lie so much alike that they share nodes.
+
+Pieces of one shape that lie alike on floats of one length are one kind. A draft of many different floats has more kinds
+than are worth their time: then the two most alike are merged, again and again (Ward's distance between their
+inclinations), until the nodes of all kinds are few enough.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER
+from pipeline.truth.geometry.pieces import Piece
+
+MOST_NODES: Final = {TOP: 256, UNDER: 128}
+"""Nodes of all kinds on top, and of all beneath, above which kinds are merged."""
+
+COLUMNS: Final = 8
+"""Nodes across a yarn: a line of them is half of what the vector units take at a time."""
+
+_ALONG = ((1.5, 4), (2.5, 3))  # nodes along a cell of a float shorter than
+_LONG = 2  # and of any longer one
+_STRIP = 3.0  # nodes a yarn spacing along what shows beneath, and along gaps
+
+Cell = tuple[int, int]
+
+
+class Kind(NamedTuple):
+    """Pieces that share nodes.
+
+    Attributes
+    ----------
+    piece : Piece
+        The mean of them.
+    cells : list of (end, pick)
+        Where they lie.
+    blocks : list of int
+        What their horizons are called; one for each cell.
+    """
+
+    piece: Piece
+    cells: list[Cell]
+    blocks: list[int]
+
+    @property
+    def lines(self) -> int:
+        """Nodes along it."""
+        if self.piece.side == UNDER:
+            return max(1, math.ceil(_STRIP * (self.piece.along[1] - self.piece.along[0])))
+        return next((count for length, count in _ALONG if 2.0 * self.piece.half < length), _LONG)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of the kind."""
+        return COLUMNS * self.lines
+
+
+def gather(pieces: Sequence[tuple[Cell, Piece, int]]) -> list[Kind]:
+    """Return the kinds of pieces, given with their cell (end, pick) and the name of their horizons; warps first."""
+    alike: dict[tuple[float | int, ...], Kind] = {}
+    for cell, piece, block in pieces:
+        numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
+        kind = alike.setdefault((piece.family, piece.side, *(round(n, 6) for n in numbers)), Kind(piece, [], []))
+        kind.cells.append(cell)
+        kind.blocks.append(block)
+    kinds: list[Kind] = []
+    for side, most in MOST_NODES.items():
+        kinds += _merged([kind for kind in alike.values() if kind.piece.side == side], most)
+    return sorted(kinds, key=lambda kind: kind.piece.family)
+
+
+def _merged(kinds: list[Kind], most: int) -> list[Kind]:
+    """Merge the two kinds most alike until all have together at most `most` nodes, or nothing is left to merge."""
+    kinds = list(kinds)
+    while sum(kind.nodes for kind in kinds) > most:
+        pairs = [
+            (_distance(first, second), i, j)
+            for j, second in enumerate(kinds)
+            for i, first in enumerate(kinds[:j])
+            if _mergeable(first, second)
+        ]
+        if not pairs:
+            break
+        _, i, j = min(pairs)
+        second = kinds.pop(j)
+        kinds[i] = _together(kinds[i], second)
+    return kinds
+
+
+def _mergeable(first: Kind, second: Kind) -> bool:
+    one, other = first.piece, second.piece
+    return one[:4] == other[:4] and first.lines == second.lines and one.family != GAP
+
+
+def _distance(first: Kind, second: Kind) -> float:
+    """Return by how much merging raises the sum over cells of the squared error of the inclination."""
+    sizes = len(first.cells), len(second.cells)
+    middle = first.piece.offset * first.piece.curve - second.piece.offset * second.piece.curve
+    curve = first.piece.curve - second.piece.curve
+    return sizes[0] * sizes[1] / sum(sizes) * (middle**2 + curve**2 / 12.0)
+
+
+def _together(first: Kind, second: Kind) -> Kind:
+    """Return two kinds as one of their mean inclination."""
+    cells = first.cells + second.cells
+    share = len(first.cells) / len(cells)
+
+    def mean(a: float, b: float) -> float:
+        return share * a + (1.0 - share) * b
+
+    one, other = first.piece, second.piece
+    curve = mean(one.curve, other.curve)
+    middle = mean(one.offset * one.curve, other.offset * other.curve)
+    # The length only tells where the arc of a yarn beneath ends.
+    piece = one._replace(offset=middle / curve if curve else 0.0, curve=curve, half=max(one.half, other.half))
+    return Kind(piece, cells, first.blocks + second.blocks)

@@ -1,0 +1,265 @@
+"""What a renderer keeps of a cloth to answer by sums: fixed nodes for wide footprints, horizons for narrow ones.
+
+    wide     The nodes of every kind are fixed. A node knows mean and spread of its horizon for some azimuths, taken
+             over the box that it stands for and over all cells of its kind: what hides it is a ramp, not a step.
+    narrow   Nodes are placed by the query, in footprint and piece; horizons are read from a grid of the piece.
+
+Nodes come in blocks of LANES, what vector units take at a time. Horizons are sines of elevation, compared with the z of
+a direction; azimuths are even in the diamond angle, which needs no arc tangent. Grids hold 8 bits a value, and are the
+coarser the more different pieces there are, so that a table stays near a megabyte.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.gauss_rules import Double, Rule, gauss_rule, grid_edges, grid_middles, overlap
+from pipeline.analytic.soft_horizons import over_boxes
+from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
+from pipeline.analytic.soft_nodes.kinds import COLUMNS, Kind, gather
+from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
+from pipeline.analytic.soft_nodes.waves import tabulate_waves
+from pipeline.truth.cloth import model_of
+from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
+from pipeline.truth.geometry.horizon import horizon_sines
+from pipeline.truth.geometry.pieces import Piece, cell_pieces
+from pipeline.truth.node_table.build import Index, Single, longest_period, orbits
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import Fabric
+
+LANES: Final = 16
+"""Numbers in single precision that the widest vector units take at a time."""
+
+LEVELS: Final = 255.0
+"""Largest value of a grid, for a horizon straight above."""
+
+_GRIDS = (24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
+_GRID_BYTES = 1 << 20
+_EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
+_SHARPEST = 0.02  # least spread of a horizon
+
+# Columns of `Table.kinds`.
+START, LINES, RULE_ALONG, RULE_ACROSS, KIND_FAMILY = range(5)
+# Columns of `Table.pieces` and of `Table.bounds`.
+FAMILY, BLOCK = range(2)
+X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
+
+
+class Table(NamedTuple):
+    """A cloth's nodes and grids.
+
+    Attributes
+    ----------
+    repeat : int64 (2,)
+        Ends and picks.
+    yarn : float32 (2, 8)
+        `HeightField.yarn`.
+    thickness : float32
+        Optical thickness T.
+    float_length : float32 (2,)
+        Mean length of the floats of each family over the cells that show them; 1 if none does.
+    uniform, waves_from : float
+        Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves say its weights.
+    starts : int64 (4,)
+        First block of the nodes on warps, on wefts, in gaps; their end.
+    nodes : float32 (B, ROWS, LANES)
+        See `surface`.
+    evenly : float32 (B, LANES)
+        Share of the cloth's area that a node stands for.
+    mean, sharpness : float32 (AZIMUTHS, B, LANES)
+        Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
+    kinds : uint32 (K, 5)
+        First node, lines of nodes, rules along and across, family.
+    kind_starts, cell_kinds : uint32
+        The kinds in cell c = pick ends + end are cell_kinds[kind_starts[c] : kind_starts[c + 1]].
+    places, weights : float32 (R, COLUMNS)
+        Rules; shorter ones are filled with weights of 0.
+    waves : int64 (H, 2)
+    wave_size : float32 (H,)
+    wave_nodes : float32 (H, B, 2, LANES)
+        See `waves`.
+    piece_starts : int64
+        The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
+    pieces : int64 (P, 2)
+        Family, grid.
+    bounds : float32 (P, 7)
+        Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination.
+    grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
+        Horizons; cells are even in v across a yarn.
+    """
+
+    repeat: Index
+    yarn: Single
+    thickness: np.float32
+    float_length: Single
+    uniform: float
+    waves_from: float
+    starts: Index
+    nodes: Single
+    evenly: Single
+    mean: Single
+    sharpness: Single
+    kinds: npt.NDArray[np.uint32]
+    kind_starts: npt.NDArray[np.uint32]
+    cell_kinds: npt.NDArray[np.uint32]
+    places: Single
+    weights: Single
+    waves: Index
+    wave_size: Single
+    wave_nodes: Single
+    piece_starts: Index
+    pieces: Index
+    bounds: Single
+    grid: npt.NDArray[np.uint8]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
+
+
+def tabulate(fabric: Fabric) -> Table:
+    """Build the table of a fabric's front, as the default model of the truth sees it."""
+    model = model_of(fabric, TruthOptions())
+    front = model.front
+    picks, ends = front.top.shape
+
+    # The pieces of all cells; those that a translation of the cloth carries into one another share a grid.
+    first_of = {cell: orbit[0] for orbit in orbits(front.top) for cell in orbit}
+    blocks: dict[tuple[tuple[int, int], int], int] = {}
+    samples: list[tuple[int, int, Piece]] = []
+    placed, piece_starts = [], [0]
+    for pick, end in np.ndindex(picks, ends):
+        for index, piece in enumerate(cell_pieces(front, pick, end)):
+            key = (first_of[pick, end], index)
+            if key not in blocks:
+                blocks[key] = len(blocks)
+                samples.append((*key[0], piece))
+            placed.append(((end, pick), piece, blocks[key]))
+        piece_starts.append(len(placed))
+    size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
+    grid = _horizon_grids(front, model.back, samples, size)
+
+    # The nodes of every kind, each family in whole blocks.
+    kinds = gather(placed)
+    rules = [_rules(kind) for kind in kinds]
+    starts, first_nodes, stop = [], [], 0
+    for family in (WARP, WEFT, GAP):
+        starts.append(stop // LANES)
+        for kind in kinds:
+            if kind.piece.family == family:
+                first_nodes.append(stop)
+                stop += kind.nodes
+        stop += -stop % LANES
+    starts.append(stop // LANES)
+    nodes = np.tile(LEVEL[:, None], stop)
+    evenly, mean = np.zeros(stop), np.zeros((AZIMUTHS, stop))
+    variance = np.ones((AZIMUTHS, stop))
+    for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True):
+        lanes = (start + np.arange(kind.nodes)).reshape(kind.lines, COLUMNS)[:, : len(across.places)].ravel()
+        nodes[:, lanes] = piece_rows(front.yarn, kind.piece, across, along)
+        evenly[lanes] = np.outer(along.weights, across.weights).ravel() * len(kind.cells) / (ends * picks)
+        mean[:, lanes], variance[:, lanes] = _soft_horizons(kind, across, along, grid)
+    used = list({id(one): one for pair in rules for one in pair}.values())
+    number = {id(one): index for index, one in enumerate(used)}
+    waves = tabulate_waves(kinds, rules, first_nodes, stop, (ends, picks))
+    cell_kinds: list[list[int]] = [[] for _ in range(ends * picks)]
+    for index, kind in enumerate(kinds):
+        for end, pick in kind.cells:
+            cell_kinds[pick * ends + end].append(index)
+
+    def lanes_of(values: Double) -> Single:
+        return np.ascontiguousarray(values.reshape(*values.shape[:-1], -1, LANES), np.float32)
+
+    return Table(
+        repeat=np.array([ends, picks], np.int64),
+        yarn=np.ascontiguousarray(front.yarn, np.float32),
+        thickness=np.float32(front.thickness),
+        float_length=_float_lengths(front),
+        uniform=_EVEN * longest_period(front.top),
+        waves_from=waves.enough_from,
+        starts=np.array(starts, np.int64),
+        nodes=np.ascontiguousarray(lanes_of(nodes).transpose(1, 0, 2)),
+        evenly=lanes_of(evenly),
+        mean=lanes_of(mean),
+        sharpness=lanes_of(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2))),
+        kinds=np.array(
+            [
+                (start, kind.lines, number[id(along)], number[id(across)], kind.piece.family)
+                for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True)
+            ],
+            np.uint32,
+        ),
+        kind_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_kinds])]).astype(np.uint32),
+        cell_kinds=np.array([index for found in cell_kinds for index in found], np.uint32),
+        places=_filled([one.places for one in used], edge=True),
+        weights=_filled([one.weights for one in used], edge=False),
+        waves=waves.periods,
+        wave_size=waves.size,
+        wave_nodes=np.ascontiguousarray(waves.nodes.reshape(len(waves.size), 2, -1, LANES).transpose(0, 2, 1, 3)),
+        piece_starts=np.array(piece_starts, np.int64),
+        pieces=np.array([(piece.family, block) for _, piece, block in placed], np.int64),
+        bounds=np.array([_bounds(piece) for _, piece, _ in placed], np.float32),
+        grid=grid,
+    )
+
+
+def _rules(kind: Kind) -> tuple[Rule, Rule]:
+    """Return the nodes of a kind across and along."""
+    piece = kind.piece
+    columns = kind.lines if piece.family == GAP else COLUMNS
+    return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, kind.lines, 0.0)
+
+
+def _bounds(piece: Piece) -> tuple[float, ...]:
+    x, y = piece.box
+    return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, STEEPEST))
+
+
+def _filled(rows: list[Double], edge: bool) -> Single:
+    """Return rows of COLUMNS numbers, the last one repeated if `edge`, else 0."""
+    found = np.zeros((len(rows), COLUMNS), np.float32)
+    for index, row in enumerate(rows):
+        found[index] = np.pad(row, (0, COLUMNS - len(row)), mode="edge" if edge else "constant")
+    return found
+
+
+def _float_lengths(front: HeightField) -> Single:
+    found = []
+    for family in (WARP, WEFT):
+        # Floats that never end count as long as the repeat.
+        shown = np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], 0.5 * front.top.shape[family])
+        found.append(2.0 * float(shown.mean()) if shown.size else 1.0)
+    return np.array(found, np.float32)
+
+
+def _horizon_grids(
+    front: HeightField, back: HeightField, samples: list[tuple[int, int, Piece]], size: int
+) -> npt.NDArray[np.uint8]:
+    """Return the horizons of pieces, given with pick and end, in the middles of the cells of their grids."""
+    xs, ys, gaps = [], [], []
+    for pick, end, piece in samples:
+        x, y = (grid_middles(*extent, size, radius) for extent, radius in zip(piece.box, piece.radii, strict=True))
+        xs.append(np.tile(end + x, size))
+        ys.append(np.repeat(pick + y, size))
+        gaps.append(np.full(size * size, piece.family == GAP))
+    x, y, gap = (np.concatenate(parts) for parts in (xs, ys, gaps))
+    sines = from_even(horizon_sines(front, back, x, y, gap, 2 * AZIMUTHS))
+    grids = sines.reshape(AZIMUTHS, len(samples), size, size).transpose(1, 0, 2, 3)
+    return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
+
+
+def _soft_horizons(kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]) -> tuple[Double, Double]:
+    """Return mean and variance of the horizon over each node's box and all cells of a kind, (AZIMUTHS, nodes)."""
+    piece, size = kind.piece, grid.shape[-1]
+    of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
+    of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
+    blocks, counts = np.unique(kind.blocks, return_counts=True)
+    values = grid[blocks] / LEVELS
+    if piece.family == WEFT:
+        values = values.transpose(0, 1, 3, 2)
+    share = (counts / counts.sum())[:, None, None, None]
+    return over_boxes((share * values).sum(axis=0), (share * values**2).sum(axis=0), of_along, of_across)

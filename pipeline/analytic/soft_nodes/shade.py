@@ -1,0 +1,275 @@
+"""The point model over blocks of lanes, soft shadows included; the innermost loops of the sums.
+
+The formulas are those of `patch`, `microflake` and `slab`, written with cosines only. What differs: a horizon is a
+ramp (soft_horizons), and a highlight has four places in a node's box.
+
+Of each family come ten sums, each a share of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and
+lit; BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR, the same with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, how much
+of the bare ones lies within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen and lit without shadows: more light no model
+that keeps energy may return (features).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
+from pipeline.analytic.soft_nodes.nodes import LANES, LEVELS
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.compiled.float32 import absorbed
+from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
+from pipeline.truth.node_table.build import Single
+
+SUMS: Final = 10
+"""Sums of a family."""
+
+AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(8)
+OPEN_DIFFUSE, OPEN_SPECULAR = 8, 9
+
+ROWS: Final = 8
+"""Rows of a block of placed nodes."""
+
+SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(ROWS)
+"""Sine and cosine of v; position along the yarn from its float's middle; half boxes across and along; weight; curve,
+negative beneath; largest sine of u."""
+
+Eight = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
+Ten = tuple[
+    np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32,
+    np.float32,
+]  # fmt: skip
+
+_0, _1 = np.float32(0.0), np.float32(1.0)
+_TINY = np.float32(1e-12)
+_FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
+_GAUSS = np.float32(1.0 / math.sqrt(3.0))
+_LEVELS = np.float32(LEVELS)
+# A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
+_TAIL = np.float32(0.0005)
+
+
+class Directions(NamedTuple):
+    """One query's directions in the frame of one family.
+
+    Attributes
+    ----------
+    ix, iy, iz, ox, oy, oz : float32
+        wi and wo.
+    size : float32
+        1 / |wi + wo|^2.
+    alike, right, opposite : float32
+        How their azimuths lie to each other (soft_horizons).
+    """
+
+    ix: np.float32
+    iy: np.float32
+    iz: np.float32
+    ox: np.float32
+    oy: np.float32
+    oz: np.float32
+    size: np.float32
+    alike: np.float32
+    right: np.float32
+    opposite: np.float32
+
+
+@fast_kernel
+def directions(
+    ix: np.float32, iy: np.float32, iz: np.float32, ox: np.float32, oy: np.float32, oz: np.float32, family: int
+) -> Directions:
+    """Prepare a query's directions for a family."""
+    size = _1 / ((ix + ox) ** 2 + (iy + oy) ** 2 + (iz + oz) ** 2)
+    alike, right, opposite = azimuths_apart(ix, iy, ox, oy)
+    if family == WEFT:
+        ix, iy, ox, oy = iy, -ix, oy, -ox
+    return Directions(ix, iy, iz, ox, oy, oz, size, alike, right, opposite)
+
+
+@inlined_fast_kernel
+def _node(
+    d: Directions,
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    inverse: np.float32,
+    tx: np.float32,
+    ty: np.float32,
+    tz: np.float32,
+    along: np.float32,
+    across: np.float32,
+    seen: np.float32,
+    lit: np.float32,
+    weight: np.float32,
+    square: np.float32,
+    rest: np.float32,
+    scale: np.float32,
+    thickness: np.float32,
+    blend: np.float32,
+) -> Eight:
+    """Return a node's shares of the first six sums and of the last two.
+
+    `along`, `across`: by how much the half vector's cosine with the tangent changes to the four places.
+    """
+    facing_o = d.ox * nx + d.oy * ny + d.oz * nz
+    facing_i = d.ix * nx + d.iy * ny + d.iz * nz
+    cos_o, cos_i = max(facing_o, _0), max(facing_i, _0)
+    both = seen_and_lit(seen, lit, d.alike, d.right, d.opposite)
+    wide = weight * inverse
+    area = wide * cos_o
+    diffuse = area * ((blend * cos_i + (_1 - blend) * d.iz) if facing_i > _0 else _0)
+    # The slab: cosines with the tangent are all that the flakes need.
+    ti, to = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
+    h = ti + to
+    e, f = along + across, along - across
+    h0, h1, h2, h3 = h - e, h - f, h + f, h + e
+    q0, q1 = square + rest * h0 * h0, square + rest * h1 * h1
+    q2, q3 = square + rest * h2 * h2, square + rest * h3 * h3
+    q0, q1, q2, q3 = q0 * q0, q1 * q1, q2 * q2, q3 * q3
+    q01, q23 = q0 * q1, q2 * q3
+    sigma_i = np.sqrt(max(_1 - (_1 - square) * ti * ti, square))
+    sigma_o = np.sqrt(max(_1 - (_1 - square) * to * to, square))
+    crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
+    cosines = cos_i * cos_o
+    depth = thickness * crossed / (cosines + _TINY)
+    flakes = ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23 * crossed)
+    specular = wide * scale * flakes * cosines * absorbed(depth)
+    return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
+
+
+@fast_kernel
+def shade_fixed(
+    nodes: Single,
+    weight: Single,
+    low_i: Single,
+    high_i: Single,
+    sharpness_i: Single,
+    turn_i: np.float32,
+    low_o: Single,
+    high_o: Single,
+    sharpness_o: Single,
+    turn_o: np.float32,
+    d: Directions,
+    alpha: np.float32,
+    thickness: np.float32,
+    blend: np.float32,
+) -> Ten:
+    """Return the sums over fixed nodes of one family.
+
+    `low`, `high`: mean horizons at the azimuths around a direction; `turn`: where between them it lies.
+    """
+    square = alpha * alpha
+    rest = (_1 - square) * d.size
+    scale = _FLAKES * alpha * square
+    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
+    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
+    for b in range(len(weight)):
+        for k in range(LANES):
+            over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
+            over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+            lit = ramp(over_i)
+            along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
+            across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
+                d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
+                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, rest, scale, thickness, blend,
+            )  # fmt: skip
+            doubt = lit * (_1 - lit) + seen * (_1 - seen)
+            a += node_a
+            c += node_c
+            s += node_s
+            a0 += bare_a
+            c0 += bare_c
+            s0 += bare_s
+            dc += bare_c * doubt
+            ds += bare_s * doubt
+            oc += open_c
+            os += open_s
+    return a, c, s, a0, c0, s0, dc, ds, oc, os
+
+
+@fast_kernel
+def shade_placed(
+    nodes: Single,
+    cells: npt.NDArray[np.uint32],
+    grid: npt.NDArray[np.uint8],
+    low_i: np.uint32,
+    high_i: np.uint32,
+    turn_i: np.float32,
+    low_o: np.uint32,
+    high_o: np.uint32,
+    turn_o: np.float32,
+    sharpness: np.float32,
+    d: Directions,
+    yarn: Single,
+    thickness: np.float32,
+) -> Ten:
+    """Return the sums over nodes placed by the query.
+
+    `cells` is each node's cell of its grid at the first azimuth; `low`, `high`: what leads to those around a direction.
+    """
+    radius, sin_t, cos_t, beta = yarn[RADIUS], yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA]
+    alpha, blend = yarn[ALPHA], yarn[BLEND]
+    square = alpha * alpha
+    rest = (_1 - square) * d.size
+    scale = _FLAKES * alpha * square
+    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
+    level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
+    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
+    for b in range(len(cells)):
+        for k in range(LANES):
+            at = cells[b, k]
+            over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
+            over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+            lit = ramp(over_i)
+
+            # Normal and tangent, as in heightfield.surface_at; the tangent's change, as in `surface`.
+            sv, cv, turn = nodes[b, SIN, k], nodes[b, COS, k], nodes[b, TURN, k]
+            inner = turn / (_1 + radius * turn * cv)
+            su = min(max(nodes[b, ALONG, k] * inner, -nodes[b, LIMIT, k]), nodes[b, LIMIT, k])
+            cu = np.sqrt((_1 - su) * (_1 + su))
+            nx, ny, nz = beta * sv, beta * su * cv, cu * cv
+            n = _1 / np.sqrt(nx * nx + ny * ny + nz * nz)
+            tx, ty, tz = -cv * sin_t, cu * cos_t + su * sv * sin_t, beta * (cu * sv * sin_t - su * cos_t)
+            m = _1 / np.sqrt(tx * tx + ty * ty + tz * tz)
+            tx, ty, tz = tx * m, ty * m, tz * m
+            step_u = nodes[b, HALF_ALONG, k] * inner / cu * _GAUSS * m
+            step_v = nodes[b, HALF_V, k] * _GAUSS * m
+            uy, uz = cu * sv * sin_t - su * cos_t, -beta * (cu * cos_t + su * sv * sin_t)
+            vx, vy, vz = sv * sin_t, su * cv * sin_t, beta * cu * cv * sin_t
+            h = hx * tx + hy * ty + hz * tz
+            along = step_u * (hy * uy + hz * uz - h * (uy * ty + uz * tz))
+            across = step_v * (hx * vx + hy * vy + hz * vz - h * (vx * tx + vy * ty + vz * tz))
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
+                d, nx * n, ny * n, nz * n, _1 / (nz * n), tx, ty, tz, along, across, seen, lit, nodes[b, WEIGHT, k],
+                square, rest, scale, thickness, blend,
+            )  # fmt: skip
+            doubt = lit * (_1 - lit) + seen * (_1 - seen)
+            a += node_a
+            c += node_c
+            s += node_s
+            a0 += bare_a
+            c0 += bare_c
+            s0 += bare_s
+            dc += bare_c * doubt
+            ds += bare_s * doubt
+            oc += open_c
+            os += open_s
+    return a, c, s, a0, c0, s0, dc, ds, oc, os
+
+
+@fast_kernel
+def shade_gaps(
+    weight: Single, low_o: Single, high_o: Single, sharpness_o: Single, turn_o: np.float32, oz: np.float32
+) -> np.float32:
+    """Return the area seen through gaps, of fixed nodes."""
+    area = _0
+    for b in range(len(weight)):
+        for k in range(LANES):
+            area += weight[b, k] * ramp(above(oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k]))
+    return area * oz

@@ -1,0 +1,110 @@
+"""Which share of a wide footprint falls on each fixed node: a sum of waves, or of the Gaussian over all its images.
+
+A Gaussian along the axes is a product: one outer product of densities (axis_densities) for every touched cell and kind.
+One at an angle is a mixture of these (oblique); waves know any.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_nodes.kinds import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import KIND_FAMILY, LANES, LINES, RULE_ACROSS, RULE_ALONG, START
+from pipeline.analytic.soft_nodes.waves import HIGHEST, faintest
+from pipeline.compiled.decorators import fast_kernel
+from pipeline.compiled.float32 import remaining
+from pipeline.truth.geometry.heightfield import WEFT
+from pipeline.truth.node_table.build import Index, Single
+
+REACH: Final = 2.6
+"""Deviations after which a footprint is cut off: 1 % of it."""
+
+TURN_ROWS: Final = 4
+"""Rows of the scratch of `wave_weights`: cosines and sines of whole turns of x, then of y."""
+
+_0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
+_TURN = np.float32(2.0 * math.pi)
+_DAMPING = np.float32(2.0 * math.pi**2)
+_FAINTEST = np.float32(faintest(1.0) ** 2)
+
+
+@fast_kernel
+def wave_weights(
+    waves: Index,
+    size: Single,
+    nodes: Single,
+    evenly: Single,
+    x: np.float32,
+    y: np.float32,
+    deviation_x: np.float32,
+    deviation_y: np.float32,
+    correlation: np.float32,
+    narrowest: np.float32,
+    ends: np.float32,
+    picks: np.float32,
+    turns: Single,
+    weight: Single,
+) -> None:
+    """Write the weights of all nodes as a sum of the waves that are not faint; `turns` is scratch."""
+    last = _FAINTEST / (narrowest * narrowest)
+    count = 0
+    while count < len(size) and size[count] < last:
+        count += 1
+    for axis in range(2):
+        angle = _TURN * (x / ends if axis == 0 else y / picks)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turns[2 * axis, 0], turns[2 * axis + 1, 0] = _1, _0
+        for m in range(HIGHEST):
+            p, q = turns[2 * axis, m], turns[2 * axis + 1, m]
+            turns[2 * axis, m + 1], turns[2 * axis + 1, m + 1] = p * cosine - q * sine, p * sine + q * cosine
+    for b in range(len(weight)):
+        for k in range(LANES):
+            weight[b, k] = _1
+    for h in range(count):
+        m, n = waves[h, 0], waves[h, 1]
+        of_x, of_y = np.float32(m) / ends * deviation_x, np.float32(n) / picks * deviation_y
+        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y + _2 * correlation * of_x * of_y))
+        cos_x, sin_x, cos_y, sin_y = turns[0, m], turns[1, m], turns[2, abs(n)], turns[3, abs(n)]
+        sin_y = -sin_y if n < 0 else sin_y
+        cosine, sine = damping * (cos_x * cos_y - sin_x * sin_y), damping * (sin_x * cos_y + cos_x * sin_y)
+        values = nodes[h]
+        for b in range(len(weight)):
+            for k in range(LANES):
+                weight[b, k] += cosine * values[b, 0, k] + sine * values[b, 1, k]
+    for b in range(len(weight)):
+        for k in range(LANES):
+            weight[b, k] = max(weight[b, k], _0) * evenly[b, k]
+
+
+@fast_kernel
+def product_weights(
+    kind_starts: npt.NDArray[np.uint32],
+    cell_kinds: npt.NDArray[np.uint32],
+    kinds: npt.NDArray[np.uint32],
+    density_x: Single,
+    density_y: Single,
+    columns: npt.NDArray[np.uint32],
+    rows: npt.NDArray[np.uint32],
+    ends: int,
+    share: np.float32,
+    weight: Single,
+) -> None:
+    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a kind's touched cells."""
+    for pick in rows:
+        for end in columns:
+            cell = pick * np.uint32(ends) + end
+            for c in range(kind_starts[cell], kind_starts[cell + np.uint32(1)]):
+                kind = kinds[cell_kinds[np.uint32(c)]]
+                if kind[KIND_FAMILY] == WEFT:
+                    along, across = density_x[end, kind[RULE_ALONG]], density_y[pick, kind[RULE_ACROSS]]
+                else:
+                    along, across = density_y[pick, kind[RULE_ALONG]], density_x[end, kind[RULE_ACROSS]]
+                start = kind[START] // np.uint32(COLUMNS)
+                for j in range(kind[LINES]):
+                    factor = share * along[j]
+                    for k in range(COLUMNS):
+                        weight[start + j, k] += factor * across[k]

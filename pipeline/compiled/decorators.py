@@ -1,0 +1,114 @@
+"""How kernels are compiled: single-threaded, without the GIL, cached on disk, the same bits whoever compiled them.
+
+numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of a
+kernel's package, and of the packages it may import, cannot serve a stale kernel. Packages come in an order
+(`PACKAGES`), so that editing an approximation recompiles no ground truth. No fast-math but where a kernel says so
+(`fast_kernel`).
+
+pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. One process
+alone compiles at a time; the others wait and read what it wrote, because numba lets two overwrite each other's index.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from filelock import FileLock
+from numba.core.compiler_lock import global_compiler_lock
+
+from pipeline.compiled.reproducible import make_reproducible
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+PACKAGES = ("pipeline.compiled", "pipeline.truth", "pipeline.analytic", "reports.truth")
+"""Packages that hold kernels; each may call those before it."""
+
+_HOME = Path(__file__).parent
+_ROOT = _HOME.parents[1]
+
+
+def _cache_home() -> Path:
+    """Return where compiled kernels are kept: this package's own ``__pycache__``, else the user's cache."""
+    if os.access(_HOME, os.W_OK):
+        return _HOME / "__pycache__"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "twillight"
+
+
+@cache
+def _cache_folder(package: str) -> Path:
+    """Return the folder for the compiled kernels of a package, named after its sources and those it may import."""
+    sources = hashlib.sha256()
+    for name in PACKAGES[: PACKAGES.index(package) + 1]:
+        for path in sorted(_ROOT.joinpath(*name.split(".")).rglob("*.py")):
+            sources.update(path.read_bytes())
+    return _CACHE / f"{package}-{sources.hexdigest()[:12]}"
+
+
+def _package_of(module: str) -> str:
+    """Return the package in which a module lies, of those that hold kernels; code from elsewhere may call them all."""
+    return next((package for package in PACKAGES if f"{module}.".startswith(f"{package}.")), PACKAGES[-1])
+
+
+_CACHE = _cache_home()
+
+make_reproducible()
+
+_LOCK = FileLock(_CACHE / "kernels.lock", thread_local=False)
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Hold this process's compiler and the cache's lock, in this order; whoever dies lets go of both."""
+    with global_compiler_lock:
+        _CACHE.mkdir(parents=True, exist_ok=True)
+        with _LOCK:
+            yield
+
+
+def _decorator(**flags: Any) -> Callable[[_Function], _Function]:
+    """Return a decorator with these flags, whose kernels one process alone compiles or reads at a time."""
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)
+
+    def decorate(function: _Function) -> _Function:
+        # numba reads its cache folder when a function is decorated.
+        numba.config.CACHE_DIR = str(_cache_folder(_package_of(function.__module__)))  # type: ignore[attr-defined]
+        dispatcher: Any = compiled(function)
+        compile_or_load = dispatcher.compile
+
+        def compile_alone(signature: Any) -> Any:
+            with _alone():
+                return compile_or_load(signature)
+
+        dispatcher.compile = compile_alone
+        return cast(_Function, dispatcher)
+
+    return decorate
+
+
+_REGROUPED = {"reassoc", "contract", "nsz", "arcp"}
+
+kernel = _decorator()
+"""Decorator of every compiled function of the ground truth."""
+
+fast_kernel = _decorator(fastmath=_REGROUPED)
+"""Decorator of the few flat loops in single precision that vector units must be free to sum in their own order.
+
+NaN and infinity keep their meaning. Sums differ in the last bits between processors of different vector width, never
+between runs, workers or orders on one, nor between who compiles a kernel and who reads it from the cache.
+"""
+
+fused_kernel = _decorator(fastmath={"contract"})
+"""Decorator of arithmetic that must not be regrouped; a product and a sum may be one instruction, rounded once."""
+
+inlined_kernel = _decorator(forceinline=True)
+"""Decorator of functions called once a point with many tables: a call would copy what it passes."""
+
+inlined_fast_kernel = _decorator(fastmath=_REGROUPED, forceinline=True)
+"""Decorator of what such a loop calls for every node: a call would keep it from the vector units."""

@@ -1,0 +1,26 @@
+"""Options of `btf_autoencoder`: those of `unified_btf` with a shorter latent, for one fabric."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from pipeline.models.options import Name
+from pipeline.models.unified_btf.options import BtfOptions
+
+
+class BtfAutoencoderOptions(BtfOptions):
+    """One autoencoder of angular samples for each fabric [Rainer2019Neural]."""
+
+    of_one_material: ClassVar[bool] = True
+    seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
+
+    model: Literal["btf_autoencoder"] = "btf_autoencoder"
+    name: Name = "btf_autoencoder"
+    latent: int = Field(default=8, ge=1, le=512)
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        return ("four components in place of RGB, in samples and answers", "the encoder of 2020")

@@ -1,0 +1,39 @@
+"""The models that exist: every folder beside this file that has options.
+
+Options are data: they enter the fingerprint of a trained model, and a recipe's ``[[models]]`` table is validated by
+`ModelOptions`, the union told apart by ``model``. Nothing heavy is imported here, so that plans can be made without
+torch. A new model is a new folder; nothing else names it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Union, cast
+
+from pydantic import Field
+
+from pipeline.models.options import Options
+
+
+def _options_of(model: str) -> type[Options]:
+    """Return the options' class of a model: the one in its folder whose field ``model`` is the folder's name."""
+    module = import_module(f"pipeline.models.{model}.options")
+    members: list[Any] = list(vars(module).values())
+    for found in members:
+        fields = found.model_fields if isinstance(found, type) and issubclass(found, Options) else {}
+        if "model" in fields and fields["model"].default == model:
+            return cast(type[Options], found)
+    raise TypeError(f"{module.__file__} defines no options whose field model is {model!r}")
+
+
+CLASSES: dict[str, type[Options]] = {
+    folder.parent.name: _options_of(folder.parent.name) for folder in sorted(Path(__file__).parent.glob("*/options.py"))
+}
+"""The options' class of every model, by the name of its folder."""
+
+if TYPE_CHECKING:
+    ModelOptions = Options
+else:
+    ModelOptions = Annotated[Union[tuple(CLASSES.values())], Field(discriminator="model")]  # noqa: UP007
+"""Any model's options, told apart by `model`."""

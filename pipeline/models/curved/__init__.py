@@ -1,0 +1,1 @@
+"""`curved`: a neural material for curved surfaces [Kuznetsov2022Curved]."""

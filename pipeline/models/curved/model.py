@@ -1,0 +1,250 @@
+"""A neural material for curved surfaces: reflectance with the curvature as an input, and opacity [Kuznetsov2022Curved].
+
+Cloth on a curved surface lies wholly below its boundary. A camera ray enters the boundary, and may leave it again
+without a hit: that share is missed, and it makes the silhouette. Three modules, each a texture over the
+repeat and a perceptron; the first two do not know the light:
+
+    opacity       texture 7 + wo + kappa -> 24 -> 24 -> 24 -> 1, through a sigmoid
+    offset        texture 7 + wo + kappa -> 24 -> 24 -> 24 -> 1, which shifts the centre along the view
+    reflectance   texture 7 at the shifted centre + wi + wo + kappa -> 24 -> 24 -> 24 -> 4
+
+`silhouette = "grazing"` predicts the cosine at which a ray just touches the cloth in place of the opacity, which is a
+step in it. Over a footprint that cosine has a distribution: its mean and deviation are learnt, in units of
+sqrt(kappa), from `pipeline.truth.geometry.opacity.grazing_cosine`, and the opacity is that Gaussian's share below wo.z.
+For that variant gaps count as filled, as they do in its truth.
+
+A shard's transparency is another thing: what goes straight through the cloth at the points that the viewer sees.
+So the truth of the silhouette is asked when a network is built (pipeline.models.curved.silhouettes). ADAPTED as in
+`neumip`: four components, specular ones in log space, counts of texels and steps. The paper has one level and no
+footprint: `levels = 1` is its network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from pipeline.models.curved.options import CurvedOptions
+from pipeline.models.curved.silhouettes import Silhouettes, View, draw_silhouettes
+from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
+from pipeline.models.networks.losses import to_components, to_network, weighted_error
+from pipeline.models.networks.perceptron import perceptron
+from pipeline.models.networks.texture import level_shapes, random_pyramid, read_pyramid, shifted
+from pipeline.models.networks.texture_network import TextureNetwork
+from pipeline.models.one_material import OneMaterial, restored
+from pipeline.models.per_query import Answering, PerQuery, columns_of
+from pipeline.truth.cloth import model_of
+from pipeline.truth.geometry.opacity import has_gaps
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+_LAYERS = 3  # hidden ones of all perceptrons
+_SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): a step of no width cannot be learnt
+_NO_FALL = -1.0  # finite, because weights are averaged
+
+
+class CurvedNetwork(TextureNetwork):
+    """Textures and perceptrons of one fabric.
+
+    Parameters
+    ----------
+    options : CurvedOptions
+        The design.
+    repeat : tuple of int
+        Extent of the fabric's repeat in x and y, in yarn spacings.
+    silhouettes : Silhouettes, optional
+        What the opacity is learnt from; needed for training alone.
+    fall : float
+        Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
+    """
+
+    textures: ClassVar[tuple[str, ...]] = ("opacity_levels", "depth", "levels")
+    options: CurvedOptions
+    fall: Tensor
+
+    def __init__(
+        self,
+        options: CurvedOptions,
+        repeat: tuple[int, int],
+        silhouettes: Silhouettes | None = None,
+        fall: float = _NO_FALL,
+    ) -> None:
+        super().__init__()
+        self.options, self.repeat, self.silhouettes = options, repeat, silhouettes
+        self.register_buffer("fall", torch.tensor(fall, dtype=torch.float32))
+        shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)
+        channels, hidden, view = options.channels, options.hidden, _view_inputs(options)
+        coarse = level_shapes(options.silhouette_texels_per_yarn, options.levels, repeat)
+        self.opacity_levels = random_pyramid(channels, coarse)
+        self.opacity = perceptron(channels + view, hidden, _LAYERS, 2 if options.silhouette == "grazing" else 1)
+        self.levels = random_pyramid(channels, shapes)
+        self.decoder = perceptron(channels + view + _axes(options), hidden, _LAYERS, 4)
+        self.depth = None
+        self.offset: nn.Sequential | None = None
+        if options.offset:
+            self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
+            self.offset = perceptron(channels + view, hidden, _LAYERS, 1)
+
+    def forward(self, view: View, wi: Tensor) -> Tensor:
+        """Answer in network space, (n, 4), for light from wi (n, 3)."""
+        seen = self._view(view)
+        u, v = view.u, view.v
+        if self.offset is not None and self.depth is not None:
+            here = self._read([self.depth], u, v, view.sigma)
+            u, v = shifted(self.offset(torch.cat([here, seen], dim=-1)), u, v, view.wo, self.repeat)
+        features = self._read(list(self.levels), u, v, view.sigma)
+        output: Tensor = self.decoder(torch.cat([features, seen, wi[:, : _axes(self.options)]], dim=-1))
+        return output
+
+    def cover(self, view: View) -> Tensor:
+        """Return the opacity in [0, 1], (n,)."""
+        if self.options.silhouette == "grazing":
+            mean, deviation = self.grazing(view)
+            unit = view.curvature.sqrt().clamp_min(1e-6)  # on flat cloth every ray sinks: 1
+            share: Tensor = torch.special.ndtr((view.wo[:, 2] / unit - mean) / deviation)
+        else:
+            share = torch.sigmoid(self._silhouette(view)[:, 0])
+        if not self.options.certain:
+            return share
+        # A ray so steep that it sinks below every yarn has hit one: tan^2 >= 2 kappa fall.
+        cosine = view.wo[:, 2].square()
+        sinks = cosine >= 2.0 * view.curvature * self.fall * (1.0 - cosine)
+        return torch.where(sinks & (self.fall >= 0.0), torch.ones_like(share), share)
+
+    def grazing(self, view: View) -> tuple[Tensor, Tensor]:
+        """Return mean and deviation (n,) of the cosine at which a ray just touches, in units of sqrt(kappa)."""
+        mean, width = self._silhouette(view).unbind(dim=-1)
+        return mean, _SHARPEST + functional.softplus(width)
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the weighted squared error of the components, and the silhouette's own loss at random questions."""
+        options = self.options
+        ends, picks = self.repeat
+        columns = (batch.u / ends, batch.v / picks, batch.sigma, batch.wo, batch.curvature)
+        view = View(*(column.flatten(0, 1) for column in columns))
+        target = to_network(batch.target.flatten(0, 1), options.log_k)
+        output = self(view, batch.wi.flatten(0, 1))
+        error = weighted_error(output, target, options.specular_weight, options.diffuse_weight)
+        if self.silhouettes is None or options.silhouette_weight == 0:
+            return error
+        return error + options.silhouette_weight * self._edge_loss(*self.silhouettes.draw(len(view.u), random))
+
+    def _edge_loss(self, view: View, target: Tensor) -> Tensor:
+        """Cross entropy of opacities; or minus the log likelihood of grazing cosines, above the sharpest Gaussian's."""
+        if self.options.silhouette == "opacity":
+            return functional.binary_cross_entropy_with_logits(self._silhouette(view)[:, 0], target[:, 0])
+        mean, deviation = self.grazing(view)
+        square = (target[:, 0] - mean).square() + target[:, 1]
+        return ((deviation / _SHARPEST).log() + 0.5 * square / deviation.square()).mean()
+
+    def _silhouette(self, view: View) -> Tensor:
+        texels = self.options.silhouette_texels_per_yarn
+        features = self._read(list(self.opacity_levels), view.u, view.v, view.sigma, texels)
+        if self.options.silhouette == "grazing":
+            # The edge lies in a direction, not at an angle: of the view its azimuth alone.
+            level = functional.normalize(view.wo * view.wo.new_tensor([1.0, 1.0, 0.0]), dim=-1, eps=1e-6)
+            view = view._replace(wo=level)
+        output: Tensor = self.opacity(torch.cat([features, self._view(view)], dim=-1))
+        return output
+
+    def _view(self, view: View) -> Tensor:
+        """Return what the perceptrons see of viewer and curvature."""
+        options, curvature = self.options, view.curvature.unsqueeze(-1)
+        seen = [view.wo[:, : _axes(options)], curvature if options.curvature_input == "linear" else curvature.sqrt()]
+        if options.curvature_input == "touch":
+            square = view.wo[:, 2:].square()
+            seen.append((square / (square + 2.0 * curvature * (1.0 - square)).clamp_min(1e-12)).sqrt())
+        return torch.cat(seen, dim=-1)
+
+    def _read(self, levels: list[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels: int = 0) -> Tensor:
+        finest = self.options.texels_per_yarn
+        texels = texels or finest
+        return read_pyramid(levels, u, v, sigma, texels, self.blur * texels / finest)
+
+
+def _axes(options: CurvedOptions) -> int:
+    return 3 if options.directions == "vector" else 2
+
+
+def _view_inputs(options: CurvedOptions) -> int:
+    return _axes(options) + (2 if options.curvature_input == "touch" else 1)
+
+
+class Curved(OneMaterial[CurvedNetwork]):
+    """Trained materials for curved surfaces, one network for each fabric."""
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        network = self._asked(fabric, queries)
+        return self._in_chunks(fabric, queries, partial(_components, network), 4)
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the reflectance of the fabric's network; what it covers is another question."""
+        network, repeat = self.network_of(fabric), fabric.weave.repeat
+
+        def refuse(queries: Queries) -> None:
+            self._asked(fabric, queries)
+
+        def answer(*asked: Tensor) -> Tensor:
+            return _components(network, View(*asked[:-1]), asked[-1])
+
+        names = (*View._fields, "wi")
+        module = Answering(network, answer)
+        return PerQuery(refuse, lambda queries: columns_of(in_repeat(queries, repeat), names), module)
+
+    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
+        network = self._asked(fabric, queries)
+        return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
+
+    def _steepest(self, fabric: Fabric) -> float:
+        """Return the largest curvature that the fabric's network answers for, in 1/yarn spacings."""
+        limit = self.network_of(fabric).options.largest_curvature
+        return limit if self.domain is None else min(limit, self.domain.queries.curvature[1])
+
+    def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
+        """Return the fabric's network; BadInput for what it was not taught."""
+        network = self.network_of(fabric)
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+        limit = self._steepest(fabric)
+        beyond = np.flatnonzero(queries.curvature > limit * (1.0 + 1e-6))
+        if beyond.size:
+            where, value = f"curvature[{beyond[0]}]", float(queries.curvature[beyond[0]])
+            raise BadInput("queries", where, value, f"the model {self.name} was trained up to {limit:g} only")
+        return network
+
+    def _in_chunks(
+        self, fabric: Fabric, queries: Queries, answer: Callable[[View, Tensor], Tensor], width: int
+    ) -> npt.NDArray[np.float32]:
+        """Answer some rows at a time, without gradients."""
+        columns = (*View._fields, "wi")
+        near = in_repeat(queries, fabric.weave.repeat)
+        return in_chunks(near, lambda *asked: answer(View(*asked[:-1]), asked[-1]), self._device, columns, width)
+
+
+def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:
+    return to_components(network(view, wi), network.options.log_k)
+
+
+def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
+    """Return an untrained network with its questions about the silhouette; there must be exactly one fabric."""
+    (fabric,) = fabrics
+    front = model_of(fabric, TruthOptions()).front
+    fall = _NO_FALL if has_gaps(front) else float(front.highest - front.lowest)
+    return CurvedNetwork(options, fabric.weave.repeat, draw_silhouettes(options, fabric), fall)
+
+
+def restore(options: CurvedOptions, trained: Trained) -> list[Curved]:
+    """Return one method that holds all trained fabrics."""
+    networks, domain = restored(trained, lambda repeat: CurvedNetwork(options, repeat))
+    return [Curved(options.name, networks, domain)]

@@ -1,0 +1,97 @@
+"""Options of `curved`: reflectance, offset and silhouette of one fabric on curved surfaces."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.models.options import LogK, Name, Options, Weight
+
+
+class CurvedOptions(Options):
+    """Opacity, offset and reflectance of one fabric on curved surfaces [Kuznetsov2022Curved]."""
+
+    of_one_material: ClassVar[bool] = True
+    seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
+
+    model: Literal["curved"] = "curved"
+    """Which file of `pipeline.models` implements it."""
+    name: Name = "curved"
+    """Name of the trained model."""
+    texels_per_yarn: int = Field(default=16, ge=1, le=256)
+    """Texels of the finest level along one yarn spacing; textures hold one repeat and wrap."""
+    levels: int = Field(default=0, ge=0, le=12)
+    """Levels of the pyramids of opacity and reflectance: 1 as published, for questions without a footprint; 0 means
+    down to one texel."""
+    channels: int = Field(default=7, ge=1, le=32)
+    """Channels of every texture; the paper does not say."""
+    hidden: int = Field(default=24, ge=4, le=256)
+    """Width of the three hidden layers of all perceptrons."""
+    offset: bool = True
+    """Shift the centre along the view by a learnt depth before the look-up."""
+    silhouette: Literal["opacity", "grazing"] = "opacity"
+    """What makes the silhouette: the opacity, or the cosine at which a ray just touches, in which opacity is a step."""
+    directions: Literal["vector", "projected"] = "vector"
+    """How directions enter: as unit vectors, or as their x and y, which cannot tell light in front from light behind;
+    the paper does not say."""
+    curvature_input: Literal["linear", "root", "touch"] = "touch"
+    """How the curvature enters: `linear` as it is, `root` its square root, or `touch`, beside the root, the share
+    tan / sqrt(tan^2 + 2 kappa) of the viewer's tangent, which says how deep the ray dips."""
+    certain: bool = True
+    """Answer an opacity of 1 where every ray sinks below every yarn; only for cloths without gaps."""
+    footprint: Literal["gaussian", "box"] = "gaussian"
+    """Kernel of the questions about the silhouette; must be the kernel of the truth."""
+    silhouette_texels_per_yarn: int = Field(default=4, ge=1, le=256)
+    """Texels of the opacity's own texture. A ray meets crests yarns away, so that finer ones hold little but noise."""
+    silhouette_rows: int = Field(default=262_144, ge=64, le=2**24)
+    """Questions about the silhouette, asked once before the training."""
+    silhouette_points: Literal[32, 64, 128, 256, 512, 1024] = 32
+    """Rays of each; of grazing cosines a sixteenth."""
+    silhouette_sigma: tuple[float, float] = (0.05, 32.0)
+    """Range of their footprints, in yarn spacings; drawn log-uniformly."""
+    largest_curvature: float = Field(default=0.5, gt=0, le=1)
+    """Largest curvature learnt and answered, in 1/yarn spacings."""
+    silhouette_anywhere: float = Field(default=0.1, ge=0, le=1)
+    """Share of these questions with any cosine; the others lie where the opacity varies."""
+    silhouette_seed: int = Field(default=0, ge=0, lt=2**63)
+    """Seed of these questions and of their rays."""
+    silhouette_weight: Weight = 0.1
+    """Weight of the silhouette's loss. It shares no weight with the rest, so it sets little but what clipping keeps."""
+    blur: float = Field(default=8.0, ge=0, le=64)
+    """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
+    blur_halving: float = Field(default=0.11, gt=0, le=1)
+    """Share of the training after which the blur has halved; the paper does not say, so it is that of `neumip`."""
+    offset_frozen: float = Field(default=0.33, ge=0, le=1)
+    """Share of the training after which the offset texture is held fixed, as in `neumip`."""
+    texture_rate: float = Field(default=3.0, gt=0, le=1000)
+    """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""
+    log_k: LogK = 3.0
+    specular_weight: Weight = 1.0
+    """Weight of the specular squared error, taken in log space."""
+    diffuse_weight: Weight = 2.0
+    """Weight of the diffuse squared error."""
+
+    @model_validator(mode="after")
+    def _range(self) -> CurvedOptions:
+        low, high = self.silhouette_sigma
+        if not 0 < low <= high:
+            raise ValueError(f"silhouette_sigma must be [low, high] with 0 < low <= high, got [{low}, {high}]")
+        return self
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        changes = {
+            "pyramids for footprints": self.levels != 1,
+            "no offset": not self.offset,
+            "the root of the curvature as an input": self.curvature_input == "root",
+            "how deep the ray dips as an input": self.curvature_input == "touch",
+            "full opacity where it is certain": self.certain,
+        }
+        return ("four components in place of RGB", *(change for change, made in changes.items() if made))
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Curved cloth lit from all around."""
+        return frozenset({"behind", "curvature"})

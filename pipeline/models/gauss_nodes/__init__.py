@@ -1,0 +1,1 @@
+"""`gauss_nodes`: Gauss-Legendre nodes on every piece of yarn, k across it."""

@@ -1,0 +1,1 @@
+"""`neumip`: a neural texture of one fabric at all scales [Kuznetsov2021NeuMIP]."""

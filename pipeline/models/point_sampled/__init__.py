@@ -1,0 +1,1 @@
+"""`point_sampled`: the point model at k points of the footprint."""

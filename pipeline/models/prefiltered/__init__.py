@@ -1,0 +1,1 @@
+"""`prefiltered`: averaged normals and one evaluation of the point model, without shadows."""

@@ -1,0 +1,290 @@
+"""Sums over few nodes, corrected by a small network: one network for all fabrics and scales.
+
+What a cloth does to light is known; only its hidden nodes are too many. `pipeline.analytic.soft_nodes` answers a query
+by the point model over tens of nodes with softened horizons, and says on the way how much of the answer is in doubt. A
+narrow perceptron reads that and puts out four factors, one for each component that the sums alone give:
+
+    features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the sums
+
+Factors lie between 0 and 2 and begin at 1: before the first step the network is the sums, and however little it has
+learnt of a cloth, its colours, highlights and repeat are the cloth's own. With `bound` no component exceeds what the
+sums give without shadows of the light, and the diffuse ones return at most what arrives
+(pipeline.analytic.soft_nodes.features). With `narrow_nodes` small footprints, where so few nodes err most, are left to
+a Gauss rule of that many nodes; between the two ends of `seam` both are blended.
+
+What the fabric alone decides, 10 of the 40 features, folds into a bias. Mirror images need not be learnt, because
+features know none; exchanging warp and weft is taught by exchanging them in half of all steps.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from pipeline.analytic.soft_nodes.features import (
+    EXCHANGED,
+    EXCHANGED_SIGN,
+    FEATURES,
+    OF_QUERY,
+    cloth_features,
+    read_queries,
+)
+from pipeline.analytic.soft_nodes.nodes import Table, tabulate
+from pipeline.models.domain import Domain, domain_of
+from pipeline.models.gauss_nodes.model import GaussNodes
+from pipeline.models.gauss_nodes.options import GaussNodesOptions
+from pipeline.models.method import CHUNK, Batch
+from pipeline.models.per_fabric import PerFabric
+from pipeline.models.per_query import Answering, Columns, PerQuery
+from pipeline.models.plain import refuse_other
+from pipeline.models.selvage.options import SelvageOptions
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+_SLOPE = 0.01
+_LARGEST = 2.0  # factor
+_STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
+_LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
+_COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
+
+
+class SelvageNetwork(nn.Module):
+    """The correcting network, with the cloth it is trained on.
+
+    Parameters
+    ----------
+    options : SelvageOptions
+        The design.
+    fabrics : sequence of Fabric
+        Training fabrics, addressed by index in batches; none for inference.
+    """
+
+    def __init__(self, options: SelvageOptions, fabrics: Sequence[Fabric] = ()) -> None:
+        super().__init__()
+        self.options = options
+        sizes = [FEATURES] + [options.width] * options.layers
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in itertools.pairwise(sizes))
+        self.last = nn.Linear(options.width, 4)
+        nn.init.zeros_(self.last.weight)
+        nn.init.zeros_(self.last.bias)
+        self.mean: Tensor
+        self.scale: Tensor
+        self.register_buffer("mean", torch.zeros(FEATURES))
+        self.register_buffer("scale", torch.ones(FEATURES))
+        self._tables = [tabulate(fabric) for fabric in fabrics]
+        if fabrics:
+            self._measure(fabrics)
+
+    def forward(self, features: Tensor, components: Tensor, bounds: Tensor) -> Tensor:
+        """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) that the sums give."""
+        x = (features - self.mean) * self.scale
+        for layer in self.hidden:
+            x = functional.leaky_relu(layer(x), _SLOPE)
+        factors: Tensor = _LARGEST * torch.sigmoid(self.last(x))
+        answer = components * factors
+        return torch.minimum(answer, bounds) if self.options.bound else answer
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the squared errors of components and colour, over the colour: dark patches count too."""
+        options = self.options
+        features, components, bounds = self._read(batch)
+        target = batch.target.flatten(0, 1)
+        if options.exchange and random.integers(2):
+            sign = torch.from_numpy(EXCHANGED_SIGN).to(features.device)
+            features = features[:, EXCHANGED.tolist()] * sign
+            components, bounds, target = (x[:, list(_COMPONENTS)] for x in (components, bounds, target))
+        specular, diffuse = options.specular_colour, options.diffuse_colour
+        colours = target.new_tensor([specular, specular, diffuse, diffuse])
+        error = (self(features, components, bounds) - target) * colours
+        squared = error.square().sum(dim=-1) + options.colour_weight * error.sum(dim=-1).square()
+        loss: Tensor = (squared / (target @ colours + options.dark)).mean()
+        return loss
+
+    def start_at(self, target: Tensor) -> None:
+        """Change nothing: the network starts at the sums."""
+
+    def schedule(self, progress: float) -> None:
+        """Change nothing over the training."""
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return one group: all weights learn at the same rate."""
+        return [{"params": list(self.parameters()), "lr": rate}]
+
+    def architecture(self) -> dict[str, Any]:
+        """Count parameters and name the layers."""
+        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
+        return {"parameters": {"total": sum(weight.numel() for weight in self.parameters())}, "layers": layers}
+
+    def _read(self, batch: Batch) -> tuple[Tensor, ...]:
+        """Return features, components and bounds of all rows of a batch, computed on the CPU."""
+        found = []
+        for row, fabric in enumerate(batch.fabric.tolist()):
+            columns = (getattr(batch, name)[row].numpy(force=True) for name in Queries._fields)
+            found.append(read_queries(self._tables[fabric], Queries(*columns)))
+        parts = (torch.from_numpy(np.concatenate(columns)) for columns in zip(*found, strict=True))
+        return tuple(part.to(batch.u.device) for part in parts)
+
+    def _measure(self, fabrics: Sequence[Fabric]) -> None:
+        """Measure mean and spread of the features over queries of all fabrics, before and after the exchange."""
+        rows = []
+        for index, (fabric, table) in enumerate(zip(fabrics, self._tables, strict=True)):
+            repeat, count = fabric.weave.repeat, self.options.measured_rows
+            rows.append(read_queries(table, draw_queries(QueryOptions(), repeat, _STREAM + index, 0, count)).features)
+        features = np.concatenate(rows)
+        features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN]).astype(np.float64)
+        self.mean.copy_(torch.from_numpy(features.mean(axis=0)))
+        self.scale.copy_(torch.from_numpy(1.0 / (features.std(axis=0) + _LEAST_SPREAD)))
+
+
+class Selvage:
+    """A trained network that answers for any fabric; it tabulates each once.
+
+    Parameters
+    ----------
+    network : SelvageNetwork
+        Trained weights.
+    domain : Domain, optional
+        What it was taught; anything that the sums know if left out.
+    """
+
+    untaught: ClassVar[frozenset[str]] = frozenset({"stretch"})
+    """Kinds of queries that it knows without training: what an ellipse weighs is the sums' business."""
+
+    def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
+        self.name, self.setting, self.domain = network.options.name, "", domain
+        self.bound = network.options.bound
+        self._network = network.eval()
+        nodes = network.options.narrow_nodes
+        self._rule = GaussNodes(nodes, GaussNodesOptions()) if nodes else None
+        self._cloths = PerFabric(self._tabulate)
+        # Transposed weights; the normalisation folds into the first layer.
+        layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
+        first, *others = layers
+        with torch.no_grad():
+            weight = first.weight * network.scale
+            self._first = weight.t().contiguous(), first.bias - weight @ network.mean
+            self._others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
+        self._of_query = self._first[0][:OF_QUERY].contiguous()
+        self._answering = Answering(self._network, self._components)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Say yes: any fabric can be tabulated."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Tabulate the fabric, once."""
+        self._cloths.of(fabric)
+        if self._rule:
+            self._rule.prepare(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        self._refuse(queries)
+        if self._rule is None:
+            return self._corrected(fabric, queries)
+        share = self._share(queries)
+        by_network, by_rule = (np.flatnonzero(rows) for rows in (share[:, 0] > 0.0, share[:, 0] < 1.0))
+        result = np.zeros((len(share), 4), np.float32)
+        if by_network.size:
+            result[by_network] = self._corrected(fabric, queries.take(by_network))
+        if by_rule.size:
+            narrow = self._rule.predict(fabric, queries.take(by_rule))
+            result[by_rule] = share[by_rule] * result[by_rule] + (1.0 - share[by_rule]) * narrow
+        return result
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the network; sums and rule are read before it, and the bias of the fabric is its constant."""
+        table, bias = self._cloths.of(fabric)
+
+        def inputs(queries: Queries) -> Columns:
+            features, components, bounds = read_queries(table, queries)
+            read = (np.ascontiguousarray(features[:, :OF_QUERY]), components, bounds)
+            if self._rule is None:
+                return read
+            share, narrow = self._share(queries).astype(np.float32), np.zeros_like(components)
+            by_rule = np.flatnonzero(share[:, 0] < 1.0)
+            if by_rule.size:
+                narrow[by_rule] = self._rule.predict(fabric, queries.take(by_rule))
+            return (*read, share, narrow)
+
+        return PerQuery(self._refuse, inputs, self._answering, (bias,))
+
+    def with_bound(self, bound: bool) -> Selvage:
+        """Return the same network, bounded in energy or not."""
+        other = Selvage(self._network, self.domain)
+        other.bound, other.setting = bound, "bounded" if bound else "unbounded"
+        return other
+
+    def _components(self, *given: Tensor) -> Tensor:
+        """Answer from features, components and bounds, share and answers of the rule if there is one, and the bias."""
+        features, components, bounds, *by_rule, bias = given
+        x = torch.addmm(bias, features, self._of_query)
+        for weight, shift in self._others:
+            x = torch.addmm(shift, functional.leaky_relu(x, _SLOPE), weight)
+        answer = _LARGEST * torch.sigmoid(x.float()) * components
+        if self.bound:
+            answer = torch.minimum(answer, bounds)
+        return torch.lerp(by_rule[1], answer, by_rule[0]) if by_rule else answer
+
+    def _share(self, queries: Queries) -> npt.NDArray[np.floating]:
+        """Return how much of each answer is the network's, (N, 1)."""
+        low, high = self._network.options.seam
+        place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
+        return np.asarray(np.clip(place, 0.0, 1.0)[:, None])
+
+    def _refuse(self, queries: Queries) -> None:
+        if self.domain is not None:
+            self.domain.refuse(queries._replace(sigma_minor=queries.sigma), self.name)
+        refuse_other(queries, self.name, stretch=True)
+
+    def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer by the sums and the network."""
+        table, bias = self._cloths.of(fabric)
+        result = np.empty((len(queries.u), 4), np.float32)
+        with torch.inference_mode():
+            for start in range(0, len(result), CHUNK):
+                rows = slice(start, start + CHUNK)
+                features, components, bounds = read_queries(table, queries.take(rows))
+                x = torch.addmm(bias, torch.from_numpy(features)[:, :OF_QUERY], self._of_query)
+                for weight, shift in self._others:
+                    x = torch.addmm(shift, functional.leaky_relu_(x, _SLOPE), weight)
+                x.sigmoid_().mul_(_LARGEST)
+                np.multiply(x.numpy(), components, out=result[rows])
+                if self.bound:
+                    np.minimum(result[rows], bounds, out=result[rows])
+        return result
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of the table and of the network."""
+        rule = self._rule.bytes_stored(fabric) if self._rule else 0
+        return (
+            rule + self._cloths.of(fabric)[0].nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        )
+
+    def _tabulate(self, fabric: Fabric) -> tuple[Table, Tensor]:
+        """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
+        table, (weight, bias) = tabulate(fabric), self._first
+        return table, bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
+
+
+def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
+    """Return an untrained network for these fabrics."""
+    return SelvageNetwork(options, fabrics)
+
+
+def restore(options: SelvageOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Selvage]:
+    """Return the method that a trained network is."""
+    methods = []
+    for card, weights in trained:
+        network = SelvageNetwork(options)
+        network.load_state_dict(weights)
+        methods.append(Selvage(network, domain_of(card)))
+    return methods

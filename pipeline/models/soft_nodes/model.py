@@ -1,0 +1,65 @@
+"""Sums over few nodes with soft shadows: what `selvage` knows of a cloth before anything is learnt.
+
+A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
+(pipeline.analytic.soft_nodes); a query becomes one sum over them and costs about a microsecond. What so few nodes get
+wrong is a few per cent of the answer of a wide footprint, and more of a narrow one on a patch that is hidden almost
+wholly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.method import CHUNK
+from pipeline.models.per_fabric import PerFabric
+from pipeline.models.plain import refuse_other
+from pipeline.models.soft_nodes.options import SoftNodesOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+
+class SoftNodes:
+    """The sums alone; nothing is learnt.
+
+    Parameters
+    ----------
+    name : str
+        Name of the method.
+    """
+
+    def __init__(self, name: str = "soft_nodes") -> None:
+        self.name, self.setting = name, ""
+        self._tables = PerFabric(tabulate)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Say yes: any fabric can be tabulated."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Tabulate the fabric, once."""
+        self._tables.of(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries the sums do not know."""
+        refuse_other(queries, self.name, stretch=True)
+        table = self._tables.of(fabric)
+        result = np.empty((len(queries.u), 4), np.float32)
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            result[rows] = read_queries(table, queries.take(rows)).components
+        return result
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of the table."""
+        return self._tables.of(fabric).nbytes
+
+
+def restore(options: SoftNodesOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[SoftNodes]:
+    """Return the method."""
+    return [SoftNodes(options.name)]

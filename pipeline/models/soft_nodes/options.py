@@ -1,0 +1,26 @@
+"""Options of `soft_nodes`: nothing to choose but the name."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pipeline.models.options import Name, Options
+
+
+class SoftNodesOptions(Options):
+    """The sums of `selvage` without its network; nothing is trained."""
+
+    learns: ClassVar[bool] = False
+    seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
+
+    model: Literal["soft_nodes"] = "soft_nodes"
+    """Which file of `pipeline.models` implements it."""
+    name: Name = "soft_nodes"
+    """Name in tables."""
+    footprint: Literal["gaussian"] = "gaussian"
+    """Kernel of the sums; must be the kernel of the truth."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape."""
+        return frozenset({"stretch"})

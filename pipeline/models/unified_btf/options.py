@@ -1,0 +1,76 @@
+"""Options of `unified_btf`, and what it shares with `btf_autoencoder`."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.models.options import LogK, Name, Options, Weight
+from pipeline.truth.options import TruthOptions
+
+
+class BtfOptions(Options):
+    """What both encodings of bidirectional textures leave open."""
+
+    texels_per_yarn: int = Field(default=8, ge=1, le=64)
+    """Texels along one yarn spacing."""
+    texel_sigma: float = Field(default=0.5, gt=0, le=4)
+    """Standard deviation of a texel's footprint, in texels."""
+    samples: int = Field(default=128, ge=1, le=65_536)
+    """Angular samples of every texel: drawn from the truth when a fabric is added."""
+    fewest_samples: int = Field(default=50, ge=1)
+    """A training step encodes a fabric from a random number of its samples, from this one to all."""
+    directions: Literal["projected_disc", "hemisphere"] = "projected_disc"
+    """Density of the samples' directions, as in the queries."""
+    max_angle: float = Field(default=89.0, gt=0, le=89.9)
+    """Largest angle of the samples' directions to the macro normal, in degrees."""
+    truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
+    """How samples are answered. Its physics must be that of the data set; its errors may be large, because a latent
+    averages over all samples of a texel."""
+    angles: Literal["stereographic", "disc"] = "stereographic"
+    """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
+    log_samples: bool = False
+    """Whether the encoder reads the specular samples in log space, as the decoder answers; linear ones average as the
+    cloth does, and taught as much."""
+    weights: int = Field(default=32, ge=1, le=512)
+    """Weights m of every sample; not published."""
+    encoder_hidden: int = Field(default=64, ge=4, le=1024)
+    """Width of the encoder's two hidden layers; not published."""
+    hidden: int = Field(default=106, ge=4, le=1024)
+    """Width of the decoder's four hidden layers."""
+    log_k: LogK = 3.0
+    specular_weight: Weight = 1.0
+    """Weight of the specular squared error, taken in log space; the published loss is unknown."""
+    diffuse_weight: Weight = 2.0
+    """Weight of the diffuse squared error."""
+
+    latent: int
+    """Numbers that a texel is known by."""
+    model: str
+    """Which file of `pipeline.models` implements it."""
+    name: Name
+    """Name of the trained model."""
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        if self.fewest_samples > self.samples:
+            raise ValueError(f"fewest_samples ({self.fewest_samples}) must not be above samples ({self.samples})")
+        if self.specular_weight == 0 and self.diffuse_weight == 0:
+            raise ValueError("specular_weight and diffuse_weight must not both be 0")
+        return self
+
+
+class UnifiedBtfOptions(BtfOptions):
+    """One encoder and decoder of angular samples for all fabrics [Rainer2020Unified]."""
+
+    seconds: ClassVar[tuple[float, float]] = (4e-5, 1.5e-6)
+
+    model: Literal["unified_btf"] = "unified_btf"
+    name: Name = "unified_btf"
+    latent: int = Field(default=32, ge=1, le=512)
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What is not as published, in words for the page."""
+        return ("four components in place of RGB, in samples and answers",)

@@ -1,0 +1,349 @@
+"""What must hold of any cloth, tested on one fabric: reciprocity, energy, periodicity, agreement of the estimators.
+
+Every test returns records of what was measured, what it should be and whether it is
+(pipeline.truth.checks.check_result).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from itertools import product
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.checks.check_result import ROUNDING, Floats, Invariant, exact, largest, quotient, worst
+from pipeline.truth.cloth import AREA, SUMS, Columns, Model, columns_of, model_of
+from pipeline.truth.estimator import ESTIMATORS, estimate
+from pipeline.truth.footprint.place import BOX_SIDE
+from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.monte_carlo import REPLICATES, query_scene, ratios
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from pipeline.truth.scattering.microflake import density, sigma
+from pipeline.truth.scattering.point import point_share
+from pipeline.truth.scattering.slab import reflection, transmission
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+from weaves.surface import GAP as NO_YARN
+from weaves.surface import surface_at
+
+_SEED = 20_250_101
+_STEPS = 128  # directions of light in each replicate of a furnace
+_LATTICE = 256.0  # points of each replicate along a side of the repeat
+_WIDE = 4.0  # repeats: a Gaussian this wide is the average over the repeat
+
+
+def point_reciprocity(fabric: Fabric) -> list[Invariant]:
+    """Test f(wi, wo) = f(wo, wi) of the specular point model, at random points and directions on both sides of them."""
+    rng = np.random.default_rng(_SEED)
+    rows = 2000
+    wi, wo = _directions(rng, rows, 90.0), _directions(rng, rows, 90.0)
+    wi[::2] *= -1.0
+    ends, picks = fabric.weave.repeat
+    point = surface_at(fabric, rng.random(rows) * ends, rng.random(rows) * picks)
+    apart = {"reflection": 0.0, "transmission": 0.0}
+    for k in np.flatnonzero(point.yarn != NO_YARN):
+        t, alpha = point.tangent[k], (fabric.warp, fabric.weft)[point.yarn[k]].roughness
+        cos_i, cos_o = float(wi[k] @ point.normal[k]), float(wo[k] @ point.normal[k])
+        name, slab = ("reflection", reflection) if cos_i * cos_o > 0.0 else ("transmission", transmission)
+        there, back = (
+            _scattered(slab, *ends_of_path, t, alpha, fabric.optical_thickness)
+            for ends_of_path in ((wi[k], wo[k], cos_i, cos_o), (wo[k], wi[k], cos_o, cos_i))
+        )
+        apart[name] = max(apart[name], largest(quotient(there, back) - 1.0))
+    return [exact(f"reciprocity of a point, {name}", value, 0.0, 0.0) for name, value in apart.items()]
+
+
+def _scattered(
+    slab: Callable[..., float],
+    i: Floats,
+    o: Floats,
+    cos_i: float,
+    cos_o: float,
+    t: Floats,
+    alpha: float,
+    thickness: float,
+) -> float:
+    """Return one point's f(i, o) for unit k_s."""
+    v = i + o
+    flakes = density(v[0], v[1], v[2], t[0], t[1], t[2], alpha)
+    sigma_i, sigma_o = (sigma(w[0], w[1], w[2], t[0], t[1], t[2], alpha) for w in (i, o))
+    return slab(flakes, sigma_i, sigma_o, abs(cos_i), abs(cos_o), thickness)
+
+
+def patch_reciprocity(fabric: Fabric) -> list[Invariant]:
+    """Test that f_P(wi, wo) |wo.n_s| = f_P(wo, wi) |wi.n_s| for the specular part, if the normaliser is "projected".
+
+    How far "visible" breaks it is a number without a verdict.
+    """
+    rng = np.random.default_rng(_SEED + 1)
+    rows = 24
+    there = _queries(fabric, _directions(rng, rows, 75.0), _directions(rng, rows, 75.0), 1.0, rng)
+    back = there._replace(wi=there.wo, wo=there.wi)
+
+    def value(queries: Queries, seed: int, **choices: str) -> tuple[Floats, Floats]:
+        answers = estimate(fabric, queries, _fixed(16_384, **choices), seed)
+        cosine = np.abs(queries.wo[:, 2].astype(np.float64))
+        return answers.mean[:, :2].sum(axis=1) * cosine, np.hypot(*answers.standard_error[:, :2].T) * cosine
+
+    found = []
+    for frame in ("ply", "macro"):
+        ways = [value(queries, 1, normaliser="projected", frame=frame)[0] for queries in (there, back)]
+        name = f"reciprocity of a patch, projected, {frame} frame"
+        found.append(exact(name, largest(quotient(*ways) - 1.0), 0.0, 5 * ROUNDING, note="the same points both ways"))
+    (f, error), (f_back, error_back) = (
+        value(queries, seed, normaliser="projected") for seed, queries in enumerate((there, back))
+    )
+    spread = np.hypot(quotient(error, f), quotient(error_back, f))
+    found.append(worst("… with other points on the way back", quotient(f_back, f) - 1.0, 0.0, spread, 15))
+    broken = np.abs(quotient(*(value(queries, 1)[0] for queries in (there, back))) - 1.0)
+    note = f"median {np.median(broken):.3f}: the walls at float ends are in no height field"
+    return [*found, Invariant("… with the default, visible", broken.max(), 0.0, 0.0, "reported", "reported", note)]
+
+
+def range_of_values(fabric: Fabric) -> list[Invariant]:
+    """Test that no answer is negative or not finite, and 0 <= transparency <= 1, over everything that can be asked."""
+    rng = np.random.default_rng(_SEED + 2)
+    angles = (0.0, 45.0, 80.0, 89.0, 89.9)
+    odd, rows, low, high = 0, 0, math.inf, -math.inf
+    for alpha in (0.01, 0.1, 1.0):
+        yarns = {name: getattr(fabric, name).model_copy(update={"roughness": alpha}) for name in ("warp", "weft")}
+        cloth = fabric.model_copy(update=yarns)
+        # Tables take a second to build: one roughness is enough for them, the most extreme.
+        for estimator, footprint in product(("owen", "auto") if alpha == 0.01 else ("owen",), ("gaussian", "box")):
+            grid = np.array(np.meshgrid(angles, angles, (1e-4, 1.0, 1e4), (0, 1, 2))).reshape(4, -1)
+            wi, wo = (_turned(a, rng.uniform(0, 2 * math.pi, a.size)) for a in grid[:2])
+            wi[grid[3] > 0, 2] *= -1.0
+            wo[grid[3] > 1, 2] *= -1.0
+            queries = _queries(fabric, wi, wo, grid[2], rng)
+            queries.curvature[(grid[3] < 2) & (rng.random(grid.shape[1]) < 0.3)] = 0.1
+            # With so coarse an error asked for, auto answers by the table what the table can answer.
+            options = _fixed(32, estimator=estimator, footprint=footprint, relative_error=1.0)
+            answers = estimate(cloth, queries, options, 3)
+            for column in answers:
+                odd += int((~np.isfinite(column) | (column < 0)).sum())
+            rows += len(queries.u)
+            low, high = min(low, float(answers.transparency.min())), max(high, float(answers.transparency.max()))
+    note = f"in {rows} answers: alpha .01 to 1, angles to 89.9°, footprints 1e-4 to 1e4, both sides, curved or flat"
+    return [
+        exact("values negative or not finite", odd, 0.0, 0.0, note=note),
+        exact(
+            "transparency outside [0, 1]", max(0.0, -low, high - 1.0), 0.0, ROUNDING, note=f"{low:.3g} to {high:.3g}"
+        ),
+    ]
+
+
+def energy(fabric: Fabric) -> list[Invariant]:
+    """Test that no light is made: unit radiance from everywhere is seen as at most 1, if k_d, k_dt or k_s is 1.
+
+    int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at several angles of wo; k_s with all that goes
+    straight through. Directions are uniform on the hemisphere, low-discrepancy, shifted at random for each replicate.
+    """
+    rng = np.random.default_rng(_SEED + 3)
+    found = []
+    for theta in (0.0, 30.0, 60.0, 80.0):
+        diffuse, specular = [], []
+        wo = _turned(np.full(REPLICATES * _STEPS, theta), np.full(REPLICATES * _STEPS, 0.7))
+        for side in (1.0, -1.0):
+            shift = rng.random((REPLICATES, 1, 2))
+            steps = np.arange(_STEPS)[:, None] * (0.7548776662466927, 0.5698402909980532)
+            z, turn = ((steps + shift) % 1.0).reshape(-1, 2).T
+            sine, turn = np.sqrt(1.0 - z * z), turn * 2.0 * math.pi
+            wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), side * np.maximum(z, 1e-4)], axis=-1)
+            answers = estimate(fabric, _queries(fabric, wi, wo, _repeat_sigma(fabric), rng), _fixed(256), 4)
+            mean = answers.mean.astype(np.float64).reshape(REPLICATES, _STEPS, 4).mean(axis=1) * 2.0 * math.pi
+            diffuse.append(mean[:, 2:].sum(axis=1))
+            specular.append(mean[:, :2].sum(axis=1))
+        through = answers.transparency.astype(np.float64).reshape(REPLICATES, _STEPS).mean(axis=1)
+        parts = (
+            ("white furnace, reflected, k_d = 1", diffuse[0], ""),
+            ("white furnace, transmitted, k_dt = 1", diffuse[1], ""),
+            (
+                "light scattered once and straight through, k_s = 1",
+                specular[0] + specular[1] + through,
+                "reflected {:.3f}, transmitted {:.3f}, straight {:.3f}".format(
+                    *(x.mean() for x in (*specular, through))
+                ),
+            ),
+        )
+        for name, total, note in parts:
+            spread = total.std(ddof=1) / math.sqrt(REPLICATES)
+            found.append(worst(f"{name}: {theta:.0f}°", total.mean(), 1.0, spread, REPLICATES - 1, "<=", note))
+    return sorted(found, key=lambda item: item.name.split(":")[0])
+
+
+def projected_area(fabric: Fabric) -> list[Invariant]:
+    """Test that a viewer sees at most the projected area: <A V> <= |wo.n_s|, for closed height fields equal.
+
+    The quotient of the answers under the two normalisers, from the same points.
+    """
+    rng = np.random.default_rng(_SEED + 5)
+    found = []
+    for theta, turn in ((0.0, 0.0), *itertools.product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
+        wo = _turned(np.full(REPLICATES, theta), np.full(REPLICATES, turn))
+        queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _repeat_sigma(fabric), rng)
+        projected, visible = (
+            estimate(fabric, queries, _fixed(16_384, normaliser=normaliser), 5)
+            .mean[:, 2:]
+            .sum(axis=1, dtype=np.float64)
+            for normaliser in ("projected", "visible")
+        )
+        share = projected / visible
+        spread = share.std(ddof=1) / math.sqrt(REPLICATES)
+        name = f"visible area / cos: {theta:.0f}°" + (f", azimuth {turn:g}" if theta else "")
+        found.append(worst(name, share.mean(), 1.0, spread if spread > ROUNDING else 0.0, REPLICATES - 1, "<="))
+    return found
+
+
+def repeat_average(fabric: Fabric) -> list[Invariant]:
+    """Test that boxes of whole repeats and wide Gaussians are the repeat average, taken on shifted lattices.
+
+    Colour is applied afterwards: the components add up to the whole that is coloured point by point.
+    """
+    rng = np.random.default_rng(_SEED + 6)
+    ends, picks = fabric.weave.repeat
+    rows = 6
+    queries = _queries(fabric, _directions(rng, rows, 70.0), _directions(rng, rows, 70.0), 1.0, rng)
+    model, columns = model_of(fabric, TruthOptions()), columns_of(queries)
+    mean, error, whole = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows)
+    colours = np.array(
+        [
+            *(np.mean(yarn.specular_rgb) for yarn in (fabric.warp, fabric.weft)),
+            *(np.mean(yarn.diffuse_rgb) for yarn in (fabric.warp, fabric.weft)),
+        ]
+    )
+    side = max(4, round(_LATTICE / math.sqrt(ends * picks)))
+    for row in range(rows):
+        whole[row] = _lattice(model, columns, row, side, rng.random((REPLICATES, 2)), colours, mean[row], error[row])
+    found = []
+    for seed, (name, footprint, size) in enumerate(
+        (
+            ("box of one repeat", "box", 1.0 / BOX_SIDE),
+            ("box of 3 repeats", "box", 3.0 / BOX_SIDE),
+            ("Gaussian of one repeat", "gaussian", 1.0),
+            ("Gaussian of 1000 repeats", "gaussian", 1000.0),
+        )
+    ):
+        sizes = (np.full(rows, size * n, np.float32) for n in (ends, picks))
+        asked = queries._replace(**dict(zip(("sigma", "sigma_minor"), sizes, strict=True)))
+        answers = estimate(fabric, asked, _fixed(16_384, footprint=footprint), seed)
+        seen = mean[:, :4] > 1e-7
+        scale = mean[:, :4][seen]
+        spread = np.hypot(answers.standard_error, error[:, :4])[seen] / scale
+        found.append(worst(f"{name} / repeat average", answers.mean[seen] / scale, 1.0, spread, REPLICATES - 1))
+    apart = largest(quotient(mean[:, :4] @ colours, whole) - 1.0)
+    found.append(exact("coloured components / coloured whole − 1", apart, 0.0, 1e-12))
+    return found
+
+
+@kernel
+def _lattice(
+    model: Model, columns: Columns, row: int, side: int, shifts: Floats, colours: Floats, mean: Floats, error: Floats
+) -> float:
+    """Average a query over the repeat by shifted square lattices; write the components, return the coloured whole."""
+    picks, ends = model.front.top.shape
+    query, sums, coloured = query_scene(columns, row), np.zeros((REPLICATES, SUMS)), 0.0
+    for r in range(REPLICATES):
+        for a in range(side * ends):
+            for b in range(side * picks):
+                x, y = (a + shifts[r, 0]) / side, (b + shifts[r, 1]) / side
+                family, area, specular, diffuse, _ = point_share(model.front, model.back, x, y, query, model.choices)
+                sums[r, AREA] += area
+                if family != GAP:
+                    sums[r, family] += specular
+                    sums[r, 2 + family] += diffuse
+                    coloured += colours[family] * specular + colours[2 + family] * diffuse
+    ratios(sums, mean, error)
+    return float(coloured / sums[:, AREA].sum())
+
+
+def translation(fabric: Fabric) -> list[Invariant]:
+    """Test that a move by whole repeats changes nothing, between positions that single precision holds exactly."""
+    rng = np.random.default_rng(_SEED + 7)
+    rows = 16
+    ends, picks = fabric.weave.repeat
+    sizes = np.exp(rng.uniform(np.log(0.05), np.log(8.0), rows))
+    near = _queries(fabric, _directions(rng, rows, 80.0), _directions(rng, rows, 80.0), sizes, rng)
+    near = near._replace(u=_coarse(near.u), v=_coarse(near.v))
+    found = []
+    for name, count in (("one repeat", 1), ("1000 repeats", 1000)):
+        far = near._replace(u=near.u + np.float32(count * ends), v=near.v - np.float32(count * picks))
+        here, there = (estimate(fabric, asked, _fixed(512), 7).mean for asked in (near, far))
+        apart = float((np.abs(here - there) / np.maximum(here.max(axis=1, keepdims=True), 1e-12)).max())
+        found.append(exact(f"change by a move of {name}", apart, 0.0, ROUNDING, note="relative to the largest part"))
+    return found
+
+
+def agreement(fabric: Fabric) -> list[Invariant]:
+    """Test that all estimators give the same answers, each compared with one of them that takes more points.
+
+    One that does not know the cloth, as `table` does not a large irregular draft, is left out.
+    """
+    rng = np.random.default_rng(_SEED + 8)
+    rows, reference = 24, "owen"
+    sizes = np.exp(rng.uniform(np.log(0.5), np.log(8.0), rows))
+    queries = _queries(fabric, _directions(rng, rows, 75.0), _directions(rng, rows, 75.0), sizes, rng)
+    best = estimate(fabric, queries, _fixed(32_768, estimator=reference), 8)
+    found = []
+    for name in ESTIMATORS:
+        try:
+            answers = estimate(fabric, queries, _fixed(8192, estimator=name), 9)
+        except BadInput:
+            continue
+        seen = best.mean > 1e-2 * best.mean.max(axis=1, keepdims=True)
+        spread = np.hypot(answers.standard_error, best.standard_error)[seen] / best.mean[seen]
+        found.append(worst(f"{name} / {reference}", answers.mean[seen] / best.mean[seen], 1.0, spread, 15))
+    return found
+
+
+INVARIANTS: Final[tuple[Callable[[Fabric], list[Invariant]], ...]] = (
+    point_reciprocity,
+    patch_reciprocity,
+    range_of_values,
+    energy,
+    projected_area,
+    repeat_average,
+    translation,
+    agreement,
+)
+"""All tests, in the order of the table."""
+
+
+def _fixed(count: int, **choices: str | float) -> TruthOptions:
+    """Return options that spend `count` points on every query: stopping by its own error would bias a z-score."""
+    errors = {"relative_error": 1e-9, "absolute_error": 0.0}
+    counts = {"min_count": count, "max_count": count}
+    return TruthOptions.model_validate({"estimator": "owen", **errors, **counts, **choices})
+
+
+def _repeat_sigma(fabric: Fabric) -> float:
+    return _WIDE * max(fabric.weave.repeat)
+
+
+def _turned(degrees: Floats, azimuth: Floats) -> Floats:
+    """Return unit vectors (N, 3) at angles from the normal, degrees, and azimuths, radians."""
+    theta = np.radians(degrees)
+    return np.stack([np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth), np.cos(theta)], axis=-1)
+
+
+def _directions(rng: np.random.Generator, rows: int, largest: float) -> Floats:
+    """Return random unit vectors (rows, 3) within `largest` degrees of the normal, even in solid angle."""
+    cosine = rng.uniform(math.cos(math.radians(largest)), 1.0, rows)
+    return _turned(np.degrees(np.arccos(cosine)), rng.uniform(0.0, 2.0 * math.pi, rows))
+
+
+def _queries(fabric: Fabric, wi: Floats, wo: Floats, size: float | Floats, rng: np.random.Generator) -> Queries:
+    """Return round flat queries at random places of the repeat."""
+    u, v = (rng.random(len(wi)) * n for n in fabric.weave.repeat)
+    columns = u, v, np.broadcast_to(size, u.shape), wi, wo
+    return Queries.round(*(np.array(column, np.float32) for column in columns))
+
+
+def _coarse(places: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Round down to 1/256, which leaves single precision room for a thousand repeats."""
+    return np.asarray(np.floor(places * 256.0) / 256.0, np.float32)

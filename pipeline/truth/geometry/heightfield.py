@@ -1,0 +1,300 @@
+"""The repeat as kernels read it: tables per cell and per yarn family, and the scalar form of `weaves.surface`.
+
+`weaves.surface` is the oracle in NumPy; the functions here repeat its formulas for one point, because a ray visits one
+cell after another. A float on top is a piece of a torus seen from outside [Irawan2012Woven]; its height,
+sqrt((R + rho)^2 - y^2) with rho = sqrt(r^2 - x^2), is CONCAVE in (x, y): visibility rests on that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.geometry.gloss import gloss
+from pipeline.truth.options import Variation
+from weaves.draft import cells
+from weaves.fabric import Fabric
+
+WARP, WEFT, GAP = 0, 1, 2
+
+# Columns of `HeightField.yarn`, one row a family.
+RADIUS, INVERSE_RADIUS, SIN_TWIST, COS_TWIST, ALPHA, BETA, BLEND, BEND = range(8)
+# Columns of `HeightField.floats`: [pick, end, TOP or UNDER, column]; a bend radius of 0 marks a float drawn flat.
+TOP, UNDER = 0, 1
+OFFSET, BEND_RADIUS, HALF_LENGTH, AXIS_DROP, GLOSS = range(5)
+
+_EDGE = 1e-9  # cosine across a yarn below which the slope counts as vertical
+
+
+class HeightField(NamedTuple):
+    """Geometry and optics of one repeat; all arrays float64 except `top` (int8).
+
+    Attributes
+    ----------
+    top : (picks, ends)
+        Family on top: WARP or WEFT.
+    floats : (picks, ends, 2, 5)
+        For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
+        length L/2, R cos(u_max), and the factor of its specular colour.
+    crown : (picks, ends)
+        Greatest height that any surface of the cell reaches.
+    highest, lowest : float
+        Greatest height of the fabric, and a bound that no yarn lies below.
+    yarn : (2, 8)
+        Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d, u_max in radians.
+    thickness : float
+        Optical thickness T.
+    """
+
+    top: npt.NDArray[np.int8]
+    floats: npt.NDArray[np.float64]
+    crown: npt.NDArray[np.float64]
+    highest: float
+    lowest: float
+    yarn: npt.NDArray[np.float64]
+    thickness: float
+
+
+def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightField:
+    """Tabulate a fabric for the kernels; with a `variation`, so many repeats of it that its yarns can differ."""
+    draft = fabric.weave
+    if variation is not None:
+        draft = draft.tiled(variation.repeats)
+    table = cells(draft)
+    families = (fabric.warp, fabric.weft)
+    yarn = np.array(
+        [
+            (
+                0.5 * y.width,
+                2.0 / y.width,
+                math.sin(math.radians(y.twist)),
+                math.cos(math.radians(y.twist)),
+                y.roughness,
+                y.relief,
+                y.blend,
+                math.radians(y.bend),
+            )
+            for y in families
+        ]
+    )
+    floats = np.zeros((*table.top.shape, 2, 5))
+    crown = np.zeros(table.top.shape)
+    for pick, end in np.ndindex(*table.top.shape):
+        for side, offset, length in (
+            (TOP, table.top_offset[pick, end], table.top_length[pick, end]),
+            (UNDER, table.under_offset[pick, end], table.under_length[pick, end]),
+        ):
+            family = int(table.top[pick, end]) if side == TOP else 1 - int(table.top[pick, end])
+            row = _float_row(float(offset), float(length), families[family].width, families[family].bend)
+            factor = 1.0
+            if variation is not None:
+                factor = gloss(variation, family, side, pick, end, float(offset), float(length), draft.repeat)
+            floats[pick, end, side] = (*row, factor)
+            if side == TOP or families[1 - family].width < 1.0:
+                crown[pick, end] = max(
+                    float(crown[pick, end]), families[family].relief * _rise(side, row, yarn[family, RADIUS])
+                )
+    sag = floats[..., BEND_RADIUS] - floats[..., AXIS_DROP]
+    lowest = -float(max(y.relief for y in families) * sag.max())
+    return HeightField(
+        np.ascontiguousarray(table.top), floats, crown, float(crown.max()), lowest, yarn, fabric.optical_thickness
+    )
+
+
+def _float_row(offset: float, length: float, width: float, bend_degrees: float) -> tuple[float, float, float, float]:
+    """Return offset, bend radius, half length and R cos(u_max) of a float; bend radius 0 where it is drawn flat."""
+    sine = math.sin(math.radians(bend_degrees))
+    if not math.isfinite(length) or sine == 0.0 or width * sine >= length:
+        return offset, 0.0, 0.5 * length, 0.0
+    radius = length / (2.0 * sine)
+    return offset, radius, 0.5 * length, radius * math.cos(math.radians(bend_degrees))
+
+
+def _rise(side: int, row: tuple[float, float, float, float], radius: float) -> float:
+    """Return the greatest height of a float before relief: at its middle on top, at its ends beneath."""
+    _, bend, half, drop = row
+    if bend == 0.0:
+        return radius
+    if side == TOP:
+        return radius + bend - drop
+    inner = bend - radius
+    arc = inner * half / bend
+    return drop - math.sqrt((inner - arc) * (inner + arc)) + (half - arc) * half / drop
+
+
+@kernel
+def torus_height(
+    r: float, inverse_r: float, beta: float, bend: float, half: float, drop: float, x: float, y: float
+) -> tuple[float, float, float]:
+    """Return height and its slopes along local x and y, for a float on top; |x| <= r, constants as in `HeightField`."""
+    sine = min(1.0, abs(x) * inverse_r)
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    steepness = math.copysign(sine, x) / max(cosine, _EDGE)
+    if bend == 0.0:
+        return beta * r * cosine, -beta * steepness, 0.0
+    rho = r * cosine
+    root = math.sqrt((bend + rho - y) * (bend + rho + y))
+    # The difference root - R cos(u_max), as a quotient without cancellation: small bends keep every digit.
+    rise = 2.0 * bend * rho + rho * rho + (half - y) * (half + y)
+    height = rise / (root + drop)
+    inverse = beta / root
+    return beta * height, -(bend + rho) * inverse * steepness, -y * inverse
+
+
+@kernel
+def _height_top(field: HeightField, family: int, pick: int, end: int, x: float, y: float) -> tuple[float, float, float]:
+    """Return height and its slopes along local x and y, for a float on top; |x| <= r."""
+    return torus_height(
+        field.yarn[family, RADIUS],
+        field.yarn[family, INVERSE_RADIUS],
+        field.yarn[family, BETA],
+        field.floats[pick, end, TOP, BEND_RADIUS],
+        field.floats[pick, end, TOP, HALF_LENGTH],
+        field.floats[pick, end, TOP, AXIS_DROP],
+        x,
+        y,
+    )
+
+
+@kernel
+def _height_under(
+    field: HeightField, family: int, pick: int, end: int, x: float, y: float
+) -> tuple[float, float, float]:
+    """Return height and slopes for the yarn beneath, its bend reversed (u -> -u); |x| <= r."""
+    r, beta, bend = field.yarn[family, RADIUS], field.yarn[family, BETA], field.floats[pick, end, UNDER, BEND_RADIUS]
+    sine = min(1.0, abs(x) * field.yarn[family, INVERSE_RADIUS])
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    steepness = math.copysign(sine, x) / max(cosine, _EDGE)
+    if bend == 0.0:
+        return beta * r * cosine, -beta * steepness, 0.0
+    inner, drop = bend - r * cosine, field.floats[pick, end, UNDER, AXIS_DROP]
+    half = field.floats[pick, end, UNDER, HALF_LENGTH]
+    # The inner arc is shorter than the float; past its end the yarn runs on straight at u_max.
+    bound = inner * half / bend
+    y_arc = min(max(y, -bound), bound)
+    root = math.sqrt((inner - y_arc) * (inner + y_arc))
+    inverse = beta / root
+    height = beta * (drop - root + abs(y - y_arc) * half / drop)
+    return height, -inner * inverse * steepness, y_arc * inverse
+
+
+@kernel
+def local_position(family: int, offset: float, x: float, y: float, end: int, pick: int) -> tuple[float, float]:
+    """Return (across, along) of a fabric point in its yarn's frame; `end`, `pick` may lie outside the repeat."""
+    if family == WARP:
+        return x - (end + 0.5), y - (pick + 0.5) + offset
+    return y - (pick + 0.5), -(x - (end + 0.5) + offset)
+
+
+@inlined_kernel
+def surface_at(
+    field: HeightField, x: float, y: float, end: int, pick: int, linear: bool
+) -> tuple[int, int, float, float, float, float, float, float, float]:
+    """Return what is seen from above at (x, y) in cell (pick, end) of the repeat.
+
+    With `linear`, normal and tangent are those of angles proportional to the position, v = pi x / w and
+    u = u_max y / (L/2), as published code has them; they belong to no height field, and the height stays the torus's.
+
+    Returns
+    -------
+    family, side : int
+        WARP, WEFT or GAP; TOP or UNDER.
+    height, n_x, n_y, n_z, t_x, t_y, t_z : float
+        Height and the unit ply normal and fibre tangent; all 0 at a gap.
+    """
+    family = int(field.top[pick, end])
+    side = TOP
+    across, along = local_position(family, field.floats[pick, end, TOP, OFFSET], x, y, end, pick)
+    if abs(across) > field.yarn[family, RADIUS]:
+        family, side = 1 - family, UNDER
+        across, along = local_position(family, field.floats[pick, end, UNDER, OFFSET], x, y, end, pick)
+        if abs(across) > field.yarn[family, RADIUS]:
+            return GAP, UNDER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    radius, bend = field.yarn[family, RADIUS], field.floats[pick, end, side, BEND_RADIUS]
+
+    # Angles across (v) and along (u) the yarn.
+    sin_v = min(1.0, max(-1.0, across * field.yarn[family, INVERSE_RADIUS]))
+    cos_v = math.sqrt((1.0 - sin_v) * (1.0 + sin_v))
+    sin_u = 0.0
+    if side == TOP:
+        height, _, _ = _height_top(field, family, pick, end, across, along)
+        if bend > 0.0:
+            sin_u = along / (bend + radius * cos_v)
+    else:
+        height, _, _ = _height_under(field, family, pick, end, across, along)
+        if bend > 0.0:
+            bound = field.floats[pick, end, side, HALF_LENGTH] / bend
+            sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
+    cos_u = math.sqrt((1.0 - sin_u) * (1.0 + sin_u))
+    if linear:
+        v = 0.5 * math.pi * across * field.yarn[family, INVERSE_RADIUS]
+        u = 0.0
+        if bend > 0.0:
+            share = min(max(along / field.floats[pick, end, side, HALF_LENGTH], -1.0), 1.0)
+            u = field.yarn[family, BEND] * (share if side == TOP else -share)
+        sin_v, cos_v, sin_u, cos_u = math.sin(v), math.cos(v), math.sin(u), math.cos(u)
+
+    # Normal and twisted tangent of the cylinder, then the relief's stretch along z.
+    sin_t, cos_t, beta = field.yarn[family, SIN_TWIST], field.yarn[family, COS_TWIST], field.yarn[family, BETA]
+    nx, ny, nz = beta * sin_v, beta * sin_u * cos_v, cos_u * cos_v
+    tx = -cos_v * sin_t
+    ty = cos_u * cos_t + sin_u * sin_v * sin_t
+    tz = beta * (-sin_u * cos_t + cos_u * sin_v * sin_t)
+    if beta != 1.0:
+        n = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx * n, ny * n, nz * n
+        t = 1.0 / math.sqrt(tx * tx + ty * ty + tz * tz)
+        tx, ty, tz = tx * t, ty * t, tz * t
+    if family == WARP:
+        return family, side, height, nx, ny, nz, tx, ty, tz
+    return family, side, height, -ny, nx, nz, -ty, tx, tz
+
+
+@inlined_kernel
+def height_along(
+    field: HeightField, side: int, x: float, y: float, dx: float, dy: float, end: int, pick: int, column: int, row: int
+) -> tuple[float, float]:
+    """Return the height at (x, y) of one piece of cell (pick, end), and its slope along the unit direction (dx, dy).
+
+    `column`, `row` are the cell's place in the endless fabric, `end`, `pick` the same cell within the repeat.
+    """
+    family = int(field.top[pick, end])
+    if side == UNDER:
+        family = 1 - family
+    across, along = local_position(family, field.floats[pick, end, side, OFFSET], x, y, column, row)
+    if side == TOP:
+        height, slope_x, slope_y = _height_top(field, family, pick, end, across, along)
+    else:
+        height, slope_x, slope_y = _height_under(field, family, pick, end, across, along)
+    if family == WARP:
+        return height, slope_x * dx + slope_y * dy
+    return height, slope_x * dy - slope_y * dx
+
+
+@kernel
+def span_over(
+    field: HeightField,
+    family: int,
+    x: float,
+    y: float,
+    dx: float,
+    dy: float,
+    start: float,
+    stop: float,
+    column: int,
+    row: int,
+) -> tuple[float, float]:
+    """Return the part of the way from `start` to `stop` that lies over a yarn of a cell; none of it: stop < start.
+
+    The way leads from (x, y) along the unit direction (dx, dy); the cell is at (column, row) of the endless fabric.
+    """
+    radius, slope = field.yarn[family, RADIUS], dx if family == WARP else dy
+    across, _ = local_position(family, 0.0, x, y, column, row)
+    if slope == 0.0:
+        return (start, stop) if abs(across) <= radius else (stop, start - 1.0)
+    first, second = (-radius - across) / slope, (radius - across) / slope
+    return max(start, min(first, second)), min(stop, max(first, second))

@@ -1,0 +1,253 @@
+"""Horizons: how steeply a ray must rise to leave the cloth, for points and azimuths, tabulated once for many queries.
+
+The slope of the horizon is the greatest (h(s) - z) / s over everything that a ray crosses. Within a cell h is concave
+(heightfield), so that the slope rises and then falls.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.geometry.heightfield import (
+    AXIS_DROP,
+    BEND_RADIUS,
+    BETA,
+    GAP,
+    HALF_LENGTH,
+    INVERSE_RADIUS,
+    OFFSET,
+    RADIUS,
+    TOP,
+    UNDER,
+    WARP,
+    HeightField,
+    height_along,
+    local_position,
+    span_over,
+    surface_at,
+    torus_height,
+)
+
+_HALVINGS, _SECANTS = 3, 4
+_STRIP_POINTS = 8
+_NEAREST = 1e-6
+_FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are not told apart
+_STEEPEST = 1e4
+
+
+@kernel
+def _slope_of_top(
+    field: HeightField,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    a: float,
+    b: float,
+    end: int,
+    pick: int,
+    column: int,
+    row: int,
+    best: float,
+) -> float:
+    """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
+
+    The slope is greatest where its tangent passes through the point, at the root of (h - z) - s h', which rises with s.
+    """
+    # The ray in the frame of the float.
+    family = int(field.top[pick, end])
+    yarn, own = field.yarn[family], field.floats[pick, end, TOP]
+    r, inverse_r, beta = yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA]
+    bend, length, drop = own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP]
+    x, y = local_position(family, own[OFFSET], x, y, column, row)
+    if family != WARP:
+        dx, dy = dy, -dx
+
+    a = max(a, _NEAREST)
+    low, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + a * dx, y + a * dy)
+    rise_a = slope_x * dx + slope_y * dy
+    low -= z
+    fall_a = low - a * rise_a
+    if fall_a >= 0.0:
+        return max(best, low / a)
+    high, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + b * dx, y + b * dy)
+    rise_b = slope_x * dx + slope_y * dy
+    high -= z
+    fall_b = high - b * rise_b
+    if fall_b <= 0.0:
+        return max(best, high / b)
+    best = max(best, low / a, high / b)
+    # Tangents at both ends bound the height; where they meet below the best ray, nothing reaches it.
+    step = (high - low - rise_b * (b - a)) / (rise_a - rise_b)
+    if low + rise_a * step <= best * (a + step):
+        return best
+    # A yarn's edge is vertical: in theta, s = middle - half cos theta, the height has no such ends. Halve, then take
+    # the false position, the weight of an end that stays halved (Illinois).
+    middle, half = 0.5 * (a + b), 0.5 * (b - a)
+    first, last, fall_a, fall_b = 0.0, math.pi, 0.0, 0.0
+    for k in range(_HALVINGS + _SECANTS):
+        share = 0.5
+        if k >= _HALVINGS and fall_a < fall_b:
+            share = min(max(fall_a / (fall_a - fall_b), 0.02), 0.98)
+        theta = first + (last - first) * share
+        s = middle - half * math.cos(theta)
+        height, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + s * dx, y + s * dy)
+        height -= z
+        rise = slope_x * dx + slope_y * dy
+        best = max(best, height / s)
+        fall = (height - s * rise) * math.sin(theta)
+        if fall < 0.0:
+            first, fall_a, fall_b = theta, fall, 0.5 * fall_b
+        else:
+            last, fall_b, fall_a = theta, fall, 0.5 * fall_a
+    return best
+
+
+@kernel
+def _slope_of_strip(
+    field: HeightField,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    a: float,
+    b: float,
+    end: int,
+    pick: int,
+    column: int,
+    row: int,
+) -> float:
+    """Return the greatest slope to the yarn beneath between distances a and b, searched point by point."""
+    family = 1 - int(field.top[pick, end])
+    best = 0.0
+    a, b = span_over(field, family, x, y, dx, dy, a, b, column, row)
+    if b < a:
+        return best
+    for k in range(_STRIP_POINTS):
+        s = max(a + (b - a) * k / (_STRIP_POINTS - 1.0), _NEAREST)
+        height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
+        best = max(best, (height - z) / s)
+    return best
+
+
+@kernel
+def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: float, dy: float) -> float:
+    """Return the slope >= 0 above which the point (x, y, z) is visible in the azimuth (dx, dy), its own float left out.
+
+    Parameters
+    ----------
+    field : HeightField
+        The repeat.
+    x, y, z : float
+        The point, 0 <= x < ends, 0 <= y < picks.
+    side : int
+        TOP for a point on the yarn on top; else UNDER.
+    dx, dy : float
+        Unit azimuth.
+    """
+    picks, ends = field.top.shape
+    column, row = int(x), int(y)
+    end, pick = column, row
+    step_x = 1 if dx >= 0.0 else -1
+    step_y = 1 if dy >= 0.0 else -1
+    stride_x = 1.0 / abs(dx) if dx != 0.0 else math.inf
+    stride_y = 1.0 / abs(dy) if dy != 0.0 else math.inf
+    next_x = ((column + 1 - x) if step_x > 0 else (x - column)) * stride_x if dx != 0.0 else math.inf
+    next_y = ((row + 1 - y) if step_y > 0 else (y - row)) * stride_y if dy != 0.0 else math.inf
+    own = int(field.top[pick, end]) if side == TOP else -1
+    own_line = column if own == WARP else row
+    own_centre = (row if own == WARP else column) - field.floats[pick, end, TOP, OFFSET]
+    best, distance = 0.0, 0.0
+    while field.highest - z > max(best, _FLATTEST) * distance:
+        leave = min(next_x, next_y)
+        if field.crown[pick, end] - z > best * distance and leave > distance:
+            family = int(field.top[pick, end])
+            line = column if family == WARP else row
+            centre = (row if family == WARP else column) - field.floats[pick, end, TOP, OFFSET]
+            is_own = family == own and line == own_line and centre == own_centre
+            radius = field.yarn[family, RADIUS]
+            # The way through the cell, split where it enters and leaves a narrow top yarn.
+            enter, exit_ = distance, leave
+            if radius < 0.5:
+                across, _ = local_position(family, 0.0, x, y, column, row)
+                slope = dx if family == WARP else dy
+                if slope == 0.0:
+                    enter = distance if abs(across) <= radius else leave
+                else:
+                    first, second = (-radius - across) / slope, (radius - across) / slope
+                    enter = min(max(min(first, second), distance), leave)
+                    exit_ = min(max(max(first, second), distance), leave)
+                if enter > distance:
+                    slope_here = _slope_of_strip(field, x, y, z, dx, dy, distance, enter, end, pick, column, row)
+                    best = max(best, slope_here)
+                if leave > exit_:
+                    slope_here = _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, end, pick, column, row)
+                    best = max(best, slope_here)
+            if exit_ > enter and not is_own:
+                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, end, pick, column, row, best)
+        distance = leave
+        if distance > 1e4:
+            break
+        if next_x <= next_y:
+            next_x += stride_x
+            column += step_x
+            end += step_x
+            end = 0 if end == ends else (ends - 1 if end < 0 else end)
+        else:
+            next_y += stride_y
+            row += step_y
+            pick += step_y
+            pick = 0 if pick == picks else (picks - 1 if pick < 0 else pick)
+    return best
+
+
+@kernel
+def horizons(
+    field: HeightField,
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    azimuths: int,
+    own_plane: bool,
+) -> npt.NDArray[np.float32]:
+    """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
+
+    Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. Shape (azimuths, points).
+    """
+    slopes = np.zeros((azimuths, len(x)), np.float32)
+    for k in range(len(x)):
+        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x[k], y[k], int(x[k]), int(y[k]), False)
+        if family == GAP:
+            side, z = UNDER, 0.0
+        for a in range(azimuths):
+            turn = 2.0 * math.pi * a / azimuths
+            dx, dy = math.cos(turn), math.sin(turn)
+            slopes[a, k] = horizon(field, x[k], y[k], z, side, dx, dy)
+            if own_plane and family != GAP:
+                slopes[a, k] = max(slopes[a, k], min(-(nx * dx + ny * dy) / nz, _STEEPEST))
+    return slopes
+
+
+def horizon_sines(
+    front: HeightField,
+    back: HeightField,
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    gap: npt.NDArray[np.bool_],
+    azimuths: int,
+) -> npt.NDArray[np.float64]:
+    """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
+
+    Who looks through a gap sees it if nothing on the other side of the cloth, `back` seen from -wo, hides it either:
+    there the higher of both horizons counts. `azimuths` is even.
+    """
+    slopes = horizons(front, x, y, azimuths, False).astype(np.float64)
+    if gap.any():
+        other = horizons(back, x[gap], y[gap], azimuths, True)
+        slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, azimuths // 2, axis=0))
+    return np.asarray(slopes / np.sqrt(1.0 + slopes * slopes))

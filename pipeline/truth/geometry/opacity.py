@@ -1,0 +1,289 @@
+"""What a curved cloth hides: its opacity along camera rays, and the cosine at which a ray just touches it.
+
+The boundary surface lies at the height of the cloth's highest point. A camera ray enters it at a point of the footprint
+with direction -wo, and the cloth falls away below it by kappa s^2 / 2 at distance s [Kuznetsov2022Curved]: seen from
+the cloth, the ray is a parabola. It hits a yarn, or rises and leaves the boundary again, or passes through a gap to the
+other side. Every point of the footprint is taken to see the viewer under the same angle to its own normal.
+
+In the fabric plane a gap is open. A ray that crosses the plane there runs on beneath, where it is followed in steps of
+`_STEP`, until it meets the back of a yarn, leaves the cloth behind it, or comes up again through a gap. One that
+crosses the plane anywhere else has hit the yarn there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.cloth import Columns, Model, columns_of, model_of
+from pipeline.truth.footprint.sequences import derive, owen_pair
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
+from pipeline.truth.geometry.visibility import Ray, ray, visible
+from pipeline.truth.monte_carlo import REPLICATES, place_point
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import STEEPEST_CURVATURE, Queries, validate
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+_STEP = 1.0 / 256.0  # in yarn spacings, below the fabric plane only, where no concave form helps
+_BISECTIONS = 50
+
+
+@kernel
+def _wrapped(x: float, repeat: int) -> float:
+    """Return x modulo the repeat, in [0, repeat)."""
+    inside = x - repeat * math.floor(x / repeat)
+    return inside if 0.0 <= inside < repeat else 0.0
+
+
+@kernel
+def _open_at(field: HeightField, x: float, y: float) -> tuple[bool, float]:
+    """Say whether (x, y), anywhere on the endless cloth, is a gap, and return the height there."""
+    picks, ends = field.top.shape
+    x, y = _wrapped(x, ends), _wrapped(y, picks)
+    family, _, height, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y), False)
+    return family == GAP, height
+
+
+@kernel
+def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
+    """Say whether a sinking ray from the boundary above (x, y) goes through a gap and meets no yarn.
+
+    With H the boundary's height, rise < 0 the ray's slope there and q its slope where it crosses the plane, downwards:
+    q^2 = rise^2 - 2 kappa H.
+    """
+    picks, ends = front.top.shape
+    dx, dy, bend, high = towards.dx, towards.dy, towards.bend, front.highest
+    square = towards.rise * towards.rise - 2.0 * bend * high
+    if square <= 0.0:
+        return False
+    q = math.sqrt(square)
+    down = 2.0 * high / (q - towards.rise)
+    x, y = x + down * dx, y + down * dy
+    empty, _ = _open_at(front, x, y)
+    if not empty:
+        return False
+
+    # Back to where it came from: nothing between the boundary and the gap.
+    if q == math.inf:
+        return True
+    back_up = Ray(-towards.x, -towards.y, -towards.z, -dx, -dy, q, bend, towards.stride_x, towards.stride_y)
+    if not visible(front, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, back_up):
+        return False
+
+    # Beneath the plane, mirrored: the depth q s - kappa s^2 / 2 has to stay greater than that of the yarns.
+    onward = Ray(towards.x, towards.y, -towards.z, dx, dy, q, bend, towards.stride_x, towards.stride_y)
+    if bend <= 0.0:
+        return visible(back, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, onward)
+    square -= 2.0 * bend * back.highest
+    leaves = square > 0.0
+    length = 2.0 * back.highest / (q + math.sqrt(square)) if leaves else 2.0 * q / bend
+    steps = int(length / _STEP) + 1
+    for k in range(1, steps):
+        s = length * k / steps
+        empty, depth = _open_at(back, x + s * dx, y + s * dy)
+        if not empty and depth > s * (q - 0.5 * bend * s):
+            return False
+    if leaves:
+        return True
+
+    # Up again on this side.
+    x, y = x + length * dx, y + length * dy
+    empty, _ = _open_at(front, x, y)
+    return empty and visible(front, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, onward)
+
+
+@kernel
+def has_gaps(field: HeightField) -> bool:
+    """Say whether there are points that no yarn covers."""
+    return bool(field.yarn[WARP, RADIUS] < 0.5 and field.yarn[WEFT, RADIUS] < 0.5)
+
+
+@kernel
+def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
+    """Say whether a ray that enters the boundary above the point (x, y) of the repeat, sinking, hits any yarn.
+
+    Parameters
+    ----------
+    front, back : HeightField
+        The repeat and its back reflected in the fabric plane.
+    x, y : float
+        The point, 0 <= x < ends, 0 <= y < picks.
+    towards : Ray
+        The camera ray, z < 0.
+    """
+    if visible(front, x, y, front.highest, UNDER, towards):
+        return False
+    return not (has_gaps(front) and _passes(front, back, x, y, towards))
+
+
+@kernel
+def _opacity_rows(
+    model: Model,
+    columns: Columns,
+    index: npt.NDArray[np.int64],
+    tolerance: float,
+    min_count: int,
+    max_count: int,
+    seed: np.uint64,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return opacities and their standard errors (N,): ratios of replicates' sums, doubled up to the tolerance."""
+    rows = len(index)
+    means, errors = np.zeros(rows), np.zeros(rows)
+    sums = np.zeros((REPLICATES, 2))
+    for row in range(rows):
+        wo = columns.wo[row]
+        if wo[2] <= 0.0:
+            continue
+        towards = ray(-wo[0], -wo[1], -wo[2], columns.curvature[row])
+        fall = model.front.highest - model.front.lowest
+        if not has_gaps(model.front) and towards.rise * towards.rise >= 2.0 * towards.bend * fall:
+            means[row] = 1.0  # the ray sinks below every yarn
+            continue
+        key = derive(seed, index[row])
+        sums[:] = 0.0
+        hit, done, target = 0, 0, min_count // REPLICATES
+        while True:
+            for r in range(REPLICATES):
+                replicate = derive(key, r)
+                for k in range(done, target):
+                    first, second = owen_pair(replicate, k)
+                    x, y, weight = place_point(columns, row, model, first, second)
+                    sums[r, 1] += weight
+                    if hits(model.front, model.back, x, y, towards):
+                        sums[r, 0] += weight
+                        hit += 1
+            done = target
+            points = done * REPLICATES
+            total = sums[:, 1].sum()
+            means[row] = sums[:, 0].sum() / total
+            if hit == 0 or hit == points:
+                # Points that all agree have no spread: the standard deviation by the rule of succession.
+                errors[row] = math.sqrt((points + 1.0) / (points + 3.0)) / (points + 2.0)
+            else:
+                spread = 0.0
+                for r in range(REPLICATES):
+                    spread += (sums[r, 0] - means[row] * sums[r, 1]) ** 2
+                errors[row] = math.sqrt(spread * REPLICATES / (REPLICATES - 1)) / total
+            if errors[row] <= tolerance or points >= max_count:
+                break
+            target = 2 * done
+    return means, errors
+
+
+def opacity(
+    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """Return the share of a footprint's camera rays that hit any yarn before they leave the boundary.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    queries : Queries
+        N questions. `wi` plays no part, and `wo` may have any sign: with wo.z <= 0 a ray leaves the boundary where it
+        enters, which is an opacity of 0.
+    options : TruthOptions
+        Its footprint and counts; `relative_error` is taken of full opacity. Always from `owen` points, with shadows.
+    seed : int
+        Name of the random numbers, 0 <= seed < 2^64.
+    start : int
+        Index of the first query in its stream: a query's numbers depend on `seed` and this index alone.
+
+    Returns
+    -------
+    mean, standard_error : float32 (N,)
+        Opacity in [0, 1], and its standard error: 0 only where the answer is known without sampling.
+
+    Raises
+    ------
+    BadInput
+        If a query has no answer; see `pipeline.truth.query.faults`.
+    """
+    # Viewers at or beyond the horizon are no fault here, so they are lifted above it for the check.
+    lifted = queries.wo.copy()
+    lifted[:, 2] = np.maximum(np.abs(lifted[:, 2]), np.float32(1e-30))
+    validate(queries._replace(wi=lifted, wo=lifted))
+    index = start + np.arange(len(queries.u))
+    mean, error = _opacity_rows(
+        model_of(fabric, options),
+        columns_of(queries._replace(wi=lifted)),
+        index,
+        options.relative_error,
+        options.min_count,
+        options.max_count,
+        np.uint64(seed),
+    )
+    return mean.astype(np.float32), error.astype(np.float32)
+
+
+@kernel
+def _grazing_rows(
+    field: HeightField,
+    u: npt.NDArray[np.float64],
+    v: npt.NDArray[np.float64],
+    azimuth: npt.NDArray[np.float64],
+    curvature: npt.NDArray[np.float64],
+) -> npt.NDArray[np.float64]:
+    picks, ends = field.top.shape
+    cosines = np.zeros(len(u))
+    for row in range(len(u)):
+        x, y = _wrapped(u[row], ends), _wrapped(v[row], picks)
+        dx, dy = -math.cos(azimuth[row]), -math.sin(azimuth[row])
+        # Bisection in the tangent of the angle to the boundary; at the upper end the ray sinks below every yarn.
+        low, high = 0.0, math.sqrt(2.0 * curvature[row] * (field.highest - field.lowest))
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            flat = 1.0 / math.sqrt(1.0 + middle * middle)
+            if visible(field, x, y, field.highest, UNDER, ray(dx * flat, dy * flat, -middle * flat, curvature[row])):
+                low = middle
+            else:
+                high = middle
+        cosines[row] = high / math.sqrt(1.0 + high * high)
+    return cosines
+
+
+def grazing_cosine(
+    fabric: Fabric, u: npt.ArrayLike, v: npt.ArrayLike, azimuth: npt.ArrayLike, curvature: npt.ArrayLike
+) -> npt.NDArray[np.float64]:
+    """Return the cosine of the viewer's angle to the normal at which a ray just touches the cloth.
+
+    At one point of a cloth without gaps, opacity is a step in the cosine: 0 below this one, 1 above. It is never
+    negative, because a ray enters the boundary from outside; it is 0 for flat cloth, into which every ray sinks, and on
+    a crest, which touches the boundary. Gaps count as filled to the height of the lowest yarn, so that a ray that would
+    pass through one has a cosine too.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    u, v : float arrays, broadcast with the others
+        Where the ray enters the boundary, yarn spacings, anywhere.
+    azimuth : float array
+        Angle from x to the viewer's direction in the fabric plane, radians; the ray runs the other way.
+    curvature : float array
+        Curvature kappa along the ray, 1/yarn spacings, 0 <= kappa <= 1.
+
+    Returns
+    -------
+    float64 array
+        Cosines in [0, 1), of the broadcast shape.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or a curvature out of range.
+    """
+    columns = np.broadcast_arrays(*(np.asarray(column, np.float64) for column in (u, v, azimuth, curvature)))
+    for name, column in zip(("u", "v", "azimuth", "curvature"), columns, strict=True):
+        if not np.isfinite(column).all():
+            raise BadInput("queries", name, column[~np.isfinite(column)].flat[0], "must be finite")
+    wrong = (columns[3] < 0) | (columns[3] > STEEPEST_CURVATURE)
+    if wrong.any():
+        raise BadInput("queries", "curvature", float(columns[3][wrong].flat[0]), f"from 0 to {STEEPEST_CURVATURE:g}")
+    flat = [np.ascontiguousarray(column).reshape(-1) for column in columns]
+    cosines = _grazing_rows(model_of(fabric, TruthOptions()).front, *flat)
+    return np.asarray(cosines.reshape(columns[0].shape))

@@ -1,0 +1,170 @@
+"""Sampled estimates: points of the footprint in independent replicates, doubled until the error asked for is reached.
+
+A component is the ratio of two sums, f = N / D; its standard error comes from the spread of the replicates' residuals
+N_r - f D_r (the linearised ratio estimator [Cochran1977Sampling]), with REPLICATES - 1 degrees of freedom. Patches that
+are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit. The point sets
+differ in how fast the error falls: as count^-1/2 for independent points, faster for the others.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.cloth import AREA, SUMS, Columns, Model
+from pipeline.truth.footprint.place import place_pair
+from pipeline.truth.footprint.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
+from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.query import HIDDEN_SHARE
+from pipeline.truth.scattering.point import Scene, point_share, scene
+
+REPLICATES: Final = 16
+
+HIDDEN_PATIENCE: Final = 16
+"""Times `max_count` that a patch may spend of which some replicate has not seen a single point."""
+
+INDEPENDENT, JITTERED, R2, OWEN = range(4)
+
+
+@inlined_kernel
+def place_point(columns: Columns, row: int, model: Model, first: float, second: float) -> tuple[float, float, float]:
+    """Return the point that two numbers in (0, 1) name in the footprint of a query, and its weight."""
+    picks, ends = model.front.top.shape
+    return place_pair(
+        model.shape,
+        columns.u[row],
+        columns.v[row],
+        columns.sigma[row],
+        columns.sigma_minor[row],
+        columns.angle[row],
+        float(ends),
+        float(picks),
+        first,
+        second,
+    )
+
+
+@inlined_kernel
+def add_point(
+    model: Model, x: float, y: float, weight: float, query: Scene, sums: npt.NDArray[np.float64], r: int
+) -> None:
+    """Add the weighted share of a point to row r of the sums, (rows, SUMS)."""
+    family, area, specular, diffuse, through = point_share(model.front, model.back, x, y, query, model.choices)
+    if family != GAP:
+        sums[r, family] += weight * specular
+        sums[r, 2 + family] += weight * diffuse
+    sums[r, 4] += weight * through
+    sums[r, AREA] += weight * (query.viewer.z if model.projected else area)
+
+
+@kernel
+def query_scene(columns: Columns, row: int) -> Scene:
+    """Prepare the directions of a query."""
+    wi, wo = columns.wi[row], columns.wo[row]
+    return scene(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2], columns.curvature[row])
+
+
+@kernel
+def ratios(sums: npt.NDArray[np.float64], mean: npt.NDArray[np.float64], error: npt.NDArray[np.float64]) -> int:
+    """Write the ratios and their standard errors from the replicates' sums, (REPLICATES, SUMS); count who saw any."""
+    area, seen = 0.0, 0
+    for r in range(REPLICATES):
+        area += sums[r, AREA]
+        seen += sums[r, AREA] > 0.0
+    for c in range(AREA):
+        mean[c], error[c] = 0.0, 0.0
+        if area > 0.0:
+            total = 0.0
+            for r in range(REPLICATES):
+                total += sums[r, c]
+            mean[c] = total / area
+            spread = 0.0
+            for r in range(REPLICATES):
+                residual = sums[r, c] - mean[c] * sums[r, AREA]
+                spread += residual * residual
+            error[c] = math.sqrt(spread * REPLICATES / (REPLICATES - 1)) / area
+            if seen < REPLICATES:
+                # The ratio of a few visible replicates follows them: their spread alone would look too small.
+                error[c] = math.hypot(error[c], mean[c] / math.sqrt(seen))
+    return seen
+
+
+@kernel
+def sample_rows(
+    model: Model,
+    columns: Columns,
+    index: npt.NDArray[np.int64],
+    method: int,
+    relative_error: float,
+    absolute_error: float,
+    min_count: int,
+    max_count: int,
+    seed: np.uint64,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Answer every row: means and standard errors (N, 5), and points used.
+
+    Parameters
+    ----------
+    model, columns : Model, Columns
+        The cloth and the queries.
+    index : int (N,)
+        Name of each row: its random numbers are a function of (seed, index).
+    method : int
+        INDEPENDENT, JITTERED, R2 or OWEN.
+    relative_error, absolute_error, min_count, max_count, seed
+        As in `TruthOptions` and `estimate`.
+    """
+    rows = len(index)
+    means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
+    counts = np.zeros(rows, np.int64)
+    sums = np.zeros((REPLICATES, SUMS))
+    for row in range(rows):
+        key = derive(seed, index[row])
+        query = query_scene(columns, row)
+        mean, error = means[row], errors[row]
+        sums[:] = 0.0
+        done, target = 0, min_count // REPLICATES
+        while True:
+            # Extend every replicate from `done` to `target` points.
+            for r in range(REPLICATES):
+                replicate = derive(key, r)
+                for k in range(done, target):
+                    if method == OWEN:
+                        first, second = owen_pair(replicate, k)
+                    elif method == R2:
+                        first, second = r2_pair(replicate, k)
+                    elif method == JITTERED:
+                        first, second = jittered_pair(replicate, k, k - done, target - done)
+                    else:
+                        first, second = independent_pair(replicate, k)
+                    x, y, weight = place_point(columns, row, model, first, second)
+                    add_point(model, x, y, weight, query, sums, r)
+            done = target
+
+            # Stop when the error asked for is reached, or the points are spent.
+            seen = ratios(sums, mean, error)
+            size, squares = 0.0, 0.0
+            for c in range(4):
+                size += mean[c] * mean[c]
+                squares += error[c] * error[c]
+            if size == 0.0:
+                # So many points without light: a share of 1 / count may have been missed.
+                error[2] = error[3] = abs(query.light.z) / (math.pi * done * REPLICATES)
+                squares = 2.0 * error[2] * error[2]
+            reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
+            # A patch of which hardly a point is seen says nothing of its error yet; its points cost little.
+            limit = max_count if seen == REPLICATES else max_count * HIDDEN_PATIENCE
+            if done * REPLICATES >= limit or (reached and seen == REPLICATES):
+                break
+            target = 2 * done
+        counts[row] = done * REPLICATES
+        area = 0.0
+        for r in range(REPLICATES):
+            area += sums[r, AREA]
+        if area < HIDDEN_SHARE * query.viewer.z * counts[row]:
+            mean[:], error[:] = 0.0, 0.0
+    return means, errors, counts

@@ -1,0 +1,298 @@
+"""The repeat as a table of nodes with horizons: a query of any footprint becomes a sum over some thousand nodes.
+
+A cloth whose draft maps onto itself under a translation needs one cell of each orbit only: an 8-end satin is 8 cells,
+not 64. Every piece of yarn seen from above in such a cell is a tensor grid of nodes, x = r sin v across the yarn with v
+evenly spaced, evenly spaced along it. A node holds normal, tangent, and for each azimuth the slope of its horizon.
+Where a highlight is narrower than a node, finer nodes resolve it.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.geometry.heightfield import (
+    ALPHA,
+    BEND,
+    GAP,
+    HALF_LENGTH,
+    RADIUS,
+    SIN_TWIST,
+    TOP,
+    UNDER,
+    WARP,
+    WEFT,
+    HeightField,
+    surface_at,
+)
+from pipeline.truth.geometry.horizon import horizons
+from pipeline.truth.geometry.pieces import cell_pieces
+
+NODES: Final = 32
+"""Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
+
+WIDE: Final = 0.3
+"""Smallest standard deviation, in yarn spacings, of a footprint that a coarse table answers about as well."""
+
+AZIMUTHS: Final = 128
+"""Directions in which horizons are known."""
+
+_FEW = 8
+_COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
+_RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
+_FINEST = 16
+_SIDE = 0.25  # share of a node by which the last one along a yarn is cut in two
+_FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
+
+Single = npt.NDArray[np.float32]
+Double = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+# Columns of `Table.pieces`.
+START, COLUMNS, ROWS, KIND_X, KIND_Y, FAMILY, FINE_START, FINE = range(8)
+
+
+class Table(NamedTuple):
+    """Nodes of one side of a cloth.
+
+    Attributes
+    ----------
+    repeat : int64 (2,)
+        Ends and picks.
+    pieces : int64 (P, 8)
+        First node, nodes along x and along y, which edges along x and along y, family (or GAP), first fine node, fine
+        nodes a node.
+    copies : int64 (P, C, 2)
+        End and pick of the cells in which a piece lies.
+    edges : float32 (E, n + 1)
+        Borders of nodes within their cell; shorter rows repeat their last value.
+    evenly : float32 (N,)
+        Share of the cloth's area that a node and its copies stand for.
+    normal : float32 (4, N)
+        Normal of each node, and 1 / n_z; rows x, y, z, 1 / z.
+    fine : float32 (7, F)
+        The same for the finer nodes, then the tangent. Within a piece, first all nodes' first ones.
+    slope : float32 (A, N)
+        Slope of the horizon.
+    slope_behind : float32 (A, N)
+        The same at the back of the cloth; no rows if not asked for.
+    uniform : float
+        Standard deviation from which on a Gaussian covers the cloth evenly.
+    """
+
+    repeat: Index
+    pieces: Index
+    copies: Index
+    edges: Single
+    evenly: Single
+    normal: Single
+    fine: Single
+    slope: Single
+    slope_behind: Single
+    uniform: float
+
+
+def tabulate(
+    front: HeightField,
+    back: HeightField,
+    behind: bool,
+    coarse: bool = False,
+    nodes: int = 0,
+    azimuths: int = AZIMUTHS,
+) -> Table:
+    """Build the table of one side of a cloth.
+
+    Parameters
+    ----------
+    front, back : HeightField
+        The side that is seen and the other one, reflected in the fabric plane.
+    behind : bool
+        Whether light from behind will be asked for; through gaps it always is.
+    coarse : bool
+        Whether fewer nodes will do, since footprints are `WIDE`: where a shadow's border is taken wrongly at one node,
+        as many others make up for it. At 1 % it costs a half to a fifth of the time.
+    nodes, azimuths : int
+        Resolution; 0 nodes: as many as the number of different cells asks for.
+    """
+    picks, ends = front.top.shape
+    alike = orbits(front.top)
+    nodes = nodes or _resolution(len(alike), coarse)
+    kinds: list[tuple[float, ...]] = []
+    rows, copies, grids = [], [], []
+    start, fine_start = 0, 0
+    for orbit in alike:
+        pick, end = orbit[0]
+        for family, x_edges, y_edges in _pieces(front, pick, end, nodes):
+            for edges in (x_edges, y_edges):
+                if edges not in kinds:
+                    kinds.append(edges)
+            columns, lines = len(x_edges) - 1, len(y_edges) - 1
+            finer = (1, 1) if family == GAP else _finer(front, family, pick, end, columns, lines)
+            kind_x, kind_y = kinds.index(x_edges), kinds.index(y_edges)
+            rows.append((start, columns, lines, kind_x, kind_y, family, fine_start, finer[0] * finer[1]))
+            copies.append([(e, p) for p, e in orbit])
+            grids.append((end, pick, family, x_edges, y_edges, finer))
+            start += columns * lines
+            fine_start += columns * lines * finer[0] * finer[1]
+
+    # Positions of the nodes and of the finer ones; then what the surface is there.
+    at = [_positions(front, *grid) for grid in grids]
+    x, y = (np.concatenate([part[axis] for part in at]) for axis in (0, 1))
+    fine_x, fine_y = (np.concatenate([part[axis] for part in at]) for axis in (2, 3))
+    areas = [np.outer(np.diff(g[4]), np.diff(g[3])).ravel() * len(c) for g, c in zip(grids, copies, strict=True)]
+    size = max(map(len, kinds))
+    slope = horizons(front, x, y, azimuths, False)
+    behind = behind or any(family == GAP for _, _, family, *_ in grids)
+    slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
+    pieces = np.array(rows, np.int64)
+    return Table(
+        repeat=np.array([ends, picks], np.int64),
+        pieces=pieces,
+        copies=np.array(copies, np.int64),
+        edges=np.array([edges + (edges[-1],) * (size - len(edges)) for edges in kinds], np.float32),
+        evenly=(np.concatenate(areas) / (ends * picks)).astype(np.float32),
+        normal=_surface(front, x, y)[:4],
+        fine=_surface(front, fine_x, fine_y),
+        slope=slope,
+        slope_behind=slope_behind,
+        uniform=_FADED * longest_period(front.top),
+    )
+
+
+def _resolution(cells: int, coarse: bool) -> int:
+    """Return the nodes a yarn spacing, an even number: the more different cells, the more borders average out."""
+    if coarse:
+        return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
+    return max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / cells))))
+
+
+def different_cells(field: HeightField) -> int:
+    """Return how many cells of the repeat no translation of the cloth onto itself carries into one another."""
+    return field.top.size // len(_translations(field.top.shape, field.top.tobytes()))
+
+
+@lru_cache(maxsize=256)
+def _translations(shape: tuple[int, int], top: bytes) -> tuple[tuple[int, int], ...]:
+    """List the shifts by picks and ends that carry the cloth onto itself; `top` holds `HeightField.top`."""
+    cloth = np.frombuffer(top, np.int8).reshape(shape)
+    return tuple(shift for shift in np.ndindex(shape) if np.array_equal(np.roll(cloth, shift, (0, 1)), cloth))
+
+
+def orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
+    """Group the cells (pick, end) that translations of the cloth onto itself carry into one another."""
+    picks, ends = top.shape
+    steps = _translations(top.shape, top.tobytes())
+    left = dict.fromkeys(np.ndindex(picks, ends))
+    found = []
+    while left:
+        pick, end = next(iter(left))
+        found.append([((pick + p) % picks, (end + e) % ends) for p, e in steps])
+        for cell in found[-1]:
+            del left[cell]
+    return found
+
+
+def longest_period(top: npt.NDArray[np.int8]) -> float:
+    """Return the wavelength of the slowest wave that the translations of a cloth onto itself leave."""
+    picks, ends = top.shape
+    steps = _translations(top.shape, top.tobytes())
+    shortest = min(
+        math.hypot(m / ends, n / picks)
+        for m in range(ends + 1)
+        for n in range(-picks, picks + 1)
+        if (m or n) and all((m * e * picks + n * p * ends) % (ends * picks) == 0 for p, e in steps)
+    )
+    return 1.0 / shortest
+
+
+def _pieces(
+    field: HeightField, pick: int, end: int, nodes: int
+) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
+    """Return family, x edges and y edges of everything seen from above in a cell."""
+    around = [tuple((0.5 + radius * np.sin(np.linspace(-math.pi / 2, math.pi / 2, nodes + 1))).tolist())
+              for radius in field.yarn[:, RADIUS]]  # fmt: skip
+
+    def straight(low: float, high: float) -> tuple[float, ...]:
+        return tuple(np.linspace(low, high, max(2, math.ceil(nodes * (high - low))) + 1).tolist())
+
+    def beneath_another(low: float, high: float) -> tuple[float, ...]:
+        # The back of the cloth is a yarn across, which turns away from steep light close to its sides only.
+        places = straight(low, high)
+        step = _SIDE * (places[1] - low)
+        return (low, low + step, *places[1:-1], high - step, high)
+
+    # Nodes end where the crossing yarn does: from there on the other side of the cloth is another one.
+    gap = max(0.0, 0.5 - float(field.yarn[1 - int(field.top[pick, end]), RADIUS]))
+    if gap > 1e-9:
+        covered = straight(0.0, gap)[:-1] + beneath_another(gap, 1.0 - gap)[:-1] + straight(1.0 - gap, 1.0)
+    else:
+        covered = beneath_another(0.0, 1.0)
+    found = []
+    for piece in cell_pieces(field, pick, end):
+        across = straight(*piece.across) if piece.family == GAP else around[piece.family]
+        along = covered if piece.side == TOP else straight(*piece.along)
+        x, y = (along, across) if piece.family == WEFT else (across, along)
+        found.append((piece.family, x, y))
+    return found
+
+
+def _finer(field: HeightField, family: int, pick: int, end: int, columns: int, lines: int) -> tuple[int, int]:
+    """Return how many finer nodes, along x and along y, resolve the highlights of a piece."""
+    side = TOP if family == field.top[pick, end] else UNDER
+    alpha = field.yarn[family, ALPHA]
+    length = 2.0 * field.floats[pick, end, side, HALF_LENGTH]
+    across, along = (columns, lines) if family == WARP else (lines, columns)
+    turn_along = 2.0 * field.yarn[family, BEND] / length / along
+    turn_across = math.pi * abs(field.yarn[family, SIN_TWIST]) / across
+    counts = [min(_FINEST, max(1, math.ceil(_RESOLVED * turn / alpha))) for turn in (turn_across, turn_along)]
+    return (counts[0], counts[1]) if family == WARP else (counts[1], counts[0])
+
+
+def _positions(
+    field: HeightField,
+    end: int,
+    pick: int,
+    family: int,
+    x_edges: tuple[float, ...],
+    y_edges: tuple[float, ...],
+    finer: tuple[int, int],
+) -> tuple[Double, Double, Double, Double]:
+    """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
+
+    def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Double:
+        # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
+        places = np.array(edges)
+        borders = np.arcsin(np.clip((places - 0.5) / radius, -1.0, 1.0)) if bent else places
+        share = (np.arange(count)[:, None] + 0.5) / count
+        at = borders[:-1] + share * np.diff(borders)
+        return 0.5 + radius * np.sin(at) if bent else at
+
+    radius = 0.0 if family == GAP else float(field.yarn[family, RADIUS])
+    bent = (family == WARP, family not in (WARP, GAP))
+    grids = []
+    for counts in ((1, 1), finer):
+        xs = end + middles(x_edges, counts[0], bent[0], radius)
+        ys = pick + middles(y_edges, counts[1], bent[1], radius)
+        shape = (counts[1], counts[0], ys.shape[1], xs.shape[1])
+        grids.append(np.broadcast_to(xs[None, :, None, :], shape).ravel())
+        grids.append(np.broadcast_to(ys[:, None, :, None], shape).ravel())
+    return grids[0], grids[1], grids[2], grids[3]
+
+
+@kernel
+def _surface(field: HeightField, x: Double, y: Double) -> Single:
+    """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
+    found = np.zeros((7, len(x)), np.float32)
+    for k in range(len(x)):
+        family, _, _, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]), False)
+        if family == GAP:
+            nx, ny, nz = 0.0, 0.0, 1.0
+        values = (nx, ny, nz, 1.0 / nz, tx, ty, tz)
+        for c in range(7):
+            found[c, k] = values[c]
+    return found

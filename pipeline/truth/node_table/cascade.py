@@ -1,0 +1,155 @@
+"""The estimators `table`, `auto`, `elliptic`: sums over tabulated nodes, and sampling for what these cannot say well.
+
+`auto` asks a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a query
+and samples its own doubtful nodes where the error it states is above the one asked for (nodes, refine). What is still
+above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, cloths of more
+than `_MOST_CELLS` different cells, and models other than the default. Footprints at an angle, which the table takes as
+mixtures (oblique), are `auto`'s to sample, as in all shards so far; `elliptic` asks the tables about them too.
+"""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.truth.cloth import Columns, Model, Raw
+from pipeline.truth.footprint.mixture import FINE_LINE, axes
+from pipeline.truth.footprint.place import GAUSSIAN
+from pipeline.truth.monte_carlo import OWEN, sample_rows
+from pipeline.truth.node_table.answer import sum_rows
+from pipeline.truth.node_table.build import NODES, WIDE, Table, different_cells, tabulate
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+
+_MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
+_SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
+_UNBOUNDED: Final = (1.0, np.inf)  # relative and absolute error: whatever the table states will do
+_STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
+"""Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
+
+
+def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+    """Answer each query by the first that states the error asked for: a coarse table, a fine one, sampling."""
+    return _first_good(tabulated(model, columns) & _axial(model, columns), model, columns, index, options, seed)
+
+
+def elliptic_rows(
+    model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
+) -> Raw:
+    """Answer as `auto_rows` does, footprints at an angle by the tables too."""
+    return _first_good(tabulated(model, columns), model, columns, index, options, seed)
+
+
+def _first_good(
+    known: npt.NDArray[np.bool_],
+    model: Model,
+    columns: Columns,
+    index: npt.NDArray[np.int64],
+    options: TruthOptions,
+    seed: int,
+) -> Raw:
+    rows = len(index)
+    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    wide = _wide(columns)
+    left = np.ones(rows, np.bool_)
+    for coarse in (True, False):
+        asked = np.flatnonzero(known & left & (wide | (not coarse)))
+        if not asked.size:
+            continue
+        chosen = columns.take(asked)
+        bound = _UNBOUNDED if coarse else (options.relative_error, options.absolute_error)
+        mean, error, count = sum_rows(
+            model, _table(model, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed), FINE_LINE
+        )
+        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
+        good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
+        means[asked], errors[asked] = mean, error
+        counts[asked] += count
+        left[asked[good]] = False
+    missing = np.flatnonzero(left)
+    if missing.size:
+        mean, error, count = sample_rows(
+            model,
+            columns.take(missing),
+            index[missing],
+            OWEN,
+            options.relative_error / _STUDENT,
+            options.absolute_error / _STUDENT,
+            options.min_count,
+            options.max_count,
+            np.uint64(seed),
+        )
+        means[missing], errors[missing] = mean, _STUDENT * error
+        counts[missing] += count
+    return means, errors, counts
+
+
+def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+    """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever they state."""
+    known, wide = tabulated(model, columns), _wide(columns)
+    if not known.all():
+        row = int(np.flatnonzero(~known)[0])
+        allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints of at least {_SMALLEST:.3g} yarn "
+        allowed += "spacings and not too thin, and the default frame, geometry, shadows and variation: take auto"
+        raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
+    rows = len(index)
+    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    for coarse in (True, False):
+        asked = np.flatnonzero(wide == coarse)
+        if asked.size:
+            chosen = columns.take(asked)
+            answer = sum_rows(
+                model, _table(model, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed), FINE_LINE
+            )
+            means[asked], errors[asked], counts[asked] = answer
+    return means, errors, counts
+
+
+def _wide(columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say for which queries the coarse table is good enough to be asked."""
+    return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
+
+
+def tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say which queries the table knows of, (N,)."""
+    choices = model.choices
+    other = choices.macro or choices.linear or not choices.shadows or model.varied
+    if other or different_cells(model.front) > _MOST_CELLS:
+        return np.zeros(len(columns.u), np.bool_)
+    known = (np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST) & (columns.curvature == 0.0)
+    if (oblique := ~_axial(model, columns)).any():
+        x, y, correlation = np.abs(axes(columns.sigma, columns.sigma_minor, columns.angle))
+        blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= _SMALLEST
+        known &= ~oblique | (blurred & (correlation <= FINE_LINE.most) & (model.shape == GAUSSIAN))
+    return np.asarray(known)
+
+
+def _axial(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+    """Say which footprints are round or lie along the axes."""
+    along = columns.angle == 0.0
+    if model.shape == GAUSSIAN:
+        along |= columns.sigma == columns.sigma_minor
+    return np.asarray(along)
+
+
+_TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}
+_KEPT: Final = 48  # of 1 to 5 MB each: those of a benchmark that asks about a dozen cloths in turn
+_BUILDING: Final = Lock()
+
+
+def _table(model: Model, columns: Columns, coarse: bool) -> Table:
+    """Return the table of one side of a cloth, one of the last few built."""
+    behind = bool((columns.wi[:, 2] < 0.0).any())
+    with _BUILDING:
+        for with_behind in (True, False):
+            kept = _TABLES.get((id(model.front), with_behind, coarse))
+            if kept and kept[0].front is model.front and (with_behind or not behind):
+                return kept[1]
+        while len(_TABLES) >= _KEPT:
+            _TABLES.pop(next(iter(_TABLES)))
+        table = tabulate(model.front, model.back, behind, coarse)
+        _TABLES[id(model.front), behind, coarse] = (model, table)
+    return table

@@ -1,0 +1,251 @@
+"""The flat loops over nodes in single precision that vector units run: visibility, the two slabs, borders.
+
+The formulas are those of `patch`, `microflake` and `slab`; the half vector's products with the tangent are sums of
+those of wi and wo. Every array holds one number a node of a piece.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pipeline.compiled.decorators import fast_kernel
+from pipeline.compiled.float32 import absorbed, remaining
+from pipeline.truth.node_table.build import Single
+
+SMOOTH: Final = np.float32(0.0005)
+"""Squared error of a node's share by what curves within it, relative to its square."""
+
+_EDGE: Final = np.float32(0.01)
+_EDGE_JUMP: Final = np.float32(0.1)
+
+_0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_JUMP = np.float32(3.0)
+_TINY = np.float32(1e-30)
+_ALIKE = np.float32(1e-8)  # no light is lost in products with it, as it is with 1e-30
+_GRAZING = np.float32(1e-6)
+
+
+@fast_kernel
+def weigh(
+    nx: Single,
+    ny: Single,
+    nz: Single,
+    inverse: Single,
+    weight: Single,
+    ix: np.float32,
+    iy: np.float32,
+    iz: np.float32,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
+    slope_i: np.float32,
+    low_i: Single,
+    high_i: Single,
+    turn_i: np.float32,
+    slope_o: np.float32,
+    low_o: Single,
+    high_o: Single,
+    turn_o: np.float32,
+    blend: np.float32,
+    lit: Single,
+    areas: Single,
+    diffuses: Single,
+    margins: Single,
+    lit_margins: Single,
+) -> tuple[np.float32, np.float32]:
+    """Write each node's weight if it is seen and lit, and its shares of area and diffuse; return the sums of both.
+
+    The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not.
+    """
+    area, diffuse = _0, _0
+    for k in range(len(weight)):
+        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
+        cos_i = ix * nx[k] + iy * ny[k] + iz * nz[k]
+        margin_o = slope_o - low_o[k] - turn_o * (high_o[k] - low_o[k])
+        margin_i = min(min(slope_i - low_i[k] - turn_i * (high_i[k] - low_i[k]), cos_i), margin_o)
+        visible = weight[k] if margin_o > _0 else _0
+        both = weight[k] if margin_i > _0 else _0
+        projected = cos_o * inverse[k]
+        a = visible * projected
+        c = both * projected * (blend * cos_i + (_1 - blend) * iz)
+        lit[k], areas[k], diffuses[k], margins[k], lit_margins[k] = both, a, c, margin_o, margin_i
+        area += a
+        diffuse += c
+    return area, diffuse
+
+
+@fast_kernel
+def borders(
+    first: Single, second: Single, margins: Single, columns: int
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Return what the borders of shadows, found between nodes, add to the sums of two shares, and their squared errors.
+
+    Where the margin changes sign from one node to the next, the border lies where its straight line crosses 0, and the
+    visible node counts up to there instead of half-way. Where the margin jumps, half-way is as good as anything.
+    `columns` is the length of a row of nodes.
+    """
+    # Neighbours as arrays of their own: indices that might be negative would keep the loop from vector units.
+    count = max(len(first) - 3 * columns, 0)
+    here, up = margins[columns : columns + count], margins[:count]
+    left, right = margins[columns - 1 : columns - 1 + count], margins[columns + 1 : columns + 1 + count]
+    further = margins[columns + 2 : columns + 2 + count]
+    down, below = margins[2 * columns : 2 * columns + count], margins[3 * columns : 3 * columns + count]
+    first_here, first_right = first[columns : columns + count], first[columns + 1 : columns + 1 + count]
+    first_down = first[2 * columns : 2 * columns + count]
+    second_here, second_right = second[columns : columns + count], second[columns + 1 : columns + 1 + count]
+    second_down = second[2 * columns : 2 * columns + count]
+    moved, moved_second, error, error_second = _0, _0, _0, _0
+    for k in range(count):
+        change_right, change_down = abs(here[k] - right[k]), abs(here[k] - down[k])
+        share, doubt = _crossing(left[k], here[k], right[k], further[k], change_right, change_down)
+        v, w = first_here[k] + first_right[k], second_here[k] + second_right[k]
+        moved += v * share
+        moved_second += w * share
+        error += first_here[k] * first_here[k] * SMOOTH + v * v * doubt
+        error_second += second_here[k] * second_here[k] * SMOOTH + w * w * doubt
+        share, doubt = _crossing(up[k], here[k], down[k], below[k], change_down, change_right)
+        v, w = first_here[k] + first_down[k], second_here[k] + second_down[k]
+        moved += v * share
+        moved_second += w * share
+        error += v * v * doubt
+        error_second += w * w * doubt
+    return moved, moved_second, error, error_second
+
+
+@fast_kernel
+def _crossing(
+    before: np.float32, m: np.float32, n: np.float32, after: np.float32, change: np.float32, across: np.float32
+) -> tuple[np.float32, np.float32]:
+    """Return what a border between nodes of margins m and n adds to the visible one's share, and its squared error.
+
+    `before` and `after` are the margins beyond them, `change` how much m and n differ, and `across` the change at a
+    right angle, which shares the border with the links in that direction.
+    """
+    weight = _1 / (change + across + _TINY)
+    jump = change > _JUMP * max(abs(before - m), abs(n - after))
+    share = _0 if jump else (max(m, n) - _HALF * change) * weight
+    doubt = change * weight * (_EDGE_JUMP if jump else _EDGE)
+    crossed = min(m, n) <= _0 and max(m, n) > _0
+    return (share if crossed else _0), (doubt if crossed else _0)
+
+
+@fast_kernel
+def reflected(
+    nx: Single,
+    ny: Single,
+    nz: Single,
+    inverse: Single,
+    tx: Single,
+    ty: Single,
+    tz: Single,
+    ix: np.float32,
+    iy: np.float32,
+    iz: np.float32,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
+    square: np.float32,
+    thickness: np.float32,
+    size: np.float32,
+    scale: np.float32,
+    lit: Single,
+    speculars: Single,
+) -> np.float32:
+    """Add each node's share of the reflected specular component to `speculars`; return the sum.
+
+    `square` is alpha^2, `size` one over the squared length of wi + wo, `scale` alpha^3 / (4 pi) over the finer nodes.
+    """
+    total = _0
+    for k in range(len(lit)):
+        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
+        cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
+        # Cross products with the tangent; the half vector's are sums of the two.
+        ax, ay, az = iy * tz[k] - iz * ty[k], iz * tx[k] - ix * tz[k], ix * ty[k] - iy * tx[k]
+        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
+        along_i = ix * tx[k] + iy * ty[k] + iz * tz[k]
+        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
+        sigma_i = np.sqrt(ax * ax + ay * ay + az * az + square * along_i * along_i)
+        sigma_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o)
+        vx, vy, vz, along = ax + bx, ay + by, az + bz, along_i + along_o
+        q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
+        crossed = sigma_i * cos_o + sigma_o * cos_i
+        # One division serves 1 / (cos_i cos_o) and 1 / (q^2 crossed).
+        cosines, spread = cos_i * cos_o, q * q * crossed
+        both = _1 / (cosines * spread + _TINY)
+        depth = thickness * crossed * spread * both
+        value = lit[k] * scale * inverse[k] * cosines * cosines * both * absorbed(depth)
+        speculars[k] += value
+        total += value
+    return total
+
+
+@fast_kernel
+def transmitted(
+    nx: Single,
+    ny: Single,
+    nz: Single,
+    inverse: Single,
+    tx: Single,
+    ty: Single,
+    tz: Single,
+    ix: np.float32,
+    iy: np.float32,
+    iz: np.float32,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
+    square: np.float32,
+    thickness: np.float32,
+    size: np.float32,
+    scale: np.float32,
+    lit: Single,
+    speculars: Single,
+) -> np.float32:
+    """Do the same for light from behind, of which (ix, iy, iz) is the opposite, -wi."""
+    total = _0
+    for k in range(len(lit)):
+        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
+        cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
+        ax, ay, az = iy * tz[k] - iz * ty[k], iz * tx[k] - ix * tz[k], ix * ty[k] - iy * tx[k]
+        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
+        along_i = ix * tx[k] + iy * ty[k] + iz * tz[k]
+        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
+        lambda_i = np.sqrt(ax * ax + ay * ay + az * az + square * along_i * along_i) / max(cos_i, _GRAZING)
+        lambda_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o) / max(cos_o, _GRAZING)
+        vx, vy, vz, along = bx - ax, by - ay, bz - az, along_o - along_i
+        q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
+        apart = max(thickness * abs(lambda_i - lambda_o), _ALIKE)
+        through = remaining(thickness * min(lambda_i, lambda_o)) * absorbed(apart) / apart
+        value = lit[k] * scale * inverse[k] * thickness * through / (q * q + _TINY)
+        value = value if cos_i > _0 and cos_o > _0 else _0
+        speculars[k] += value
+        total += value
+    return total
+
+
+@fast_kernel
+def crossing(
+    nx: Single,
+    ny: Single,
+    nz: Single,
+    tx: Single,
+    ty: Single,
+    tz: Single,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
+    square: np.float32,
+    thickness: np.float32,
+    areas: Single,
+) -> np.float32:
+    """Return the sum of what crosses the layer unscattered, exp(-T Lambda), from each node's share of the area."""
+    total = _0
+    for k in range(len(areas)):
+        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _GRAZING)
+        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
+        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
+        sigma_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o)
+        total += areas[k] * remaining(thickness * sigma_o / cos_o)
+    return total

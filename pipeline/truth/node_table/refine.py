@@ -1,0 +1,130 @@
+"""The table's doubtful nodes sampled again: points with exact visibility where a shadow's border crosses a node.
+
+Every other node keeps what the table says; so a few hundred points do what thousands would do over the whole footprint.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.cloth import AREA, SUMS, Model
+from pipeline.truth.footprint.sequences import uniform
+from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.monte_carlo import add_point
+from pipeline.truth.node_table.build import COLUMNS, FAMILY, KIND_X, KIND_Y, ROWS, START, Single, Table
+from pipeline.truth.node_table.kernels import SMOOTH
+from pipeline.truth.scattering.point import Scene
+
+UNSEEN: Final = 0.002
+"""Relative error of an answer that neither nodes nor borders show."""
+
+_NEGLIGIBLE: Final = 1e-5
+
+
+@kernel
+def refine(
+    model: Model,
+    table: Table,
+    query: Scene,
+    key: np.uint64,
+    side: int,
+    shares: Single,
+    areas: Single,
+    diffuses: Single,
+    speculars: Single,
+    margins: Single,
+    lit_margins: Single,
+    below: float,
+    mean: npt.NDArray[np.float64],
+    error: npt.NDArray[np.float64],
+) -> int:
+    """Sample the nodes on borders with exact visibility in place of the table's share of them; return the points.
+
+    Each such node gets `side` by `side` jittered points. `mean` and `error` of the four components, and the denominator
+    `below`, are the table's; the first two are written.
+    """
+    subsamples = side * side
+    change, variance = np.zeros(SUMS), np.zeros(4)
+    value, first, second = np.zeros((1, SUMS)), np.zeros(SUMS), np.zeros(4)
+    points = 0
+    for p in range(len(table.pieces)):
+        piece = table.pieces[p]
+        start, across, family = piece[START], piece[COLUMNS], piece[FAMILY]
+        stop = start + across * piece[ROWS]
+        if family == GAP:
+            continue
+        end, pick = table.copies[p, 0, 0], table.copies[p, 0, 1]
+        x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
+        for k in range(start, stop):
+            a, c = np.float64(areas[k]), np.float64(diffuses[k]) / math.pi
+            s, share = np.float64(speculars[k]), np.float64(shares[k])
+            if share <= 0.0:
+                continue
+            if not (_on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)):
+                # What curves within the node.
+                for kind, part in ((0, s), (2, c)):
+                    residual = part - mean[kind + family] * a
+                    variance[kind + family] += residual * residual * SMOOTH
+                continue
+            if share < _NEGLIGIBLE * below:
+                continue
+            i, j = (k - start) % across, (k - start) // across
+            tilt_x = _tilt(shares, k, 1, x_edges, i, across)
+            tilt_y = _tilt(shares, k, across, y_edges, j, piece[ROWS])
+            first[:], second[:] = 0.0, 0.0
+            for sub in range(subsamples):
+                u = (sub % side + uniform(key, k, 2 * sub)) / side
+                v = (sub // side + uniform(key, k, 2 * sub + 1)) / side
+                x = end + x_edges[i] + u * (x_edges[i + 1] - x_edges[i])
+                y = pick + y_edges[j] + v * (y_edges[j + 1] - y_edges[j])
+                value[:] = 0.0
+                weight = share * max(1.0 + tilt_x * (u - 0.5) + tilt_y * (v - 0.5), 0.0)
+                add_point(model, x, y, weight, query, value, 0)
+                for q in range(4):
+                    residual = value[0, q] - mean[q] * value[0, AREA]
+                    second[q] += residual * residual
+                for q in range(SUMS):
+                    first[q] += value[0, q]
+            points += subsamples
+            for q in range(4):
+                residual = first[q] - mean[q] * first[AREA]
+                spread = second[q] - residual * residual / subsamples
+                variance[q] += max(spread, 0.0) / (subsamples * (subsamples - 1.0))
+                change[q] += first[q] / subsamples
+            change[AREA] += first[AREA] / subsamples - a
+            change[family] -= s
+            change[2 + family] -= c
+    total = below if model.projected else below + change[AREA]
+    for q in range(4):
+        mean[q] = max((mean[q] * below + change[q]) / total, 0.0)
+        error[q] = math.sqrt(variance[q]) / total + UNSEEN * mean[q]
+    return points
+
+
+@kernel
+def _on_border(margins: Single, k: int, columns: int, first: int, last: int) -> bool:
+    """Say whether a neighbour of node k is on the other side of a border."""
+    here = margins[k] > 0.0
+    column = (k - first) % columns
+    if column > 0 and (margins[k - 1] > 0.0) != here:
+        return True
+    if column < columns - 1 and (margins[k + 1] > 0.0) != here:
+        return True
+    if k - columns >= first and (margins[k - columns] > 0.0) != here:
+        return True
+    return k + columns < last and (margins[k + columns] > 0.0) != here
+
+
+@kernel
+def _tilt(shares: Single, k: int, step: int, edges: Single, place: int, count: int) -> float:
+    """Return the relative change of the footprint's density across node k, from its neighbours along one axis."""
+    if place == 0 or place == count - 1:
+        return 0.0
+    below = shares[k - step] / (edges[place] - edges[place - 1])
+    above = shares[k + step] / (edges[place + 2] - edges[place + 1])
+    return float(0.5 * (above - below) * (edges[place + 1] - edges[place]) / shares[k])

@@ -1,0 +1,1 @@
+"""The estimator `quadrature`: adaptive Gauss-Legendre rules, cut at shadow edges; the reference of references."""

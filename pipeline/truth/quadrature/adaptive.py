@@ -1,0 +1,242 @@
+"""Patches integrated without random numbers: Gauss-Legendre rules on every float that the footprint reaches.
+
+The fabric is cut into the rectangles on which its surface is smooth: floats on top, strips of the yarn beneath, gaps.
+Across a yarn the nodes are taken in the angle v, x = r sin v, which turns the vertical tangent at its edge into nothing
+special. A rectangle is clipped to the footprint and cut again where the kernel is narrow against it (quadrature_parts);
+what is left, a part, gets a tensor rule, cut at shadow edges (quadrature_rules). Without shadows it converges
+spectrally, at a rate proportional to the roughness; with them the median error falls as points^-1.1 (cloth with gaps)
+to points^-1.8 (narrow footprints), where scrambled points reach points^-0.8.
+
+Each part doubles its nodes per axis on its own, the worst first. Its error is taken to be its last change, an
+overestimate of what is left, plus what a rule of its size may step over: highlights and slivers of light. Parts add up
+as if their errors all had one sign, or none, whichever is more. That is an estimate, no proof: it covers the norm of
+the true error in about 97 % of queries.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.cloth import AREA, SUMS, Columns, Model, Raw
+from pipeline.truth.footprint.place import GAUSSIAN
+from pipeline.truth.monte_carlo import OWEN, query_scene, sample_rows
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.quadrature.parts import (
+    BOX_WEIGHT,
+    KIND,
+    MASS,
+    PART,
+    TURN,
+    Axis,
+    cut_parts,
+    one_of_each,
+    rectangles,
+)
+from pipeline.truth.quadrature.rules import LEVELS, integrate
+from pipeline.truth.query import HIDDEN_SHARE
+
+Floats = npt.NDArray[np.float64]
+
+SAFETY: Final = 1.5
+"""Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""
+
+_FLOOR: Final = 1e-6  # least reported error as a share of the mean: footprints are cut at 5.5 sigma, 4e-8 of their mass
+_FIRST: Final = 1  # level of the first rule
+_SPLIT: Final = 2  # level from which on lines are cut
+_EVEN: Final = 1.0  # in repeats: a Gaussian this wide covers the repeat evenly, to 4e-16
+_HIGHLIGHT: Final = 14.0  # n nodes miss 2 exp(-14 n alpha / angle) of a highlight, fitted for alpha .1 to .3
+_FADING: Final = 0.25  # share of the change before that the last one counts for at least: it may be small by chance
+_SLIVER: Final = 2.0  # n nodes an axis miss slivers of light and shade of 2 n^-3 of a part
+_WORST: Final = 0.0625  # parts with this share of the worst one's squared error are refined with it
+
+
+@kernel
+def integrate_rows(
+    model: Model,
+    columns: Columns,
+    relative_error: float,
+    absolute_error: float,
+    min_count: int,
+    max_count: int,
+    split: int,
+    first: int,
+    last: int,
+) -> Raw:
+    """Answer every row; all footprints have axes along x and y.
+
+    Parameters
+    ----------
+    model, columns : Model, Columns
+        The cloth and the queries.
+    relative_error, absolute_error, min_count, max_count
+        As in `TruthOptions`.
+    split : int
+        Level from which on lines are cut at shadow edges.
+    first, last : int
+        First and greatest level, first < last.
+    """
+    rows = len(columns.u)
+    means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
+    counts = np.zeros(rows, np.int64)
+    picks, ends = model.front.top.shape
+    everything = rectangles(model.front, np.ones((picks, ends), np.bool_))
+    some = one_of_each(model.front, model.back)
+    kinds, share = rectangles(model.front, some), picks * ends / some.sum()
+    x_pieces, y_pieces = np.zeros((32, 3)), np.zeros((32, 3))
+    grid, states = np.zeros((64, 64, SUMS)), np.zeros((64, 64), np.int64)
+    for row in range(rows):
+        query = query_scene(columns, row)
+        sigma_x, sigma_y = columns.sigma[row], columns.sigma_minor[row]
+        if sigma_x != sigma_y and abs(math.cos(columns.angle[row])) < 0.5:
+            sigma_x, sigma_y = sigma_y, sigma_x
+        x_axis = Axis(model.shape, columns.u[row], sigma_x, float(ends))
+        y_axis = Axis(model.shape, columns.v[row], sigma_y, float(picks))
+        even = model.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
+        pieces = kinds if even else everything
+        total = 0
+        for p in range(len(pieces)):
+            nothing = np.zeros((0, PART))
+            total += cut_parts(pieces[p], model.front.yarn, x_axis, y_axis, x_pieces, y_pieces, nothing)
+        parts = np.zeros((total, PART))
+        total = 0
+        for p in range(len(pieces)):
+            total += cut_parts(pieces[p], model.front.yarn, x_axis, y_axis, x_pieces, y_pieces, parts[total:])
+        if even:
+            parts[:, BOX_WEIGHT] *= share
+            parts[:, MASS] *= share
+
+        # The first rule on every part; then the worst parts get the next, at first all of them.
+        sums, levels = np.zeros((total, SUMS)), np.full(total, first)
+        changes, earlier = np.zeros((total, SUMS)), np.zeros((total, SUMS))
+        costs, badness = np.zeros(total, np.int64), np.zeros(total)
+        for p in range(total):
+            counts[row] += integrate(model, query, parts[p], x_axis, y_axis, first, split, grid, states, sums[p])
+        cut = -1.0
+        while True:
+            refined = False
+            for p in range(total):
+                fits = levels[p] == first or counts[row] + 4 * costs[p] <= max_count
+                if badness[p] >= cut and levels[p] < last and fits:
+                    earlier[p] = changes[p]
+                    changes[p] = sums[p]
+                    levels[p] += 1
+                    costs[p] = integrate(
+                        model, query, parts[p], x_axis, y_axis, levels[p], split, grid, states, sums[p]
+                    )
+                    changes[p] = sums[p] - changes[p]
+                    counts[row] += costs[p]
+                    refined = True
+            worst, size = _judge(
+                query.viewer.z if model.choices.shadows else 0.0,
+                parts,
+                levels,
+                sums,
+                changes,
+                earlier,
+                means[row],
+                errors[row],
+                badness,
+            )
+            if size == 0.0:
+                # So many points without light: a share of 1 / count may have been missed.
+                errors[row, 2:4] = abs(query.light.z) / (math.pi * counts[row])
+            squares = 0.0
+            for c in range(4):
+                squares += errors[row, c] ** 2
+            reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
+            if not refined or (reached and counts[row] >= min_count):
+                break
+            cut = _WORST * worst
+        area = 0.0
+        for p in range(total):
+            area += sums[p, AREA]
+        if area < HIDDEN_SHARE * query.viewer.z:
+            means[row], errors[row] = 0.0, 0.0
+    return means, errors, counts
+
+
+@kernel
+def _judge(
+    cosine: float,
+    parts: Floats,
+    levels: npt.NDArray[np.int64],
+    sums: Floats,
+    changes: Floats,
+    earlier: Floats,
+    mean: Floats,
+    error: Floats,
+    badness: Floats,
+) -> tuple[float, float]:
+    """Write means, errors and each part's squared error; return the worst, and the squared size of the means.
+
+    What both rules of a part may have stepped over is added to its change: highlights, and, where `cosine` (the
+    viewer's, 0 without shadows) says so, slivers that are seen or lit.
+    """
+    area, worst, size = 0.0, 0.0, 0.0
+    badness[:] = 0.0
+    for p in range(len(sums)):
+        area += sums[p, AREA]
+    mean[:], error[:] = 0.0, 0.0
+    if area <= 0.0:
+        return 0.0, 0.0
+    for c in range(AREA):
+        for p in range(len(sums)):
+            mean[c] += sums[p, c] / area
+        if c < 4:
+            size += mean[c] * mean[c]
+    for c in range(AREA):
+        signed, unsigned = 0.0, 0.0
+        for p in range(len(sums)):
+            residual = (changes[p, c] - mean[c] * changes[p, AREA]) / area
+            signed += residual
+            n = float(2 << levels[p])
+            missed = _SLIVER / (n * n * n) * parts[p, MASS] * cosine / area * mean[c]
+            before = _FADING * (earlier[p, c] - mean[c] * earlier[p, AREA]) / area
+            square = max(residual * residual, before * before) + missed * missed
+            if c == parts[p, KIND] and parts[p, TURN] > 0.0:
+                missed = 2.0 * math.exp(-_HIGHLIGHT * n / parts[p, TURN]) * sums[p, AREA] / area
+                square += missed * missed * size
+            unsigned += square
+            if c < 4:
+                badness[p] += square
+                worst = max(worst, badness[p])
+        error[c] = SAFETY * max(abs(signed), math.sqrt(unsigned)) + _FLOOR * mean[c]
+    return worst, size
+
+
+def quadrature_rows(
+    model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
+) -> Raw:
+    """Answer every row: means and error bounds (N, 5), and points used.
+
+    Rotated footprints are no product in x and y; they are sampled as `owen` does, and only they depend on `seed`.
+
+    Parameters
+    ----------
+    model, columns : Model, Columns
+        The cloth and the queries.
+    index : int (N,)
+        Name of each row.
+    options : TruthOptions
+        Error asked for, and counts; the points of the two first rules may exceed `max_count`.
+    seed : int
+        Name of the random numbers.
+    """
+    quarter = np.sin(2.0 * columns.angle)
+    aligned = (np.abs(quarter) < 1e-6) | ((model.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
+    rows = len(index)
+    means, errors, counts = np.zeros((rows, AREA)), np.zeros((rows, AREA)), np.zeros(rows, np.int64)
+    limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
+    if aligned.any():
+        found = integrate_rows(model, columns.take(aligned), *limits, _SPLIT, _FIRST, LEVELS - 1)
+        means[aligned], errors[aligned], counts[aligned] = found
+    if not aligned.all():
+        rotated = ~aligned
+        found = sample_rows(model, columns.take(rotated), index[rotated], OWEN, *limits, np.uint64(seed))
+        means[rotated], errors[rotated], counts[rotated] = found
+    return means, errors, counts

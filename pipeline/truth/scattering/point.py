@@ -1,0 +1,152 @@
+"""One point's share of a patch BSDF [Zhu2023Cloth], [Chen2024Woven].
+
+f_P(wi, wo) = sum k F V(wi) A(wo) / sum k A(wo), with A(wo) = <wo.n_p> / (n_s.n_p) V(wo) and F the point model times
+<wi.n_p>. The four components keep unit colour: specular F by family, and diffuse
+(w_d <wi.n_p> + (1 - w_d) <wi.n_s>) / pi by family. Light from behind is transmitted: shadowed by the back of the
+cloth, with -wi in the diffuse cosines. A gap has A = <wo.n_s> V(wo), returns nothing, and lets through what neither
+side hides.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, GLOSS, UNDER, HeightField, surface_at
+from pipeline.truth.geometry.visibility import Ray, ray, visible
+from pipeline.truth.scattering.microflake import density, sigma
+from pipeline.truth.scattering.slab import reflection, transmission, unscattered
+
+_SHALLOWEST = 0.1  # least n_s.n_p of `geometry = "linear"`, whose mean of 1 / (n_s.n_p) has no limit
+
+
+class Choices(NamedTuple):
+    """The options of the model as kernels read them.
+
+    Attributes
+    ----------
+    macro : bool
+        Cosines in the slab and in A are taken to n_s instead of n_p.
+    linear : bool
+        Angles on the yarn are proportional to the position.
+    shadows : bool
+        Whether points can hide one another.
+    """
+
+    macro: bool
+    linear: bool
+    shadows: bool
+
+
+class Scene(NamedTuple):
+    """One query's light and viewer, both in front as the viewer sees it.
+
+    Attributes
+    ----------
+    light, viewer : Ray
+        wi and wo.
+    light_behind, viewer_behind : Ray
+        wi and -wo as the back of the cloth sees them, reflected in its plane.
+    """
+
+    light: Ray
+    viewer: Ray
+    light_behind: Ray
+    viewer_behind: Ray
+
+
+@kernel
+def scene(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curvature: float) -> Scene:
+    """Prepare unit wi and wo, wo with z > 0, over a cylinder curved by `curvature` in the viewer's plane.
+
+    Towards the light the cylinder is curved by Euler's curvature * cos^2 of the angle between the two planes.
+    """
+    across = ix * ox + iy * oy
+    squares = (ix * ix + iy * iy) * (ox * ox + oy * oy)
+    # A viewer on the normal looks along x.
+    turn = across * across / squares if squares > 1e-18 else ix * ix / max(ix * ix + iy * iy, 1e-300)
+    return Scene(
+        ray(ix, iy, iz, curvature * min(turn, 1.0)),
+        ray(ox, oy, oz, curvature),
+        ray(ix, iy, -iz, 0.0),
+        ray(-ox, -oy, oz, 0.0),
+    )
+
+
+@inlined_kernel
+def point_share(
+    front: HeightField, back: HeightField, x: float, y: float, query: Scene, choices: Choices
+) -> tuple[int, float, float, float, float]:
+    """Return what the point (x, y) of the repeat adds to numerators and denominator.
+
+    Parameters
+    ----------
+    front, back : HeightField
+        The repeat and its back reflected in the fabric plane.
+    x, y : float
+        Position in it, 0 <= x < ends, 0 <= y < picks.
+    query : Scene
+        The directions.
+    choices : Choices
+        Options of the model.
+
+    Returns
+    -------
+    family : int
+        WARP, WEFT or GAP.
+    area, specular, diffuse, through : float
+        A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); what goes straight through, times A(wo).
+    """
+    light, viewer = query.light, query.viewer
+    family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y), choices.linear)
+    if family == GAP:
+        # A ray that enters a gap and ends on a yarn further down counts there, not here.
+        if choices.shadows and not (
+            visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, query.viewer_behind)
+        ):
+            return family, 0.0, 0.0, 0.0, 0.0
+        return family, viewer.z, 0.0, 0.0, viewer.z
+
+    # What the viewer sees of the point.
+    cos_o = viewer.x * nx + viewer.y * ny + viewer.z * nz
+    if cos_o <= 0.0 or nz <= 0.0 or (choices.shadows and not visible(front, x, y, z, side, viewer)):
+        return family, 0.0, 0.0, 0.0, 0.0
+    if choices.macro:
+        cos_o, area = viewer.z, viewer.z
+    else:
+        area = cos_o / (max(nz, _SHALLOWEST) if choices.linear else nz)
+    alpha, blend = front.yarn[family, ALPHA], front.yarn[family, BLEND]
+    sigma_o = sigma(viewer.x, viewer.y, viewer.z, tx, ty, tz, alpha)
+    through = area * unscattered(sigma_o, cos_o, front.thickness)
+
+    # What light reaches it, from the front or through the cloth.
+    cos_i = light.x * nx + light.y * ny + light.z * nz
+    # Over a curved cloth the front may see a light below its tangent plane; one that it does not see is behind.
+    lit, transmitted = False, False
+    if light.z > 0.0 or light.bend > 0.0:
+        lit = cos_i > 0.0 and (not choices.shadows or visible(front, x, y, z, side, light))
+    if not lit and light.z < 0.0:
+        lit = transmitted = cos_i < 0.0 and _lit_from_behind(back, x, y, query.light_behind, choices)
+    if not lit:
+        return family, area, 0.0, 0.0, through
+    facing = abs(cos_i)
+    slab_i = abs(light.z) if choices.macro else facing
+    flakes = density(light.x + viewer.x, light.y + viewer.y, light.z + viewer.z, tx, ty, tz, alpha)
+    sigma_i = sigma(light.x, light.y, light.z, tx, ty, tz, alpha)
+    if transmitted:
+        specular = slab_i * transmission(flakes, sigma_i, sigma_o, slab_i, cos_o, front.thickness)
+    else:
+        specular = slab_i * reflection(flakes, sigma_i, sigma_o, slab_i, cos_o, front.thickness)
+    specular *= front.floats[int(y), int(x), side, GLOSS]
+    diffuse = (blend * facing + (1.0 - blend) * (abs(light.z) if transmitted else max(light.z, 0.0))) / math.pi
+    return family, area, specular * area, diffuse * area, through
+
+
+@inlined_kernel
+def _lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices: Choices) -> bool:
+    """Say whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
+    if not choices.shadows:
+        return True
+    _, side, z, nx, ny, nz, _, _, _ = surface_at(back, x, y, int(x), int(y), choices.linear)
+    return light.x * nx + light.y * ny + light.z * nz > 0.0 and visible(back, x, y, z, side, light)

@@ -1,0 +1,183 @@
+"""How far answers are from the truth, and how much of that is noise of the truth itself.
+
+With a model's value m, the truth's estimate t, its standard error s, and means <.> over queries (pixels) and channels:
+
+MSE measured   <(m - t)^2> in linear RGB of the fabric's own colours: the error the papers report [Chen2024Woven].
+noise          <s^2>, s what the truth errs on average (`reports.measure.truth_noise`). Components are taken to be
+               uncorrelated, s_rgb^2 = sum_j colour_j^2 s_j^2: an approximation, for they share their points; the page
+               says how much of an error the noise is.
+MSE            MSE measured - noise. The truth's error is independent of the model's, so E[(m - t)^2] = (m - f)^2 + s^2
+               and the difference estimates the model's own error (m - f)^2; it can fall below zero.
+relative MSE   <((m - t)^2 - s^2) / (t^2 + eps <t>^2)>: every pixel counts by its share, the noise subtracted likewise;
+               eps keeps dark pixels from counting without bound. As the weight holds the noisy t, a bias of relative
+               size (s / t)^2 remains [Rousselle2011Adaptive].
+relative RMSE  sqrt(max(MSE, 0)) / <t>, one component at a time.
+colour measure the relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft), which compares fabrics of any colour.
+
+Intervals are 95 % percentile bootstraps over queries [Efron1993Bootstrap] by scipy, with a fixed seed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from pipeline.truth.query import Answers
+
+Floats = npt.NDArray[np.float64]
+
+COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
+"""Colours of the colour measure: one channel, (4, 1)."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """A mean squared error and what is known of it."""
+
+    value: float
+    """MSE with the noise of the truth subtracted."""
+    standard_error: float
+    """Of `value`, from the spread over queries."""
+    low: float
+    """Lower end of the 95 % interval of `value`."""
+    high: float
+    """Upper end."""
+    measured: float
+    """MSE as measured."""
+    noise: float
+    """Mean squared standard error of the truth."""
+    mean: float
+    """Mean of the truth."""
+    count: int
+    """Queries (pixels)."""
+
+    @property
+    def relative_rmse(self) -> float:
+        """Root of the MSE over the mean of the truth; NaN where that is 0."""
+        return math.sqrt(max(self.value, 0.0)) / self.mean if self.mean > 0 else math.nan
+
+
+def squared_error(
+    values: npt.ArrayLike, truth: npt.ArrayLike, standard_error: npt.ArrayLike, resamples: int = 500
+) -> Error:
+    """Return the mean squared error of values, noise of the truth subtracted.
+
+    Parameters
+    ----------
+    values, truth, standard_error : array_like (N, ...)
+        One row a query or pixel; further axes are channels.
+    resamples : int
+        Bootstrap resamples; below 2 the interval is value +- 1.96 standard errors.
+    """
+    t = np.asarray(truth, dtype=np.float64)
+    t = t.reshape(len(t), -1)
+    squared = (np.asarray(values, dtype=np.float64).reshape(t.shape) - t) ** 2
+    variance = np.asarray(standard_error, dtype=np.float64).reshape(t.shape) ** 2
+    measured, noise = float(squared.mean()), float(variance.mean())
+    rows = (squared - variance).mean(axis=1)
+    value, spread = float(rows.mean()), float(stats.sem(rows)) if len(rows) > 1 else 0.0
+    low, high = _interval(rows, value, spread, resamples)
+    return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
+
+
+def relative_squared_error(
+    values: npt.ArrayLike,
+    truth: npt.ArrayLike,
+    standard_error: npt.ArrayLike,
+    epsilon: float = 0.01,
+    resamples: int = 500,
+) -> Error:
+    """Return the mean squared error relative to the truth's own square, noise of the truth subtracted.
+
+    Parameters
+    ----------
+    values, truth, standard_error : array_like (N, ...)
+        One row a query or pixel; further axes are channels.
+    epsilon : float
+        Share of the truth's squared mean that is added to the truth's square; positive.
+    resamples : int
+        As in `squared_error`.
+    """
+    weight = relative_weight(truth, epsilon)
+    m, t, s = (np.asarray(array, np.float64) * weight for array in (values, truth, standard_error))
+    return squared_error(m, t, s, resamples)
+
+
+def relative_weight(truth: npt.ArrayLike, epsilon: float = 0.01) -> Floats:
+    """Return 1 / sqrt(t^2 + epsilon <t>^2), in the truth's shape; the truth may not be zero everywhere."""
+    t = np.asarray(truth, np.float64)
+    return np.asarray(1.0 / np.sqrt(t**2 + epsilon * t.mean() ** 2))
+
+
+def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resamples: int = 500) -> Error:
+    """Return the mean squared error in colour.
+
+    Parameters
+    ----------
+    values : array_like (N, 4)
+        A method's components.
+    answers : Answers
+        The truth's.
+    colours : float64 (4, channels) or (N, 4, channels)
+        Colour of each component: `pipeline.scenes.shade.colours`, or `COLOUR_WEIGHTS`; of each query, if they differ.
+    resamples : int
+        As in `squared_error`.
+    """
+    seen, truth = (_coloured(np.asarray(parts, np.float64), colours) for parts in (values, answers.mean))
+    return squared_error(seen, truth, colour_noise(answers, colours), resamples)
+
+
+def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
+    """Return the mean squared error of each component, in the order of `frames.COMPONENTS`."""
+    components = np.asarray(values)
+    return [
+        squared_error(components[:, j], answers.mean[:, j], answers.standard_error[:, j], resamples=0)
+        for j in range(components.shape[1])
+    ]
+
+
+def colour_noise(answers: Answers, colours: Floats) -> Floats:
+    """Return the standard error of the truth in colour, (N, channels), components taken to be uncorrelated."""
+    return np.asarray(np.sqrt(_coloured(answers.standard_error.astype(np.float64) ** 2, colours**2)))
+
+
+def _coloured(components: Floats, colours: Floats) -> Floats:
+    """Return components (N, 4) in colours (4, channels) or (N, 4, channels)."""
+    return np.asarray(np.einsum("nj,jc->nc" if colours.ndim == 2 else "nj,njc->nc", components, colours))
+
+
+def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> tuple[float, float, float]:
+    """Return the ratio of two measured means and its 95 % interval.
+
+    Parameters
+    ----------
+    numerator, denominator : (value, standard error)
+        Both values positive.
+
+    Notes
+    -----
+    The interval is the delta method's in the logarithm: log r +- 1.96 sqrt((s_a/a)^2 + (s_b/b)^2). Methods that answer
+    the same queries err together, so it is wider than it need be.
+    """
+    (a, error_a), (b, error_b) = numerator, denominator
+    spread = 1.96 * math.hypot(error_a / a, error_b / b)
+    return a / b, a / b * math.exp(-spread), a / b * math.exp(spread)
+
+
+def _interval(rows: Floats, value: float, spread: float, resamples: int) -> tuple[float, float]:
+    if resamples < 2 or len(rows) < 2 or spread == 0.0:
+        return value - 1.96 * spread, value + 1.96 * spread
+    result = stats.bootstrap(
+        (rows,),
+        np.mean,
+        n_resamples=resamples,
+        batch=max(1, 2_000_000 // len(rows)),
+        method="percentile",
+        rng=np.random.default_rng(0),
+    )
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)

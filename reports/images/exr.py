@@ -1,0 +1,79 @@
+"""Pictures as OpenEXR: linear channels, ZIP compression, and what they are as metadata.
+
+Channels are float32; of what is only looked at, float16 holds three digits in half the bytes.
+
+OpenEXR writes non-contiguous arrays silently wrong, so every channel is made contiguous here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+
+from pipeline.atomic import atomic_path
+from weaves.errors import BadInput
+
+Picture = npt.NDArray[np.float32]
+
+
+RGB: Final = ("R", "G", "B")
+"""Channels of the colour."""
+
+
+class Exr(NamedTuple):
+    """What an OpenEXR file holds."""
+
+    channels: dict[str, Picture]
+    """Each (H, W)."""
+    attributes: dict[str, str | int | float]
+    """Metadata that `write_exr` was given."""
+
+    def stack(self, *names: str) -> Picture:
+        """Return channels as one array, (H, W, len(names))."""
+        return np.stack([self.channels[name] for name in names], axis=-1)
+
+
+def write_exr(
+    path: Path,
+    channels: Mapping[str, npt.ArrayLike],
+    attributes: Mapping[str, str | int | float] | None = None,
+    half: Collection[str] = (),
+) -> None:
+    """Write a picture whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.exr``.
+    channels : mapping of array_like (H, W)
+        Planes by name, such as ``R``, ``G``, ``B``, ``A``; ``layer.R`` belongs to a layer.
+    attributes : mapping, optional
+        Metadata; names may not be those that OpenEXR itself uses.
+    half : collection of str
+        Channels that are stored as float16; the others are float32.
+    """
+    kinds = {name: np.float16 if name in half else np.float32 for name in channels}
+    planes = {name: np.ascontiguousarray(plane, dtype=kinds[name]) for name, plane in channels.items()}
+    if len({plane.shape for plane in planes.values()}) != 1 or next(iter(planes.values())).ndim != 2:
+        raise ValueError(f"channels must be planes of one size, got { ({n: p.shape for n, p in planes.items()}) }")
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **(attributes or {})}
+    with atomic_path(path) as temporary, OpenEXR.File(header, planes) as file:
+        file.write(str(temporary))
+
+
+def read_exr(path: Path) -> Exr:
+    """Read a picture that `write_exr` wrote; BadInput if there is none."""
+    if not path.is_file():
+        raise BadInput(str(path), "", "does not exist", "a picture is needed; run the benchmark first")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.array(channel.pixels, np.float32) for name, channel in file.channels().items()}
+            attributes = {name: value for name, value in file.header().items() if isinstance(value, str | int | float)}
+    except (RuntimeError, ValueError) as error:
+        raise BadInput(str(path), "", "cannot be read", "an OpenEXR picture is needed") from error
+    return Exr(channels, attributes)

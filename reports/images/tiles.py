@@ -1,0 +1,146 @@
+"""Pictures without words: renderings, differences, and maps of the repeat, as PNG bytes.
+
+Renderings are tone mapped alike: times `EXPOSURE`, cut at 1, sRGB encoding (from colour-science, by way of
+`weaves.colour`); pixels without cloth are transparent. Every pixel becomes a square of `SCALE`.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, Final
+
+import matplotlib as mpl
+import matplotlib.image
+import numpy as np
+import numpy.typing as npt
+
+from reports.images.exr import RGB, Exr
+from weaves.colour import LUMINANCE, linear_rgb
+from weaves.fabric import Fabric
+from weaves.surface import GAP, surface_maps
+
+EXPOSURE: Final = 1.6
+"""Factor on linear values before they are shown."""
+RELATIVE_RANGE: Final = 0.5
+"""Relative difference that is shown in full colour."""
+
+DIFFERENCE_RANGE: Final = 0.5
+"""Difference, as a share of the truth's mean luminance, that is shown in full colour."""
+SCALE: Final = 2
+CELLS: Final = 16
+"""Yarns shown in each direction by the maps of the repeat."""
+CELL_PIXELS: Final = 12
+
+Bytes8 = npt.NDArray[np.uint8]
+
+
+def picture(exr: Exr) -> bytes:
+    """Return a rendering as it is shown."""
+    return png(_tone_mapped(exr))
+
+
+def difference(exr: Exr, truth: Exr) -> bytes:
+    """Return luminance minus the truth's: blue too dark, red too bright, in full colour from `DIFFERENCE_RANGE` on."""
+    shown, reference = ((e.stack(*RGB).astype(np.float64) @ np.array(LUMINANCE)) for e in (exr, truth))
+    cloth = truth.channels["A"] > 0
+    scale = DIFFERENCE_RANGE * reference[cloth].mean() if cloth.any() else 1.0
+    share = 0.5 + 0.5 * np.clip((shown - reference) / scale, -1.0, 1.0)
+    rgba = mpl.colormaps["RdBu_r"](share, bytes=True)
+    rgba[~cloth] = 0
+    return png(rgba)
+
+
+def relative_tile(differences: Exr) -> bytes:
+    """Return the relative difference of luminance: blue too dark, red too bright, full from `RELATIVE_RANGE` on."""
+    share = np.clip(differences.channels["relative.Y"] / RELATIVE_RANGE, -1.0, 1.0)
+    return _tile("RdBu_r", 0.5 + 0.5 * share, differences)
+
+
+def flip_tile(differences: Exr, channel: str = "flip_ldr") -> bytes:
+    """Return a map of FLIP, black to white from 0 to 1 by way of purple and orange, as its authors show it."""
+    return _tile("magma", differences.channels[channel], differences)
+
+
+def _tile(colours: str, share: npt.NDArray[np.float32], differences: Exr) -> bytes:
+    """Return a map in colours, clear where nothing counts."""
+    rgba = np.array(mpl.colormaps[colours](share, bytes=True))
+    rgba[differences.channels["lit"] == 0] = 0
+    return png(rgba)
+
+
+def overview(exrs: Sequence[Exr], columns: int) -> bytes:
+    """Return several renderings of one size as a sheet of `columns`."""
+    pictures = [_tone_mapped(exr) for exr in exrs]
+    pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
+    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
+    return png(np.concatenate(rows, axis=0))
+
+
+def drawdown(fabric: Fabric) -> bytes:
+    """Return the drawdown, warp over in black, the first pick at the bottom."""
+    cells = np.where(_tiled(fabric.weave.warp_over, 1), 35, 250).astype(np.uint8)
+    grey = cells.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
+    lines = np.arange(len(grey)) % CELL_PIXELS == 0
+    grey[lines], grey[:, lines] = 190, 190
+    return png(_opaque(np.stack([grey] * 3, axis=-1)), 1)
+
+
+def height(fabric: Fabric) -> bytes:
+    """Return the height map, black to white from the lowest to the highest point; gaps are black."""
+    surface = surface_maps(fabric, CELL_PIXELS)
+    solid = surface.yarn != GAP
+    low, high = surface.height[solid].min(), surface.height[solid].max()
+    share = np.where(solid, (surface.height - low) / max(high - low, 1e-12), 0.0)
+    return png(mpl.colormaps["bone"](_tiled(share, CELL_PIXELS), bytes=True), 1)
+
+
+def normals(fabric: Fabric) -> bytes:
+    """Return the normal map: (n + 1) / 2 as red, green, blue; gaps are black."""
+    surface = surface_maps(fabric, CELL_PIXELS)
+    colours = np.where((surface.yarn != GAP)[..., None], 0.5 * surface.normal + 0.5, 0.0)
+    return png(_opaque(np.rint(255 * _tiled(colours, CELL_PIXELS)).astype(np.uint8)), 1)
+
+
+def hex_colour(linear: Sequence[float]) -> str:
+    """Return a linear RGB colour as ``#rrggbb``."""
+    return "#" + "".join(f"{value:02x}" for value in encoded(np.asarray(linear)))
+
+
+def _tone_mapped(exr: Exr) -> Bytes8:
+    cloth = exr.channels["A"] > 0
+    rgb = encoded(EXPOSURE * exr.stack(*RGB))
+    return np.concatenate([rgb * cloth[..., None], np.where(cloth, 255, 0)[..., None]], axis=-1).astype(np.uint8)
+
+
+def encoded(linear: npt.NDArray[np.floating]) -> Bytes8:
+    """Return sRGB codes of linear values, in their shape."""
+    codes = np.interp(linear, _levels(), np.arange(256))
+    return np.asarray(np.rint(codes), dtype=np.uint8)
+
+
+@cache
+def _levels() -> npt.NDArray[np.float64]:
+    """Return the linear value of each of the 256 sRGB codes."""
+    return np.array([linear_rgb(f"#{code:02x}{code:02x}{code:02x}")[0] for code in range(256)])
+
+
+def _tiled(repeat: npt.NDArray[np.generic], pixels: int) -> npt.NDArray[np.generic]:
+    """Repeat a map over `CELLS` yarns of `pixels` each, the first pick at the bottom."""
+    side = CELLS * pixels
+    rows, columns = (np.arange(side) % extent for extent in repeat.shape[:2])
+    return np.asarray(repeat[rows][:, columns][::-1])
+
+
+def _opaque(rgb: Bytes8) -> Bytes8:
+    return np.concatenate([rgb, np.full((*rgb.shape[:2], 1), 255, np.uint8)], axis=-1)
+
+
+def png(rgba: Bytes8, scale: int = SCALE) -> bytes:
+    """Return a picture, (H, W, 4), as PNG bytes, every pixel a square of `scale`."""
+    buffer = io.BytesIO()
+    enlarged = rgba.repeat(scale, axis=0).repeat(scale, axis=1)
+    metadata: Any = {"Software": None}  # else the bytes change with matplotlib's version
+    matplotlib.image.imsave(buffer, enlarged, format="png", metadata=metadata)
+    return buffer.getvalue()

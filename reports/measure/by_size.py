@@ -1,0 +1,130 @@
+"""Errors and times of methods by the size of the footprint.
+
+One number over all footprints hides what a method is good for: points resolve small footprints, averages large ones,
+and the cost of a query depends on its size as well. So errors and times are measured apart in classes of size, methods
+in turns; `reports.tables.equal_time` compares them.
+
+The error is the relative RMSE of the colour, .3 (S_warp + S_weft) + .5 (C_warp + C_weft), of its specular or its
+diffuse part: root of the MSE, noise of the truth subtracted, over the mean of the truth; the mean over fabrics.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.fingerprint import fingerprint
+from pipeline.shards.manifest import Manifest
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries
+from reports.error import COLOUR_WEIGHTS, colour_error
+from reports.measure.timing import Contender, affordable, time_side_by_side
+from reports.measure.truth_noise import with_noise
+from reports.options import BenchOptions
+from reports.record import Metric, Provenance, Record
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+EDGES: Final = (0.0, 0.1, 0.3, 1.0, 3.0, math.inf)
+"""Standard deviations between which footprints are of one class, in yarn spacings."""
+
+WHOLE: Final = "all"
+"""Name of all classes together, as the data set mixes them."""
+
+SIZES: Final = ("below .1", ".1 to .3", ".3 to 1", "1 to 3", "above 3")
+"""Names of the classes."""
+
+MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
+    "colour": ("size_colour", COLOUR_WEIGHTS),
+    "specular": ("size_specular", np.array([[1.0], [1.0], [0.0], [0.0]])),
+    "diffuse": ("size_diffuse", np.array([[0.0], [0.0], [1.0], [1.0]])),
+}
+"""What errors are taken of: the Record's metric and the colour of each component."""
+
+LONGEST: Final = 0.02
+"""Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
+
+FEWEST: Final = 512
+"""Least queries a fabric in such a call: what a call itself costs must not stand for what a query costs."""
+
+_Asked = list[tuple[Fabric, Queries, Answers]]
+
+
+def measure_by_size(
+    methods: Sequence[Method],
+    manifest: Manifest,
+    folder: Path,
+    options: BenchOptions,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure errors and times of methods on held-out queries, one class of footprints after the other.
+
+    Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
+    many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
+    edge of the class, value); its value is that over all classes.
+    """
+    classes, shares = _classes(manifest, folder)
+    methods = [one for one in methods if any(one.covers(cloth) for asked in classes.values() for cloth, _, _ in asked)]
+    times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
+    errors: dict[tuple[int, str], list[tuple[float, float]]] = {}
+    for low, asked in classes.items():
+        contenders = []
+        for index, method in enumerate(methods):
+            own = [one for one in asked if method.covers(one[0])]
+            for cloth, _, _ in own:
+                method.prepare(cloth)
+            asked_of = [(cloth, queries) for cloth, queries, _ in own]
+            contenders.append(affordable(Contender(method.predict, asked_of), LONGEST, FEWEST))
+            for name, error in _errors(method, own, options.seed):
+                errors.setdefault((index, name), []).append((low, error))
+        timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
+        for index, timing in enumerate(timings):
+            times[index].append((low, timing.quartiles[1]))
+    records = []
+    for index, method in enumerate(methods):
+        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
+        count = sum(len(queries.u) for asked in classes.values() for cloth, queries, _ in asked if method.covers(cloth))
+        mean = sum(shares[low] * ns for low, ns in times[index])
+        records.append(subject.of("size_time", mean, count, unit="ns/query", curve=tuple(times[index])))
+        for name, (metric, _) in MEASURES.items():
+            curve = errors[index, name]
+            # Squared errors add up: over all classes they weigh as their queries occur.
+            whole = math.sqrt(sum(shares[low] * error**2 for low, error in curve))
+            records.append(subject.of(metric, whole, count, curve=tuple(curve)))
+    return records
+
+
+def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Asked], dict[float, float]]:
+    """Return the queries and the truth of each class by its lower edge, and the share of all queries it holds."""
+    classes: dict[float, _Asked] = {}
+    counts: dict[float, int] = {}
+    for name in manifest.names("seen", "unseen"):
+        queries, stated = manifest.read(folder, name, "test")
+        answers = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+        size = np.sqrt(queries.sigma * queries.sigma_minor)
+        for low, high in itertools.pairwise(EDGES):
+            chosen = np.flatnonzero((size >= low) & (size < high))
+            if chosen.size:
+                counts[low] = counts.get(low, 0) + chosen.size
+                asked = (manifest.fabrics[name], queries.take(chosen), answers.take(chosen))
+                classes.setdefault(low, []).append(asked)
+    total = sum(counts.values())
+    return {low: classes[low] for low in sorted(classes)}, {low: count / total for low, count in counts.items()}
+
+
+def _errors(method: Method, asked: _Asked, seed: int) -> Iterator[tuple[str, float]]:
+    """Yield the error of each measure, the mean over fabrics; 0 where it is lost in the noise of the truth."""
+    values = [
+        method.predict(cloth, queries, int(fingerprint(["size", cloth.name, seed]), 16)) for cloth, queries, _ in asked
+    ]
+    for name, (_, weights) in MEASURES.items():
+        found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, asked, strict=True)]
+        yield name, float(np.mean([error.relative_rmse for error in found if error.mean > 0] or [0.0]))

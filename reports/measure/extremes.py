@@ -1,0 +1,239 @@
+"""Every method at its extremes: footprints of 1e-4 to 1e4 repeats, 89.9 degrees, far places, half precision.
+
+Methods are asked the same questions of the same cloths, one of them as lustrous as yarns may be (alpha = .01):
+
+    error       relative RMSE of the colour measure against the truth: at each footprint without grazing angles, and at
+                grazing angles
+    rounding    relative RMSE between the answers of a lower precision and the method's own, at all questions
+    far         the same footprints a million yarns away: largest difference, over the largest answer
+    large       1e4 repeats against 1e2: both are the average of the repeat
+    not finite, negative    answers that none can be
+
+Random methods draw the same points where only the place differs; at another size they land elsewhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from reports.error import COLOUR_WEIGHTS
+from reports.record import Metric, Provenance, Record, Role
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)
+"""Standard deviations, in repeats: the square root of their area."""
+
+ANGLES: Final = (0.0, 60.0, 89.9)
+"""Of light and viewer, to the normal, in degrees."""
+
+GRAZING: Final = 89.9
+"""Name of the grazing questions among the errors, and their angle."""
+
+LUSTROUS: Final = 0.01
+"""Least roughness that a yarn may have."""
+
+FAR: Final = 1e6
+"""How far away, in yarn spacings; single precision still holds sixteenths of a yarn there."""
+
+TRUTH: Final = TruthOptions(estimator="quadrature", relative_error=0.01)
+"""How true the truth is: half a second a fabric, and 1 to 3 % from 16,384 points a query at every footprint."""
+
+Array = npt.NDArray[np.float64]
+
+_SHINY = f", alpha = {LUSTROUS:g}"  # ending of the names of lustrous fabrics
+_WORST: Final[dict[str, Metric]] = {
+    "rounding": "extreme_rounding",
+    "far": "extreme_far",
+    "large": "extreme_large",
+}
+_AZIMUTHS = (0.4, 2.1)  # of light and viewer
+_PLACES = 2
+_SIXTEENTH = 16
+
+
+def lustrous(fabric: Fabric) -> Fabric:
+    """Return the fabric with the shiniest yarns that may be."""
+    yarns = {name: getattr(fabric, name).model_copy(update={"roughness": LUSTROUS}) for name in ("warp", "weft")}
+    return fabric.model_copy(update={"name": fabric.name + _SHINY, **yarns})
+
+
+class Extremes(NamedTuple):
+    """Questions about one fabric."""
+
+    queries: Queries
+    """Of all footprints, angles and places."""
+    size: npt.NDArray[np.float64]
+    """Footprint of each, in repeats."""
+    grazing: npt.NDArray[np.bool_]
+    """Whether light or viewer graze."""
+    repeat: tuple[int, int]
+    """Of the fabric, in yarn spacings."""
+
+    @property
+    def far(self) -> Queries:
+        """The same about a million yarns away."""
+        return self.queries._replace(u=self._moved(self.queries.u, 0), v=self._moved(self.queries.v, 1))
+
+    def _moved(self, place: npt.NDArray[np.float32], axis: int) -> npt.NDArray[np.float32]:
+        period = self.repeat[axis]
+        return (place.astype(np.float64) + period * (FAR // period - 1)).astype(np.float32)
+
+
+def extremes(repeat: tuple[int, int]) -> Extremes:
+    """Return the questions about a fabric of this repeat: 5 footprints x 9 pairs of angles x 2 places."""
+    random = np.random.default_rng(0)
+    # Sixteenths of a yarn: what single precision holds far away too.
+    places = random.integers(0, np.array(repeat) * _SIXTEENTH, (_PLACES, 2)) / _SIXTEENTH
+    rows = list(itertools.product(FOOTPRINTS, ANGLES, ANGLES, places.tolist()))
+    size, light, viewer = (np.array([row[k] for row in rows], np.float64) for k in range(3))
+    u, v = np.array([row[3] for row in rows], np.float32).T
+    sigma = (size * math.sqrt(repeat[0] * repeat[1])).astype(np.float32)
+    wi, wo = (_direction(theta, phi) for theta, phi in zip((light, viewer), _AZIMUTHS, strict=True))
+    return Extremes(Queries.round(u, v, sigma, wi, wo), size, np.maximum(light, viewer) == GRAZING, repeat)
+
+
+def measure_extremes(
+    families: Sequence[Sequence[Method]],
+    fabrics: Sequence[tuple[Fabric, Role]],
+    provenance: Provenance | None = None,
+    truth: TruthOptions = TRUTH,
+) -> list[Record]:
+    """Measure methods at their extremes.
+
+    Parameters
+    ----------
+    families : sequence of sequence of Method
+        Methods, each followed by its lower precisions.
+    fabrics : sequence of (Fabric, role)
+        The cloths; methods answer for those that they cover.
+    truth : TruthOptions
+        What the methods are held against.
+
+    Returns
+    -------
+    list of Record
+        For each method and fabric `extreme_error`, the worst over footprints with all of them as its curve, and
+        `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`,
+        `extreme_not_finite`, `extreme_negative`. Numbers that no finite answer is left for are left out.
+    """
+    records = []
+    for fabric, role in fabrics:
+        asked = extremes(fabric.weave.repeat)
+        covering = [[method for method in family if method.covers(fabric)] for family in families]
+        if not any(covering):
+            continue
+        true = estimate(fabric, asked.queries, truth, 0).mean.astype(np.float64)
+        about = Record(fabric=fabric.name, role=role, provenance=provenance or Provenance(), method="")
+        for family in covering:
+            own: Array | None = None
+            for method in family:
+                subject = about.model_copy(update={"method": method.name, "setting": method.setting})
+                method.prepare(fabric)
+                answers, found = _measured(subject, method, fabric, asked, true)
+                records += found
+                if own is not None:
+                    records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
+                own = answers if own is None else own
+    return records
+
+
+def _measured(
+    subject: Record, method: Method, fabric: Fabric, asked: Extremes, truth: Array
+) -> tuple[Array, list[Record]]:
+    """Return a method's answers and what is measured of them alone."""
+    near, far = (_asked(method, fabric, queries) for queries in (asked.queries, asked.far))
+    wide, wider = (_asked(method, fabric, asked.queries.take(asked.size == size)) for size in FOOTPRINTS[-2:])
+    every = np.concatenate([near, far])
+    lost, count = int((~np.isfinite(every)).any(axis=1).sum()), len(every)
+    records = [
+        subject.of("extreme_not_finite", lost, count),
+        subject.of("extreme_negative", int((every < 0).any(axis=1).sum()), count),
+    ]
+    rows = [(size, (asked.size == size) & ~asked.grazing) for size in FOOTPRINTS]
+    curve = tuple((size, _relative(near[chosen], truth[chosen])) for size, chosen in rows)
+    curve = tuple(point for point in curve if math.isfinite(point[1]))
+    if curve:
+        records.append(subject.of("extreme_error", max(error for _, error in curve), len(near), curve=curve))
+    grazing = asked.grazing
+    records += _of(subject, "extreme_grazing", _relative(near[grazing], truth[grazing]), int(grazing.sum()))
+    records += _of(subject, "extreme_far", _largest(far, near), len(far))
+    records += _of(subject, "extreme_large", _largest(wider, wide), len(wide))
+    return near, records
+
+
+def _asked(method: Method, fabric: Fabric, queries: Queries) -> Array:
+    with np.errstate(all="ignore"):  # what is not finite is counted
+        return method.predict(fabric, queries, 0).astype(np.float64)
+
+
+def _of(subject: Record, metric: Metric, value: float, count: int) -> list[Record]:
+    return [subject.of(metric, value, count)] if math.isfinite(value) else []
+
+
+def _relative(answers: Array, truth: Array) -> float:
+    """Return the relative RMSE of the colour measure over rows that are finite; NaN if there is none."""
+    finite = np.isfinite(answers).all(axis=1) & np.isfinite(truth).all(axis=1)
+    value, reference = (x[finite] @ COLOUR_WEIGHTS for x in (answers, truth))
+    size = float(np.linalg.norm(reference))
+    return float(np.linalg.norm(value - reference)) / size if size else math.nan
+
+
+def _largest(answers: Array, others: Array) -> float:
+    """Return the largest difference over the largest of the others; NaN if no row is finite in both."""
+    finite = np.isfinite(answers).all(axis=1) & np.isfinite(others).all(axis=1)
+    largest = float(np.abs(others[finite]).max(initial=0.0))
+    return float(np.abs(answers[finite] - others[finite]).max(initial=0.0)) / largest if largest else math.nan
+
+
+def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the extremes, one row a method: the worst over its fabrics, those of alpha = .01 apart.
+
+    Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
+    footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative, asked
+    (numbers of answers).
+    """
+    found: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record.metric.startswith("extreme_"):
+            found.setdefault((record.method, record.setting), []).append(record)
+    return pd.DataFrame([_row(*key, group) for key, group in found.items()])
+
+
+def _row(method: str, setting: str, records: Sequence[Record]) -> dict[str, object]:
+    def worst(metric: Metric, shiny: bool | None = None) -> float:
+        values = [r.value for r in records if r.metric == metric and shiny in (None, r.fabric.endswith(_SHINY))]
+        return max(values, default=math.nan)
+
+    def total(metric: Metric) -> int:
+        return int(sum(record.value for record in records if record.metric == metric))
+
+    plain = [dict(r.curve) for r in records if r.metric == "extreme_error" and not r.fabric.endswith(_SHINY)]
+    row: dict[str, object] = {"method": method, "setting": setting, "fabrics": len({r.fabric for r in records})}
+    row |= {error_name(size): max((c[size] for c in plain if size in c), default=math.nan) for size in FOOTPRINTS}
+    row |= {"grazing": worst("extreme_grazing", False), "lustrous": worst("extreme_error", True)}
+    row |= {name: worst(metric) for name, metric in _WORST.items()}
+    row |= {"not_finite": total("extreme_not_finite"), "negative": total("extreme_negative")}
+    return row | {"asked": sum(record.count for record in records if record.metric == "extreme_not_finite")}
+
+
+def error_name(size: float) -> str:
+    """Return the column of the errors at a footprint: ``error_1em04`` for 1e-4."""
+    return "error_" + f"{size:g}".replace("-", "m").replace(".", "p")
+
+
+def _direction(theta: npt.NDArray[np.float64], phi: float) -> npt.NDArray[np.float32]:
+    sine, cosine = np.sin(np.radians(theta)), np.cos(np.radians(theta))
+    return np.stack([sine * math.cos(phi), sine * math.sin(phi), cosine], axis=-1).astype(np.float32)

@@ -1,0 +1,156 @@
+"""Frames of the moving plane, by the truth and by methods, and what aliases in them (`reports.measure.aliasing`).
+
+The truth's frames are one OpenEXR: luminance Y and its standard error, one frame below the other.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.fingerprint import fingerprint
+from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.shade import colours
+from pipeline.scenes.views import view
+from pipeline.truth.estimator import estimate
+from reports.error import colour_noise
+from reports.images.exr import read_exr, write_exr
+from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
+from reports.measure.truth_noise import with_noise
+from reports.options import BenchOptions
+from reports.record import TRUTH, Provenance, Record, Role
+from weaves.colour import LUMINANCE
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+Floats = npt.NDArray[np.float64]
+
+
+class _Frames(NamedTuple):
+    """The truth's frames, less the irradiance."""
+
+    truth: Floats
+    """Luminance, (F, H, W); 0 where no cloth is lit."""
+    noise: Floats
+    """Its standard error."""
+    lit: npt.NDArray[np.bool_]
+    """Pixels that show lit cloth, (H, W); the same in every frame."""
+
+    @property
+    def rows(self) -> npt.NDArray[np.bool_]:
+        """Rows that are lit from end to end, (H,): the rectangle whose spectrum is taken."""
+        return np.asarray(self.lit.all(axis=1))
+
+
+def render_frames(fabric: Fabric, options: BenchOptions, path: Path) -> None:
+    """Write the truth's frames of the moving plane to `path`."""
+    weights = _luminance(fabric)
+    values, errors = [], []
+    for index in range(options.frames):
+        gbuffer = _view(options, index)
+        seed = int(fingerprint(["frame", fabric.name, index, options.seed]), 16)
+        queries = gbuffer.queries(fabric.weave.repeat)
+        answers = with_noise(estimate(fabric, queries, options.frame_truth, seed), queries, options.frame_truth)
+        values.append(_spread(gbuffer, answers.mean @ weights))
+        errors.append(_spread(gbuffer, colour_noise(answers, weights)))
+    channels = {"Y": np.concatenate(values), "error.Y": np.concatenate(errors)}
+    write_exr(path, channels, {"fabric": fabric.name, "scene": "plane", "method": TRUTH, "frames": options.frames})
+
+
+def measure_aliasing(
+    method: Method,
+    fabric: Fabric,
+    role: Role,
+    options: BenchOptions,
+    frames: Path,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure flicker and excess energy of a method on the moving plane.
+
+    Parameters
+    ----------
+    method : Method
+        Must cover the fabric.
+    frames : Path
+        The truth's frames that `render_frames` wrote with the same options.
+    """
+    reference = _read(frames, options)
+    method.prepare(fabric)
+    weights = _luminance(fabric)
+    planes = []
+    for index in range(options.frames):
+        gbuffer = _view(options, index)
+        seed = int(fingerprint(["aliasing", fabric.name, index, options.seed]), 16)
+        values = method.predict(fabric, gbuffer.queries(fabric.weave.repeat), seed)
+        planes.append(_spread(gbuffer, values.astype(np.float64) @ weights))
+    shown = np.array(planes)
+    lit, rows = reference.lit, reference.rows
+    subject = _subject(method.name, method.setting, fabric, role, provenance)
+    motion = flicker(shown[:, lit], reference.truth[:, lit], 0.0, reference.noise[:, lit])
+    energy = excess_energy(shown[:, rows], reference.truth[:, rows], 0.0, reference.noise[:, rows])
+    return [
+        subject.of("flicker", motion, options.frames),
+        subject.of("excess_energy", energy, options.frames),
+        _spectrum(subject, shown[:, rows], np.zeros(1), float(reference.truth[:, rows].mean())),
+    ]
+
+
+def measure_truth_frames(
+    fabric: Fabric, role: Role, options: BenchOptions, frames: Path, provenance: Provenance | None = None
+) -> list[Record]:
+    """Measure the truth's own frames: the variance that the motion brings, and their spectrum."""
+    reference = _read(frames, options)
+    lit, rows = reference.lit, reference.rows
+    subject = _subject(TRUTH, "", fabric, role, provenance)
+    own = temporal_variance(reference.truth[:, lit], reference.noise[:, lit])
+    mean = float(reference.truth[:, lit].mean())
+    return [
+        subject.of("motion", own / mean**2, options.frames),
+        _spectrum(subject, reference.truth[:, rows], reference.noise[:, rows], float(reference.truth[:, rows].mean())),
+    ]
+
+
+def _view(options: BenchOptions, index: int) -> GBuffer:
+    return view("plane", *options.frame_size, frame=index, options=options.view)
+
+
+def _read(path: Path, options: BenchOptions) -> _Frames:
+    width, height = options.frame_size
+    channels = read_exr(path).channels
+    truth, noise = (channels[name].astype(np.float64).reshape(-1, height, width) for name in ("Y", "error.Y"))
+    return _Frames(truth, noise, _view(options, 0).lit)
+
+
+def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Floats:
+    """Spread the values of lit pixels, (N, 1), over the picture, (H, W); 0 elsewhere."""
+    plane = np.zeros(gbuffer.lit.shape)
+    plane[gbuffer.lit] = values[:, 0]
+    return plane
+
+
+def _luminance(fabric: Fabric) -> Floats:
+    """Return the luminance of each component's colour, (4, 1)."""
+    return np.asarray(colours(fabric) @ np.array(LUMINANCE)[:, None])
+
+
+def _subject(method: str, setting: str, fabric: Fabric, role: Role, provenance: Provenance | None) -> Record:
+    return Record(
+        method=method,
+        setting=setting,
+        fabric=fabric.name,
+        role=role,
+        scene="plane",
+        provenance=provenance or Provenance(),
+    )
+
+
+def _spectrum(subject: Record, frames: Floats, noise: Floats, mean: float) -> Record:
+    """Return the radially averaged spectrum, relative to the squared mean of the truth."""
+    found = spectrum(frames, noise)
+    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(found.frequency, found.power, strict=True))
+    return subject.of("spectrum", found.high / mean**2, len(frames), curve=curve)

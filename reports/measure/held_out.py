@@ -1,0 +1,192 @@
+"""The measurements on held-out queries: errors, the truth's own, and what answers cost.
+
+Each function stands alone, so that a task system can run them apart; so do those of `reports.measure.pictures` and
+`reports.measure.frames`. Random methods get seeds that are named by what is measured: no number depends on what ran
+before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import count, cycle, islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pipeline.fingerprint import fingerprint
+from pipeline.scenes.shade import colours_of
+from pipeline.shards.manifest import Manifest
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries
+from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
+from reports.measure.memory import peak_memory
+from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
+from reports.measure.truth_noise import with_noise
+from reports.options import BenchOptions
+from reports.record import TRUTH, Metric, Provenance, Record, Role
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+EDITS: Final = 5
+"""Fabrics never seen before that a method is timed to prepare."""
+
+_COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
+    "rrmse_specular_warp",
+    "rrmse_specular_weft",
+    "rrmse_diffuse_warp",
+    "rrmse_diffuse_weft",
+)
+
+
+def measure_errors(
+    method: Method,
+    manifest: Manifest,
+    folder: Path,
+    fabric: str,
+    role: Role,
+    options: BenchOptions,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure a method on a fabric's held-out queries: MSE in colour, and relative errors (`reports.error`).
+
+    Parameters
+    ----------
+    method : Method
+        Must cover the fabric.
+    manifest, folder : Manifest, Path
+        The data set.
+    fabric, role : str
+        Name of the fabric, and whether general models saw it.
+    options : BenchOptions
+        How many rows, and the seed of random methods.
+    """
+    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
+    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+    method.prepare(cloth)
+    values = method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric,
+        role=role,
+        scene="queries",
+        provenance=provenance or Provenance(),
+    )
+    records = subject.of_error(colour_error(values, truth, colours_of(cloth, queries)))
+    relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
+    relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
+    black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
+    records.append(subject.of("zero_answers", float(black.mean()), len(black)))
+    # A component that is nowhere seen has no relative error.
+    records += [subject.of(name, e.relative_rmse, e.count) for name, e in relative.items() if e.mean > 0]
+    return records
+
+
+def measure_truth(
+    manifest: Manifest,
+    folder: Path,
+    fabric: str,
+    role: Role,
+    options: BenchOptions,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure the truth itself on a fabric's held-out queries: median and quartiles of |standard error| / |mean|.
+
+    Both are norms over the four components, as in the estimator's stopping rule.
+    """
+    _, _, truth = _held_out(manifest, folder, fabric, options)
+    size = np.linalg.norm(truth.mean, axis=1)
+    relative = np.linalg.norm(truth.standard_error, axis=1)[size > 0] / size[size > 0]
+    low, median, high = (float(q) for q in np.percentile(relative, [25, 50, 75]))
+    subject = Record(method=TRUTH, fabric=fabric, role=role, scene="queries", provenance=provenance or Provenance())
+    return [subject.of("truth_relative_error", median, len(relative), low=low, high=high)]
+
+
+def measure_timing(
+    methods: Sequence[Method],
+    manifest: Manifest,
+    folder: Path,
+    options: BenchOptions,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Time methods side by side on held-out queries of all named fabrics; note bytes, memory and the cost of a fabric.
+
+    Returns
+    -------
+    list of Record
+        For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
+        thread, where the system tells (`reports.measure.memory`); `prepare_time`, the time until a fabric never seen
+        before can be asked about, where any fabric can be. Then `time` for each method and number of threads, the truth
+        last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
+    """
+    asked = []
+    for name in manifest.names("seen", "unseen"):
+        cloth, queries, _ = _held_out(manifest, folder, name, options)
+        asked.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
+
+    truth = TruthOptions.model_validate(manifest.about["truth"])
+    entries, records, edits = [], [], count(1)
+    for method in methods:
+        covered = [(cloth, queries) for cloth, queries in asked if method.covers(cloth)]
+        if not covered:
+            continue
+        for cloth, _ in covered:
+            method.prepare(cloth)
+        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
+        entries.append((subject, affordable(Contender(method.predict, covered))))
+        stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
+        records.append(subject.of("bytes_stored", stored, len(covered), unit="B"))
+        memory = peak_memory(partial(method.predict, *covered[0]))
+        records += [subject.of("peak_memory", memory, 3, unit="B")] if memory is not None else []
+        records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
+    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), asked))
+    entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
+    return records + _times(entries, options)
+
+
+def _times(entries: Sequence[tuple[Record, Contender]], options: BenchOptions) -> list[Record]:
+    """Return the times of all contenders on every number of threads, all of them in turns."""
+    runs = [
+        (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
+        for subject, contender in entries
+        for threads in thread_counts(options.threads)
+    ]
+    timings = time_side_by_side([contender for _, contender in runs], options.timing_repeats, options.warm_up)
+    records = []
+    for (subject, contender), timing in zip(runs, timings, strict=True):
+        low, median, high = timing.quartiles
+        about = subject.model_copy(update={"note": f"{len(contender.questions[0][1].u)} queries a fabric"})
+        repeats, samples = len(timing.samples), timing.samples
+        records.append(about.of("time", median, repeats, unit="ns/query", low=low, high=high, samples=samples))
+        if math.isfinite(timing.waited):
+            records.append(subject.of("waited", timing.waited, repeats))
+    return records
+
+
+def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:
+    """Return the time to prepare fabrics that nothing knows yet: the named ones in turn, each with an edit of its own.
+
+    An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
+    """
+    times = []
+    for fabric, edit in zip(islice(cycle(fabrics), EDITS), edits, strict=False):
+        warp = fabric.warp.model_copy(update={"relief": fabric.warp.relief * (1 - 1e-4 * edit)})
+        new = fabric.model_copy(update={"name": f"{fabric.name}, edit {edit}", "warp": warp})
+        if not method.covers(new):
+            return []
+        times.append(milliseconds(partial(method.prepare, new)))
+    low, median, high = quartiles(times)
+    found = subject.of("prepare_time", median, len(times), unit="ms", low=low, high=high, samples=tuple(times))
+    return [found]
+
+
+def _held_out(manifest: Manifest, folder: Path, name: str, options: BenchOptions) -> tuple[Fabric, Queries, Answers]:
+    queries, answers = manifest.read(folder, name, "test")
+    rows = slice(options.rows)
+    return manifest.fabrics[name], queries.take(rows), answers.take(rows)

@@ -1,0 +1,194 @@
+"""What lies between two latents, and what an edit costs.
+
+A designer moves a slider, or edits a yarn. Two ways lead from one fabric to another: blend their latents, or encode the
+fabric in between. Both are held against the truth of the fabric in between, at shares t of the way, on the same
+questions. Every number of the yarns is then blended alike, beta(t) = (1 - t) beta_first + t beta_second. Between two
+drafts there is no draft: the truth in between is the cross-fade (1 - t) f_first + t f_second of both cloths, and there
+is nothing to encode.
+
+Errors are the relative RMSE of the colour measure (`reports.error`), noise of the truth subtracted. The time
+of an edit is all that answers wait for: the fabric is looked at and encoded anew. Colours are no part of what is
+encoded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries
+from reports.error import COLOUR_WEIGHTS, colour_error
+from reports.measure.timing import milliseconds, quartiles
+from reports.measure.truth_noise import with_noise
+from reports.options import LATENT_PAIRS
+from reports.record import Metric, Provenance, Record
+from weaves.fabric import Fabric, load_fabric
+from weaves.yarn import Yarn
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Where on the way from the first fabric to the second errors are measured."""
+
+ROWS: Final = 1024
+"""Queries at each of them."""
+
+EDITS: Final = 25
+"""Edits that are timed, of each kind."""
+
+_SEED = 31
+_BLENDED = ("width", "bend", "twist", "roughness", "relief", "blend")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two fabrics that differ in one thing."""
+
+    first: Fabric
+    second: Fabric
+    """Of the same repeat."""
+    differs: Literal["yarns", "draft"]
+
+    @property
+    def about(self) -> str:
+        """What the second one has that the first has not."""
+        return f"{self.differs} of {self.second.name}"
+
+
+@runtime_checkable
+class Blends(Protocol):
+    """A method that answers for what lies between two fabrics."""
+
+    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer N queries from latents blended by `share`, float32 (N, 4)."""
+
+
+def pairs() -> list[Pair]:
+    """Return the pairs: three drafts, each with the yarns of another preset, and two drafts of the same yarns."""
+    result = []
+    for one, other, differs in LATENT_PAIRS:
+        first, second = load_fabric(one), load_fabric(other)
+        update = {"draft": second.draft} if differs == "draft" else {"warp": second.warp, "weft": second.weft}
+        result.append(Pair(first, first.model_copy(update={"name": other} | update), differs))
+    return result
+
+
+def between(pair: Pair, share: float) -> Fabric:
+    """Return the fabric whose yarns lie at `share` of the way; colours are the first one's."""
+    warp = _between(pair.first.warp, pair.second.warp, share)
+    return pair.first.model_copy(update={"warp": warp, "weft": _between(pair.first.weft, pair.second.weft, share)})
+
+
+def measure_paths(
+    method: Method,
+    chosen: Sequence[Pair],
+    asked: QueryOptions,
+    truth: TruthOptions,
+    rows: int = ROWS,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Return the errors of blending and of encoding anew along each path.
+
+    Parameters
+    ----------
+    method : Method
+        Must be one that `Blends`.
+    chosen : sequence of Pair
+        Paths.
+    asked : QueryOptions
+        Distribution of the questions; the same ones at every share.
+    truth : TruthOptions
+        How they are answered.
+    rows : int
+        Queries at each share.
+
+    Returns
+    -------
+    list of Record
+        `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at `SHARES`.
+    """
+    records = []
+    for pair in chosen:
+        queries = draw_queries(asked, pair.first.weave.repeat, _SEED, 0, rows)
+        answers = _truths(pair, queries, truth)
+        subject = Record(
+            method=method.name,
+            setting=method.setting,
+            fabric=pair.first.name,
+            note=pair.about,
+            provenance=provenance or Provenance(),
+        )
+        for metric, values in _along(method, pair, queries):
+            errors = [_error(found, answer) for found, answer in zip(values, answers, strict=True)]
+            curve = tuple(zip(SHARES, errors, strict=True))
+            records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
+    return records
+
+
+def measure_edits(
+    method: Method, fabric: Fabric, repeats: int = EDITS, provenance: Provenance | None = None
+) -> list[Record]:
+    """Return the time until answers can follow an edit of a yarn, and one of a colour: medians, in milliseconds.
+
+    Edits change the warp's relief, or its diffuse colour, a little each time: no two fabrics are the same.
+    """
+    subject = Record(
+        method=method.name, setting=method.setting, fabric=fabric.name, provenance=provenance or Provenance()
+    )
+    method.prepare(fabric)
+    steps = [(step + 1) / (repeats + 2) for step in range(repeats + 1)]
+    yarns = [{"relief": fabric.warp.relief * (0.9 + 0.1 * step)} for step in steps]
+    colours = [{"diffuse": (0.2, 0.3, 0.4 * step)} for step in steps]
+    records = []
+    for about, edits in (("a yarn", yarns), ("a colour", colours)):
+        edited = [fabric.model_copy(update={"warp": fabric.warp.model_copy(update=edit)}) for edit in edits]
+        # The first call warms up.
+        times = tuple(milliseconds(partial(method.prepare, one)) for one in edited)[1:]
+        low, median, high = quartiles(times)
+        found = subject.model_copy(update={"note": about})
+        records.append(found.of("encode_time", median, repeats, unit="ms", low=low, high=high, samples=times))
+    return records
+
+
+def _along(method: Method, pair: Pair, queries: Queries) -> Iterator[tuple[Metric, list[npt.NDArray[np.float32]]]]:
+    """Yield both ways from the first fabric to the second, each with the method's answers at every share."""
+    assert isinstance(method, Blends)
+    yield "path_error", [method.predict_between(pair.first, pair.second, share, queries) for share in SHARES]
+    if pair.differs == "yarns":
+        yield "reencode_error", [method.predict(between(pair, share), queries) for share in SHARES]
+
+
+def _between(first: Yarn, second: Yarn, share: float) -> Yarn:
+    numbers = {name: (1.0 - share) * getattr(first, name) + share * getattr(second, name) for name in _BLENDED}
+    return first.model_copy(update=numbers)
+
+
+def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:
+    """Return the truth at every share: of the yarns in between, or the cross-fade of both drafts."""
+    if pair.differs == "yarns":
+        return [_truth(between(pair, share), queries, truth, _SEED) for share in SHARES]
+    ends = _truth(pair.first, queries, truth, _SEED), _truth(pair.second, queries, truth, _SEED + 1)
+    return [_faded(*ends, share) for share in SHARES]
+
+
+def _truth(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> Answers:
+    return with_noise(estimate(fabric, queries, options, seed), queries, options)
+
+
+def _faded(first: Answers, second: Answers, share: float) -> Answers:
+    mean = (1.0 - share) * first.mean + share * second.mean
+    error = np.hypot((1.0 - share) * first.standard_error, share * second.standard_error)
+    return Answers.opaque(mean.astype(np.float32), error.astype(np.float32), first.count + second.count)
+
+
+def _error(values: npt.NDArray[np.float32], answers: Answers) -> float:
+    return colour_error(values, answers, COLOUR_WEIGHTS, resamples=0).relative_rmse

@@ -1,0 +1,190 @@
+"""What a method makes of a scene: its picture's errors, what aliases on the camera's way, the time of a frame.
+
+Errors are those of the first frame (`reports.measure.scene.image_error`), over the pixels of lit cloth; the colour's is
+over the questions of all frames. Flicker and excess energy are those of `reports.measure.aliasing` over all frames:
+flicker where cloth is lit in every one of them, the spectrum of whole frames, whose background is the truth's.
+Intervals are those of `reports.measure.block_bootstrap`, over blocks of pixels with all their frames; excess energy has
+none. Every method is asked as `pipeline.models.fallback` says; how many questions were not its own stands beside its
+numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.models.fallback import Fallback
+from reports.error import COLOUR_WEIGHTS, squared_error
+from reports.images.film import frame_layers
+from reports.measure.aliasing import excess_energy, flicker, temporal_variances
+from reports.measure.block_bootstrap import block_interval
+from reports.measure.pictures import write_picture
+from reports.measure.scene.differences import difference_maps
+from reports.measure.scene.fovvideovdp import fovvideovdp_records
+from reports.measure.scene.frames import Shot
+from reports.measure.scene.image_error import image_errors, noise_floor
+from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
+from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
+from reports.record import TRUTH, Metric, Provenance, Record
+from weaves.colour import LUMINANCE
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+Floats = npt.NDArray[np.float64]
+
+LONGEST: Final = 0.01
+"""Seconds of a timed call."""
+
+FEWEST: Final = 128
+"""Least questions about a cloth in such a call: what a call itself costs must not stand for what a question costs."""
+
+
+class _Reference(NamedTuple):
+    """The truth's frames and what every method is compared with."""
+
+    pictures: Floats
+    """(F, H, W, 3)"""
+    noise: Floats
+    """Standard errors of `pictures`."""
+    lit: npt.NDArray[np.bool_]
+    """Pixels of lit cloth, (F, H, W)."""
+    floor: dict[Metric, float]
+    """What a noised copy of the first frame scores."""
+
+
+def write_truth(shot: Shot, path: Path) -> None:
+    """Write the truth's frames and the standard error of the first as an OpenEXR."""
+    pictures, whole = shot.pictures(), np.ones(shot.base.shape[1:3], np.bool_)
+    about = {"scene": shot.name, "method": TRUTH}
+    write_picture(path, pictures[0], whole, about, shot.noise()[0], frame_layers(pictures))
+
+
+def measure_scene(
+    methods: Sequence[Fallback],
+    shot: Shot,
+    options: BenchOptions,
+    pictures: Mapping[str, Path],
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure the settings of a method on a scene.
+
+    Parameters
+    ----------
+    methods : sequence of Fallback
+        One a setting; those that do not cover every cloth are left out.
+    shot : Shot
+        The scene's frames.
+    options : BenchOptions
+        How pictures are compared, and the seed of random methods.
+    pictures : mapping
+        Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
+        of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.differences`).
+    """
+    image, reference = options.scenes.image, _reference(shot, options.scenes.image)
+    truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]
+    records = []
+    for method in (one for one in methods if shot.covered_by(one)):
+        answers = shot.answers(method, options.scenes.seed)
+        shown = shot.pictures(answers)
+        errors = image_errors(shown[0], truth, noise, lit, image, reference.floor)
+        if method.setting in pictures:
+            about = {"scene": shot.name, "method": method.name, "setting": method.setting}
+            layers = frame_layers(shown) | difference_maps(shown[0], truth, errors, image.relative_epsilon)
+            write_picture(pictures[method.setting], shown[0], np.ones(lit.shape, np.bool_), about, layers=layers)
+        subject = _subject(method, shot, provenance)
+        records += errors.records(subject)
+        records.append(_colour(subject, shot, answers, image))
+        records += _over_time(subject, shown, reference, options.scenes)
+        strange = [method.strange(cloth.fabric, cloth.queries) for cloth in shot.cloths]
+        records.append(subject.of("fallback_share", float(np.concatenate(strange).mean()), sum(map(len, strange))))
+    return records
+
+
+def _reference(shot: Shot, image: ImageOptions) -> _Reference:
+    pictures, noise, lit = shot.pictures(), shot.noise(), shot.lit
+    return _Reference(pictures, noise, lit, noise_floor(pictures[0], noise[0], lit[0], image))
+
+
+def _over_time(subject: Record, shown: Floats, reference: _Reference, options: SceneBenchOptions) -> list[Record]:
+    """Return what a method's frames show of aliasing, and FovVideoVDP's score where that is installed."""
+    own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, reference.pictures, reference.noise))
+    still, image = np.asarray(reference.lit.all(axis=0)), options.image
+    records = []
+    if still.any():  # else no pixel shows lit cloth all the way
+        value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
+        scale = truth[:, still].mean() ** 2
+        rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
+        _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
+        records.append(subject.of("flicker", value, len(own), low=low, high=high))
+    return [
+        *records,
+        subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)),
+        *fovvideovdp_records(subject, own, truth, options.display),
+    ]
+
+
+def time_scene(
+    methods: Sequence[Fallback], shot: Shot, options: BenchOptions, provenance: Provenance | None = None
+) -> list[Record]:
+    """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
+
+    Of every cloth as many questions are asked as one call can answer in `LONGEST`, `FEWEST` at least; the time of all
+    of them is in proportion, cloth by cloth: a small one with costly questions counts for no more than it is.
+    """
+    first = shot.first()
+    if not (able := [method for method in methods if first.covered_by(method)]):
+        return []
+    mixed = np.random.default_rng(options.scenes.seed)
+    contenders = []
+    # In a random order, so that the first ones are a fair sample of the frame.
+    asked = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]
+    for method in able:
+        for fabric, queries in asked:
+            method.prepare(fabric)
+            # Quadrature's own preparation must not look like the time of a question: rare ones come late in a call.
+            rare = np.flatnonzero(method.strange(fabric, queries))[:1]
+            method.predict(fabric, queries.take(rare))
+            contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
+    records = []
+    timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
+    readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(asked), -1)
+    counts = np.array([len(queries.u) for _, queries in asked])
+    for method, frames in zip(able, 1e-6 * np.einsum("mct,c->mt", readings, counts), strict=True):
+        samples = tuple(frames.tolist())
+        low, median, high = quartiles(samples)
+        subject = _subject(method, shot, provenance)
+        repeats = len(samples)
+        records.append(subject.of("frame_time", median, repeats, unit="ms/frame", low=low, high=high, samples=samples))
+    return records
+
+
+def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float32]], image: ImageOptions) -> Record:
+    """Return the relative RMSE of the colour measure over the questions of all frames."""
+    values, truth, noise = (
+        np.concatenate(parts).astype(np.float64)
+        for parts in (answers, [c.mean for c in shot.cloths], [c.standard_error for c in shot.cloths])
+    )
+    own, reference = values @ COLOUR_WEIGHTS, truth @ COLOUR_WEIGHTS
+    spread = np.sqrt(np.square(noise) @ np.square(COLOUR_WEIGHTS))
+    error = squared_error(own, reference, spread, resamples=0)
+    # The mean over questions is the sum over pixels over their number; all questions of a pixel are drawn together.
+    pixel, size = np.concatenate([cloth.pixel for cloth in shot.cloths]), shot.base.shape[1:3]
+    squares = (np.square(own - reference) - np.square(spread))[:, 0]
+    asked, sums = (np.bincount(pixel, weights, minlength=size[0] * size[1]) for weights in (None, squares))
+    lit = (asked > 0).reshape(size)
+    rows = sums[lit.ravel()] * lit.sum() / len(pixel)
+    _, *ends = block_interval(rows, lit, image.block, image.resamples, image.seed)
+    low, high = (math.sqrt(max(end, 0.0)) / error.mean for end in ends)
+    return subject.of("colour_rrmse", error.relative_rmse, error.count, low=low, high=high)
+
+
+def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Record:
+    return Record(
+        method=method.name, setting=method.setting, scene=shot.name, threads=1, provenance=provenance or Provenance()
+    )

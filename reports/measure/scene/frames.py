@@ -1,0 +1,231 @@
+"""Frames of a scene by the truth and by methods: what is asked is worked out once and lies in a file.
+
+The file, NumPy's npz, holds every question of all frames with the truth's answer, and the pictures without the light
+that the cloth scatters: the backdrop, and what of it comes straight through the cloth. A method's picture is that plus
+the sum over questions of irradiance times f_P. So methods differ in the patch BSDF alone; what passes straight through
+cloth is the truth's for all of them, and cloth hides what its mesh covers.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.atomic import atomic_write
+from pipeline.fingerprint import fingerprint
+from pipeline.models.fallback import Fallback
+from pipeline.models.fallback_table import stand_in
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.frame import render
+from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.loading import load
+from pipeline.scenes.shade import colours_of, compose
+from pipeline.truth.estimator import estimate
+from pipeline.truth.query import Queries
+from reports.measure.truth_noise import with_noise
+from reports.options import SceneBenchOptions
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.method import Method
+
+_COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "stand_in")
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Questions:
+    """What is asked about one cloth over all F frames: M questions.
+
+    Attributes
+    ----------
+    fabric : Fabric
+        What it is.
+    queries : Queries
+        The questions.
+    frame, pixel : int64 (M,)
+        Which frame, and which of its H W pixels.
+    weight : float32 (M, 3)
+        Linear RGB irradiance.
+    mean, standard_error : float32 (M, 4)
+        The truth's answers.
+    stand_in : float32 (M, 4)
+        What quadrature answers where light or viewer is behind the cloth, for methods that do not know that; 0
+        elsewhere.
+    """
+
+    fabric: Fabric
+    queries: Queries
+    frame: npt.NDArray[np.int64]
+    pixel: npt.NDArray[np.int64]
+    weight: npt.NDArray[np.float32]
+    mean: npt.NDArray[np.float32]
+    standard_error: npt.NDArray[np.float32]
+    stand_in: npt.NDArray[np.float32]
+
+    def light(self, components: npt.ArrayLike) -> Floats:
+        """Return the light of each question, (M, 3), from components (M, 4)."""
+        return np.asarray(
+            self.weight
+            * np.einsum("mc,mcx->mx", np.asarray(components, np.float64), colours_of(self.fabric, self.queries))
+        )
+
+    def noise(self) -> Floats:
+        """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
+        squared = np.square(self.standard_error.astype(np.float64))
+        return np.asarray(
+            self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(colours_of(self.fabric, self.queries))))
+        )
+
+    def of_frame(self, frame: int) -> Questions:
+        """Return the questions of one frame."""
+        rows = np.flatnonzero(self.frame == frame)
+        parts = (getattr(self, name)[rows] for name in _COLUMNS)
+        return Questions(self.fabric, self.queries.take(rows), *parts)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A scene's frames.
+
+    Attributes
+    ----------
+    name : str
+        Of the scene.
+    base : float32 (F, H, W, 3)
+        Linear RGB without the light that the cloth scatters.
+    cloths : list of Questions
+        In the order of the scene.
+    """
+
+    name: str
+    base: npt.NDArray[np.float32]
+    cloths: list[Questions]
+
+    @property
+    def lit(self) -> npt.NDArray[np.bool_]:
+        """Pixels that any question is about, (F, H, W)."""
+        result = np.zeros(self.base.shape[:3], np.bool_)
+        for cloth in self.cloths:
+            result.reshape(len(result), -1)[cloth.frame, cloth.pixel] = True
+        return result
+
+    def pictures(self, answers: list[npt.NDArray[np.float32]] | None = None) -> Floats:
+        """Return the frames, (F, H, W, 3), from each cloth's components (M, 4); the truth's if left out."""
+        result = self.base.astype(np.float64)
+        flat = result.reshape(len(result), -1, 3)
+        for index, cloth in enumerate(self.cloths):
+            light = cloth.light(cloth.mean if answers is None else answers[index])
+            np.add.at(flat, (cloth.frame, cloth.pixel), light)
+        return result
+
+    def noise(self) -> Floats:
+        """Return the standard error of the truth's frames, (F, H, W, 3); of a pixel's lights it adds in quadrature."""
+        squared = np.zeros(self.base.shape)
+        flat = squared.reshape(len(squared), -1, 3)
+        for cloth in self.cloths:
+            np.add.at(flat, (cloth.frame, cloth.pixel), np.square(cloth.noise()))
+        return np.sqrt(squared)
+
+    def first(self) -> Shot:
+        """Return the first frame alone."""
+        return Shot(self.name, self.base[:1], [cloth.of_frame(0) for cloth in self.cloths])
+
+    def covered_by(self, method: Method) -> bool:
+        """Tell whether a method answers for every cloth."""
+        return all(method.covers(cloth.fabric) for cloth in self.cloths)
+
+    def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
+        """Return a method's components for every cloth; random methods draw anew in every frame.
+
+        What falls back because of light or viewer behind the cloth was answered once for all methods.
+        """
+        found = []
+        for cloth in self.cloths:
+            method.prepare(cloth.fabric)
+            values = cloth.stand_in.copy()
+            answered = method.strange(cloth.fabric, cloth.queries) & cloth.queries.behind
+            for frame in range(len(self.base)):
+                rows = np.flatnonzero((cloth.frame == frame) & ~answered)
+                if rows.size:
+                    own = int(fingerprint([self.name, cloth.fabric.name, frame, seed]), 16)
+                    values[rows] = method.predict(cloth.fabric, cloth.queries.take(rows), own)
+            found.append(values)
+        return found
+
+
+def shoot(name: str, options: SceneBenchOptions, path: Path) -> None:
+    """Work out a scene's frames with the truth's answers and write them to `path`.
+
+    Raises
+    ------
+    BadInput
+        If the scene cannot be used (`pipeline.scenes`), or shows no cloth.
+    """
+    loaded = load(load_scene(name), options.options)
+    bases: list[npt.NDArray[np.floating]] = []
+    parts: dict[str, list[dict[str, npt.NDArray[Any]]]] = {key: [] for key in loaded.cloths}
+    for frame in range(options.frames):
+        found = render(loaded, float(frame), options.size)
+        base: npt.NDArray[np.floating] = found.backdrop
+        for key, gbuffer in found.gbuffers.items():
+            fabric = loaded.cloths[key][1]
+            truth = options.frame_truth if frame else options.truth
+            seed = int(fingerprint(["scene", loaded.scene.name, key, frame, options.seed]), 16)
+            queries = gbuffer.queries(fabric.weave.repeat)
+            answers = with_noise(estimate(fabric, queries, truth, seed), queries, truth)
+            dark = np.zeros((len(gbuffer.place), 3))
+            base = compose(gbuffer, dark, base, transparency=_transparency(gbuffer, answers.transparency))
+            columns = {"frame": np.full(len(gbuffer.place), frame), "pixel": gbuffer.pixel[gbuffer.place]}
+            columns |= queries._asdict()
+            columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
+            columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
+            columns |= {"stand_in": _stand_in(fabric, queries, seed)}
+            parts[key].append(columns)
+        bases.append(base)
+    arrays = {"base": np.array(bases, np.float32)}
+    keys = [key for key, found in parts.items() if sum(len(part["frame"]) for part in found)]
+    if not keys:
+        raise BadInput(name, "frames", options.frames, "no cloth that is lit is in sight of the camera")
+    for key in keys:
+        for column in parts[key][0]:
+            arrays[f"{key}.{column}"] = np.concatenate([part[column] for part in parts[key]])
+    about = {"name": loaded.scene.name, "cloths": {key: loaded.cloths[key][1].model_dump(mode="json") for key in keys}}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)  # type: ignore[arg-type]
+    atomic_write(path, buffer.getvalue())
+
+
+def read_shot(path: Path) -> Shot:
+    """Read what `shoot` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        about = json.loads(str(file["about"]))
+        cloths = []
+        for key, fabric in about["cloths"].items():
+            queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
+            rest = (file[f"{key}.{column}"] for column in _COLUMNS)
+            cloths.append(Questions(Fabric.model_validate(fabric), queries, *rest))
+        return Shot(about["name"], file["base"], cloths)
+
+
+def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
+    """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
+    result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
+    if rows.any():
+        result[rows] = stand_in(fabric, queries.take(rows), seed)
+    return result
+
+
+def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:
+    """Return the transparency of each place: what any of its questions was answered, 0 where nothing is asked."""
+    result = np.zeros(len(gbuffer.pixel))
+    result[gbuffer.place] = answered
+    return result

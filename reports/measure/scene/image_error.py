@@ -1,0 +1,240 @@
+"""How far a method's picture is from the truth's, by numbers, to an eye, and how much of it is noise of the truth.
+
+Pictures are linear RGB. m is the method's value, t the truth's, s its standard error, <.> the mean over the lit pixels
+(the mask) and the channels. Outside the mask both pictures are set to one grey, the median luminance of the truth's lit
+pixels: nothing there enters, not even by the windows of SSIM and FLIP, and it shifts no exposure of HDR-FLIP.
+
+linear light    MSE and relative MSE as in `reports.error`, noise subtracted. Components: `light_errors`.
+display light   L = min(max(exposure m, 0), 1), and its sRGB encoding E, the codes of the picture on the page.
+PSNR            10 log10(1 / <(E_m - E_t)^2>) in dB: peak 1, which is display white. Infinite where pictures are equal.
+SSIM            mean of the map of structural similarity of E, Gaussian window, one channel at a time, range 1, at the
+                picture's edge continued by reflection [Wang2004SSIM], scikit-image. 1 where equal.
+FLIP, LDR       mean of the error map of E at a number of pixels per degree [Andersson2020FLIP], NVIDIA's code. 0 to 1.
+FLIP, HDR       the same for linear values >= 0 over the exposures that the truth's median and maximum ask for
+                [Andersson2021HDRFLIP]. It does not depend on the unit of light.
+Delta E         mean CIEDE2000 of L (`weaves.colour.delta_e`).
+
+Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
+subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel (option
+`floor_channels`), fixed seed: about what a perfect method would score. Intervals are 95 % percentile bootstraps over
+square blocks of pixels, since neighbours err alike (`reports.measure.block_bootstrap`); they say how much the choice of
+pixels matters, not the noise floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
+
+import flip_evaluator
+import numpy as np
+import numpy.typing as npt
+from skimage.metrics import structural_similarity
+
+from reports.error import Error, relative_squared_error, relative_weight, squared_error
+from reports.measure.block_bootstrap import block_interval, blocks
+from reports.options import ImageOptions
+from reports.record import Metric, Record
+from weaves.colour import LUMINANCE, delta_e, encoded
+from weaves.errors import BadInput
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+PERCEIVED: Final[dict[Metric, tuple[Metric, str]]] = {
+    "psnr": ("psnr_floor", "dB"),
+    "ssim": ("ssim_floor", "1"),
+    "flip_ldr": ("flip_ldr_floor", "1"),
+    "flip_hdr": ("flip_hdr_floor", "1"),
+    "delta_e": ("delta_e_floor", "1"),
+}
+"""Measures of what an eye sees: the metric of the noise floor and the unit."""
+
+
+class Measure(NamedTuple):
+    """A mean over pixels, its 95 % interval and the truth's noise floor."""
+
+    value: float
+    low: float
+    high: float
+    floor: float
+    pixels: int
+    """Behind it."""
+
+
+@dataclass(frozen=True)
+class ImageErrors:
+    """All measures of one picture, and maps of what an eye sees."""
+
+    mse: Error
+    mse_relative: Error
+    perceived: dict[Metric, Measure]
+    """By the keys of `PERCEIVED`."""
+    maps: dict[str, Floats]
+    """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
+    mask: Mask
+    """Pixels that count, (H, W)."""
+
+    def records(self, subject: Record) -> list[Record]:
+        """Return every number as a Record of `subject`; numbers that are infinite (equal pictures) are left out."""
+        r = self.mse_relative
+        found = subject.of_error(self.mse)
+        found.append(
+            subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
+        )
+        found.append(subject.of("mse_relative_floor", r.noise, r.count))
+        for metric, (floor, unit) in PERCEIVED.items():
+            m = self.perceived[metric]
+            low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
+            if math.isfinite(m.value):
+                found.append(subject.of(metric, m.value, m.pixels, unit=unit, low=low, high=high))
+            if math.isfinite(m.floor):
+                found.append(subject.of(floor, m.floor, m.pixels, unit=unit))
+        return found
+
+
+def image_errors(
+    picture: npt.ArrayLike,
+    truth: npt.ArrayLike,
+    standard_error: npt.ArrayLike,
+    mask: npt.ArrayLike,
+    options: ImageOptions | None = None,
+    floor: Mapping[Metric, float] | None = None,
+) -> ImageErrors:
+    """Measure a picture against the truth's.
+
+    Parameters
+    ----------
+    picture, truth, standard_error : array_like (H, W, 3)
+        Linear RGB of the method and of the truth, and the latter's standard error.
+    mask : array_like (H, W)
+        True where there is lit cloth: the pixels that count. What the others hold does not matter.
+    floor : mapping, optional
+        What `noise_floor` returned for this truth; half of the time is spent on it where it is not given.
+
+    Raises
+    ------
+    BadInput
+        If sizes differ, a value that counts is not finite, the truth is dark, or nothing that counts is left.
+    """
+    options = options or ImageOptions()
+    m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
+    window = 2 * int(3.5 * options.ssim_sigma + 0.5) + 1
+    if t.shape[2] != 3 or min(lit.shape) < window:
+        raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
+    mse, relative = light_errors(m, t, s, lit, options)
+    maps = _perceived(m, t, lit, options)
+    floors = floor or noise_floor(t, s, lit, options)
+    perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
+    return ImageErrors(mse, relative, perceived, maps, lit)
+
+
+def noise_floor(
+    truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions | None = None
+) -> dict[Metric, float]:
+    """Return what a noised copy of the truth scores, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
+    options = options or ImageOptions()
+    _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
+    channels = 1 if options.floor_channels == "together" else 3
+    noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], channels))
+    maps = _perceived(noised, t, lit, options)
+    return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
+
+
+def light_errors(
+    picture: npt.ArrayLike,
+    truth: npt.ArrayLike,
+    standard_error: npt.ArrayLike,
+    mask: npt.ArrayLike,
+    options: ImageOptions | None = None,
+) -> tuple[Error, Error]:
+    """Return MSE and relative MSE of pictures with any channels, (H, W, C): of a component, C = 1.
+
+    Other arguments and errors are those of `image_errors`.
+    """
+    options = options or ImageOptions()
+    m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
+    m, t, s = m[lit], t[lit], s[lit]
+    w = relative_weight(t, options.relative_epsilon)
+    squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
+    errors = squared_error(m, t, s, 0), relative_squared_error(m, t, s, options.relative_epsilon, 0)
+    spreads = [block_interval(rows, lit, options.block, options.resamples, options.seed) for rows in squares]
+    mse, relative = (
+        replace(error, standard_error=spread, low=low, high=high)
+        for error, (spread, low, high) in zip(errors, spreads, strict=True)
+    )
+    return mse, relative
+
+
+def _perceived(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
+    """Return the maps of what an eye sees, (H, W); `square` is that of PSNR."""
+    grey = float(np.median(truth[lit] @ LUMINANCE))
+    picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
+    light, light_truth = (np.clip(options.exposure * values, 0.0, 1.0) for values in (picture, truth))
+    shown, shown_truth = encoded(light), encoded(light_truth)
+    window = {"gaussian_weights": True, "sigma": options.ssim_sigma, "use_sample_covariance": False}
+    compare: Any = structural_similarity  # has no types
+    similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
+    # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
+    unit = 1.0 / (truth @ LUMINANCE).max()
+    return {
+        "square": ((shown - shown_truth) ** 2).mean(axis=-1),
+        "ssim": similarity.mean(axis=-1),
+        "flip_ldr": _flip(shown, shown_truth, "LDR", options),
+        "flip_hdr": _flip(np.maximum(unit * picture, 0.0), unit * truth, "HDR", options),
+        "delta_e": delta_e(light, light_truth),
+    }
+
+
+def _flip(picture: Floats, truth: Floats, kind: str, options: ImageOptions) -> Floats:
+    """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
+    values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
+    parameters: dict[str, Any] = {"ppd": options.pixels_per_degree}
+    if kind == "HDR":
+        parameters["tonemapper"] = options.tone_mapper
+    errors, _, _ = flip_evaluator.evaluate(
+        *values, kind, applyMagma=False, computeMeanError=False, parameters=parameters
+    )
+    return np.asarray(errors[..., 0], np.float64)
+
+
+def _measure(metric: Metric, maps: dict[str, Floats], floor: float, lit: Mask, o: ImageOptions) -> Measure:
+    rows = _rows(metric, maps, lit)
+    _, *ends = block_interval(rows, lit, o.block, o.resamples, o.seed)
+    low, high = sorted(_unit(metric, end) for end in ends)
+    return Measure(_unit(metric, float(rows.mean())), low, high, floor, len(rows))
+
+
+def _rows(metric: Metric, maps: dict[str, Floats], lit: Mask) -> Floats:
+    """Return the values whose mean is the measure, one a lit pixel."""
+    return maps["square" if metric == "psnr" else metric][lit]
+
+
+def _unit(metric: Metric, mean: float) -> float:
+    """Return a mean in the unit of its measure: dB of a mean square, else itself."""
+    if metric != "psnr":
+        return mean
+    return -10.0 * math.log10(mean) if mean > 0 else math.inf
+
+
+def _checked(
+    picture: npt.ArrayLike, truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, o: ImageOptions
+) -> tuple[Floats, Floats, Floats, Mask]:
+    """Return the arguments as arrays, or say which of them cannot be used."""
+    m, t, s = (np.asarray(values, np.float64) for values in (picture, truth, standard_error))
+    lit = np.asarray(mask, dtype=np.bool_)
+    named = {"picture": m, "truth": t, "standard error": s}
+    for name, values in named.items():
+        if values.ndim != 3 or values.shape != t.shape or values.shape[:2] != lit.shape:
+            size = f"height, width, channels alike for all, and those of the mask {lit.shape} are needed"
+            raise BadInput("image errors", f"size of the {name}", values.shape, size)
+    if not lit.any() or blocks(lit, o.block).max() < 1:
+        raise BadInput("image errors", "lit pixels", int(lit.sum()), "at least two blocks of the picture must be lit")
+    for name, values in named.items():
+        if not np.isfinite(values[lit]).all():
+            raise BadInput("image errors", name, "not finite", "every lit pixel needs a number")
+    if min(t[lit].min(), s[lit].min()) < 0 or t[lit].max() == 0:
+        raise BadInput("image errors", "truth", "dark or negative", "light > 0 and standard errors >= 0 are needed")
+    return m, t, s, lit

@@ -1,0 +1,210 @@
+"""The edge of a cloth cylinder against a dark ground: who finds its silhouette, and what light it returns there.
+
+An orthographic camera looks at right angles at a cylinder of radius r; its picture is the strip along one edge, from
+`depth` inside the boundary's outline to the outline. A pixel at the distance d from the axis sees the boundary under
+the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacity: what the cloth hides of the ground
+[Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance pi.
+
+A method without `missed` knows no curved cloth. It is asked as a flat material is used on a curved surface: the
+same questions with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from pipeline.models.method import Method
+from pipeline.scenes.curvature import minimum_curvature
+from pipeline.scenes.shade import shade
+from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.opacity import opacity
+from pipeline.truth.query import Queries
+from reports.images.exr import read_exr, write_exr
+from reports.options import EdgeOptions
+from reports.record import TRUTH, Provenance, Record, Role, to_table
+from weaves.fabric import Fabric
+
+Floats = npt.NDArray[np.float64]
+
+
+@runtime_checkable
+class SeesThrough(Protocol):
+    """A method that knows what a curved cloth does not hide."""
+
+    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
+
+
+class Edge(NamedTuple):
+    """Pictures of the strip, the outline at the right, H by W.
+
+    Attributes
+    ----------
+    coverage : float64 (H, W)
+        Share of a pixel that the cloth hides.
+    light : float64 (H, W, 3)
+        Linear RGB.
+    """
+
+    coverage: Floats
+    light: Floats
+
+
+class Silhouette(NamedTuple):
+    """A method's edge beside the truth's.
+
+    Attributes
+    ----------
+    coverage_rmse : float
+        Root mean squared error of the coverage.
+    displacement : float
+        How far the method's edge lies outside the true one, on average over the rows, in yarn spacings.
+    light_rmse : float
+        Root mean squared error of the light, over pixels and channels.
+    """
+
+    coverage_rmse: float
+    displacement: float
+    light_rmse: float
+
+
+def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
+    """Return what the strip's pixels ask, row after row, (H W,); the circumference runs along x."""
+    radius, pixel = options.radius, options.pixel
+    columns = max(round(min(options.depth, radius) / pixel), 1)
+    sine = (radius - pixel * (np.arange(columns)[::-1] + 0.5)) / radius
+    along = pixel * (np.arange(options.rows) + 0.5)
+    v, sine = (grid.ravel() for grid in np.meshgrid(along, sine, indexing="ij"))
+    cosine, zero, one = np.sqrt((1.0 - sine) * (1.0 + sine)), np.zeros_like(sine), np.ones_like(sine)
+
+    # World: x towards the edge, y along the axis, z to the camera; local frame: tangent, axis, normal.
+    turn, rise = (math.radians(angle) for angle in options.light)
+    light = np.array([math.sin(turn) * math.cos(rise), math.sin(rise), math.cos(turn) * math.cos(rise)])
+    frame = np.stack(
+        [np.stack([cosine, zero, -sine], -1), np.stack([zero, one, zero], -1), np.stack([sine, zero, cosine], -1)], 1
+    )
+    wi, wo = frame @ light, frame[:, :, 2]
+    boundary = np.diag([1.0 / radius**2, 0.0, 1.0 / radius**2])
+    curvature = minimum_curvature(boundary, radius * frame[:, 2], np.tile([0.0, 0.0, 1.0], (len(v), 1)))
+    asked = Queries.round(
+        np.mod(radius * np.arcsin(sine), repeat[0]).astype(np.float32),
+        np.mod(v, repeat[1]).astype(np.float32),
+        (0.5 * pixel / np.sqrt(cosine)).astype(np.float32),
+        wi.astype(np.float32),
+        wo.astype(np.float32),
+    )
+    return asked._replace(curvature=curvature.astype(np.float32))
+
+
+def true_edge(fabric: Fabric, options: EdgeOptions) -> Edge:
+    """Return the truth's pictures."""
+    queries = edge_queries(options, fabric.weave.repeat)
+    coverage, _ = opacity(fabric, queries, options.truth, options.seed)
+    return _edge(fabric, queries, coverage, estimate(fabric, queries, options.truth, options.seed).mean, options)
+
+
+def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
+    """Return a method's pictures."""
+    queries = edge_queries(options, fabric.weave.repeat)
+    method.prepare(fabric)
+    if isinstance(method, SeesThrough):
+        coverage = 1.0 - method.missed(fabric, queries)
+        return _edge(fabric, queries, coverage, method.predict(fabric, queries, options.seed), options)
+    front = np.flatnonzero(queries.wi[:, 2] > 0)
+    asked = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)
+    components = np.zeros((len(queries.u), 4), np.float32)
+    components[front] = method.predict(fabric, asked, options.seed)
+    return _edge(fabric, queries, np.ones(len(queries.u), np.float32), components, options)
+
+
+def silhouette(method: Method, fabric: Fabric, options: EdgeOptions, truth: Edge | None = None) -> Silhouette:
+    """Compare a method's edge with the truth's, which is computed unless it is given."""
+    truth = truth or true_edge(fabric, options)
+    found = edge_of(method, fabric, options)
+    covered = found.coverage - truth.coverage
+    return Silhouette(
+        coverage_rmse=float(np.sqrt(np.square(covered).mean())),
+        displacement=float(covered.sum(axis=1).mean() * options.pixel),
+        light_rmse=float(np.sqrt(np.square(found.light - truth.light).mean())),
+    )
+
+
+def render_edge(fabric: Fabric, options: EdgeOptions, path: Path) -> None:
+    """Write the truth's pictures to `path`: R, G, B the light, A the coverage."""
+    edge = true_edge(fabric, options)
+    planes = {name: edge.light[..., index] for index, name in enumerate("RGB")} | {"A": edge.coverage}
+    write_exr(path, planes, {"fabric": fabric.name, "scene": "edge", "method": TRUTH})
+
+
+def read_edge(path: Path) -> Edge:
+    """Read what `render_edge` wrote; BadInput if there is nothing."""
+    exr = read_exr(path)
+    return Edge(exr.channels["A"].astype(np.float64), exr.stack("R", "G", "B").astype(np.float64))
+
+
+def measure_silhouette(
+    method: Method,
+    fabric: Fabric,
+    role: Role,
+    options: EdgeOptions,
+    truth: Path,
+    provenance: Provenance | None = None,
+) -> list[Record]:
+    """Measure a method's edge against the truth's: errors of coverage and light, and how far the edge lies outside.
+
+    Parameters
+    ----------
+    method : Method
+        Must cover the fabric.
+    truth : Path
+        The pictures that `render_edge` wrote with the same options.
+    """
+    reference = read_edge(truth)
+    found = silhouette(method, fabric, options, reference)
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric.name,
+        role=role,
+        provenance=provenance or Provenance(),
+    )
+    pixels = reference.coverage.size
+    return [
+        subject.of("silhouette_coverage", found.coverage_rmse, pixels),
+        subject.of("silhouette_displacement", found.displacement, options.rows, unit="yarn spacings"),
+        subject.of("silhouette_light", found.light_rmse, pixels),
+    ]
+
+
+def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return one row a method: coverage, displacement, light, fabrics; means over fabrics."""
+    table = to_table(records)
+    table = table[table["metric"].str.startswith("silhouette_")]
+    keys = ["method", "setting"]
+    if table.empty:
+        return pd.DataFrame(columns=[*keys, "coverage", "displacement", "light", "fabrics"])
+    names = table["metric"].str.removeprefix("silhouette_")
+    means = table.assign(metric=names).pivot_table("value", keys, "metric", "mean", sort=False)
+    counts: Any = table.groupby(keys, sort=False)["fabric"].nunique().rename("fabrics")
+    result: pd.DataFrame = means[["coverage", "displacement", "light"]].join(counts).reset_index()
+    return result.rename_axis(columns=None)
+
+
+def _edge(
+    fabric: Fabric,
+    queries: Queries,
+    coverage: npt.NDArray[np.float32],
+    components: npt.NDArray[np.float32],
+    options: EdgeOptions,
+) -> Edge:
+    behind = queries.wi[:, 2:] < 0
+    colour = np.where(behind, shade(fabric, components, transmitted=True), shade(fabric, components))
+    cover = coverage.astype(np.float64).reshape(options.rows, -1)
+    return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))

@@ -1,0 +1,34 @@
+"""What the gallery of a page says of a fabric."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reports.images.tiles import EXPOSURE, hex_colour
+from reports.tables.numbers import plain
+from weaves.fabric import Fabric
+
+
+def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
+    """Return what the gallery says of a fabric."""
+    ends, picks = fabric.weave.repeat
+    yarns = []
+    for family, yarn in (("warp", fabric.warp), ("weft", fabric.weft)):
+        numbers = [
+            f"{yarn.bend:g}°",
+            f"{yarn.twist:g}°".replace("-", "−"),
+            f"{yarn.roughness:g}",
+            f"{yarn.relief:g}",
+            f"{yarn.width:g}",
+        ]
+        colours = [hex_colour([EXPOSURE * c for c in rgb]) for rgb in (yarn.diffuse_rgb, yarn.specular_rgb)]
+        yarns.append({"family": family, "cells": numbers, "colours": colours})
+    return {
+        "name": fabric.name,
+        "title": plain(fabric.name),
+        "role": role,
+        "weave": fabric.weave.name,
+        "repeat": f"{ends} ends × {picks} picks",
+        "source": fabric.source,
+        "yarns": yarns,
+    }

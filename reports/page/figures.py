@@ -1,0 +1,223 @@
+"""The plots of a page, one function each: `plot(scheme, data) -> Figure`, drawn by `reports.page.style.render`.
+
+Those of fronts, a fault against a cost, are in `reports.page.front_figures`.
+
+A method has one colour and one mark everywhere; its knobs stand under each other, or on one curve. Filled marks are
+fabrics seen in training, open ones unseen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+
+from reports.measure.aliasing import HALF_NYQUIST
+from reports.page.style import NARROWEST, Scheme, new_figure
+from reports.record import TRUTH
+from reports.tables.numbers import display
+from reports.tables.summary import BASELINE, rows
+
+_ROLES: Final = ("seen", "unseen")
+_MOST_DECADES: Final = 5  # whose labels fit under half a figure
+
+
+def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:
+    """Draw the MSE of every method: each fabric as a faint dot, the mean of a role with its 95 % interval.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `summary.error_table`.
+    fabrics : DataFrame
+        From `summary.fabric_table`.
+    """
+    roles = [role for role in _ROLES if role in set(table["role"])]
+    places = _places(table)
+    figure, panels = new_figure(max(4.6 * len(roles), NARROWEST), 1.1 + 0.28 * _height(places), len(roles), sharey=True)
+    colours = scheme.colours(table["method"])
+    for axes, role in zip(panels, roles, strict=True):
+        for (method, setting), row in places.items():
+            single = _values(fabrics, role, method, setting)
+            axes.scatter(single, np.full(len(single), row), s=16, color=colours[method], alpha=0.3, linewidths=0)
+            found = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
+            for mean in rows(found):
+                spread = _bounds(mean.mse, mean.low, mean.high)
+                _mark(axes, mean.mse, row, colours[method], role, scheme.marker(method), xerr=spread)
+        noise = table.loc[table["role"] == role, "truth_noise"].mean()
+        axes.axvline(noise, color=scheme.muted, linewidth=0.9, linestyle=(0, (4, 3)))
+        # Above the first row, where no mark can lie.
+        axes.annotate(
+            "noise of the truth, subtracted",
+            (noise, 1.0),
+            xytext=(4, -2),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            va="top",
+            fontsize=8,
+            color=scheme.muted,
+        )
+        axes.set(title=f"{role.capitalize()} fabrics", xlabel="MSE, linear RGB", xscale="log")
+        axes.grid(axis="y", visible=False)
+    _name_rows(panels[0], places, above=0.5)
+    return figure
+
+
+def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw flicker and excess energy of every method; 0 is the truth."""
+    places = _places(table)
+    figure, panels = new_figure(9.2, 1.1 + 0.28 * _height(places), 2, sharey=True)
+    colours = scheme.colours(table["method"])
+    columns = {"flicker": "Flicker", "excess_energy": "Excess energy at high frequencies"}
+    for axes, (column, title) in zip(panels, columns.items(), strict=True):
+        smallest = float(table[column].abs().replace(0.0, math.nan).min())
+        threshold = 10 ** math.floor(math.log10(smallest)) if math.isfinite(smallest) else 1e-6
+        axes.set_xscale("symlog", linthresh=(threshold := max(threshold, 1e-5)))
+        axes.axvline(0, color=scheme.muted, linewidth=1.0)
+        for found in rows(table):
+            row = places[found.method, found.setting]
+            value = getattr(found, column)
+            axes.plot([0, value], [row, row], color=colours[found.method], linewidth=1.6, alpha=0.35)
+            _mark(axes, value, row, colours[found.method], found.role, scheme.marker(found.method))
+        axes.set(title=title, xlabel="variance beyond the truth's, over its squared mean")
+        axes.xaxis.set_major_locator(FixedLocator(_signed_decades(table[column].dropna().tolist(), threshold)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.grid(axis="y", visible=False)
+    _name_rows(panels[0], places)
+    return figure
+
+
+def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[float, float]]]) -> Figure:
+    """Draw the power spectrum of the receding plane by every method beside the truth's.
+
+    Of a method with knobs only the last and the baseline are drawn.
+    """
+    last = dict(curves.keys())
+    shown = {key: curve for key, curve in curves.items() if key == BASELINE or last[key[0]] == key[1]}
+    height = max(3.8, 0.9 + 0.19 * len(shown))
+    figure, (axes,) = new_figure(9.2, height)
+    colours = scheme.colours(method for method, _ in shown)
+    axes.axvspan(HALF_NYQUIST, 0.5, color=scheme.line, alpha=0.35, linewidth=0)
+    axes.annotate(
+        "counted as aliasing where it exceeds the truth", (HALF_NYQUIST, 0.98), xytext=(6, 0),
+        xycoords=("data", "axes fraction"), textcoords="offset points", va="top", fontsize=8, color=scheme.muted,
+    )  # fmt: skip
+    axes.set(
+        xlim=(0, 0.62), yscale="log", xlabel="frequency, cycles a pixel",
+        ylabel="power over the truth's squared mean", xticks=[0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5],
+    )  # fmt: skip
+    labels = []
+    for (method, setting), curve in sorted(shown.items(), key=lambda item: item[0][0] == TRUTH):
+        points = np.array([point for point in curve if point[1] > 0])
+        if not len(points):
+            continue
+        is_truth = method == TRUTH
+        axes.plot(*points.T, color=colours[method], linewidth=2.6 if is_truth else 1.3, alpha=1 if is_truth else 0.85)
+        labels.append((math.log(points[-1][1]), display(method, setting), method))
+    labels.sort()
+    low, high = (math.log(limit) for limit in axes.get_ylim())
+    places = _apart([end for end, _, _ in labels], (high - low) / ((height - 0.9) / 0.17), high)
+    for place, (_, label, method) in zip(places, labels, strict=True):
+        weight = "bold" if method == TRUTH else "normal"
+        at = (0.505, math.exp(place))
+        axes.annotate(label, at, va="center", fontsize=8.5, color=colours[method], fontweight=weight)
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    return figure
+
+
+def _signed_decades(values: Sequence[float], smallest: float) -> list[float]:
+    """Return ticks for values of both signs: 0 and, outwards from `smallest`, powers of ten; few enough to be read."""
+    first = round(math.log10(smallest))
+    reach = {sign: max((sign * value for value in values), default=0.0) for sign in (-1, 1)}
+    last = {sign: math.floor(math.log10(top) + 1e-9) if top > 0 else first - 1 for sign, top in reach.items()}
+    step = max(-(-sum(max(end - first + 1, 0) for end in last.values()) // _MOST_DECADES), 1)
+    return sorted([0.0, *(sign * 10.0**e for sign, end in last.items() for e in range(end, first - 1, -step))])
+
+
+def _apart(places: Sequence[float], step: float, high: float) -> list[float]:
+    """Move ascending places up until `step` lies between neighbours, and down again where they passed `high`."""
+    result: list[float] = []
+    for place in places:
+        result.append(max(place, result[-1] + step) if result else place)
+    for index in reversed(range(len(result))):
+        result[index] = min(result[index], high - step * (len(result) - 1 - index))
+    return result
+
+
+def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw the time of a query: median and quartiles."""
+    places = _places(table)
+    figure, (axes,) = new_figure(9.2, 1.0 + 0.28 * _height(places))
+    colours = scheme.colours(table["method"])
+    for found in rows(table):
+        colour, row = colours[found.method], places[found.method, found.setting]
+        spread = _bounds(found.median_ns, found.first_quartile_ns, found.third_quartile_ns)
+        _mark(axes, found.median_ns, row, colour, "seen", scheme.marker(found.method), xerr=spread)
+        axes.annotate(
+            _nanoseconds(found.median_ns), (found.third_quartile_ns, row), xytext=(8, 0), textcoords="offset points",
+            va="center", fontsize=9, color=scheme.muted,
+        )  # fmt: skip
+    axes.set(xscale="log", xlabel="time of a query, ns: median and quartiles of interleaved calls")
+    axes.margins(x=0.12)
+    axes.grid(axis="y", visible=False)
+    _name_rows(axes, places)
+    return figure
+
+
+def _places(table: pd.DataFrame) -> dict[tuple[str, str], float]:
+    """Return the height of every method's row, downwards: knobs of a method close together, a gap before the next."""
+    keys = list(dict.fromkeys(zip(table["method"], table["setting"], strict=True)))
+    order = list(dict.fromkeys(method for method, _ in keys))
+    keys.sort(key=lambda key: order.index(key[0]))
+    places: dict[tuple[str, str], float] = {}
+    place, before = 0.0, keys[0] if keys else ("", "")
+    for key in keys:
+        if places:
+            place += 1.0 if (not key[1] and not before[1]) or key[0] == before[0] else 1.5
+        places[key], before = place, key
+    return places
+
+
+def _height(places: Mapping[tuple[str, str], float]) -> float:
+    return max(places.values(), default=0.0) + 1.0
+
+
+def _values(fabrics: pd.DataFrame, role: str, method: str, setting: str) -> pd.Series[float]:
+    """Return a method's MSE on each fabric of a role that it covers."""
+    label = f"{method} {setting}".strip()
+    if label not in fabrics:
+        return pd.Series(dtype=float)
+    return fabrics.loc[fabrics["role"] == role, label].dropna()
+
+
+def _name_rows(axes: Axes, places: Mapping[tuple[str, str], float], above: float = 0.0) -> None:
+    """Label the rows; only the first of a method's rows has its name."""
+    labels, before = [], ""
+    for method, setting in places:
+        labels.append(display("", setting).removeprefix(", ") if method == before else display(method, setting))
+        before = method
+    axes.set_yticks(list(places.values()), labels)
+    axes.set_ylim(_height(places) - 0.4, -0.6 - above)
+    axes.tick_params(axis="y", length=0)
+
+
+def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: str, **bars: Any) -> None:
+    """Put a method's mark: filled where seen, open where unseen."""
+    face = colour if role == "seen" else "none"
+    axes.errorbar(
+        x, y, fmt=shape, markersize=7, color=colour, markerfacecolor=face, markeredgewidth=1.6, elinewidth=1.6, **bars
+    )
+
+
+def _bounds(value: float, low: float, high: float) -> list[list[float]]:
+    return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
+
+
+def _nanoseconds(value: float) -> str:
+    return f"{value:,.0f} ns" if value < 1e4 else f"{value / 1e3:,.1f} µs"

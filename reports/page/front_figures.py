@@ -1,0 +1,209 @@
+"""Plots of a fault against a cost, both logarithmic: every method's curve, and the front that nothing beats on both.
+
+A method's knobs are one curve, of which the first and the last are numbered, and so is the baseline. The broad band is
+the front. Where both are of the paper's comparison, an arrow is its own ratio, from our 2 points on: 4.1 times lower
+MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. What is 0 cannot be drawn.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+from reports.measure.by_size import SIZES
+from reports.page.style import NARROWEST, Scheme, new_figure
+from reports.tables.front import front
+from reports.tables.numbers import display, size
+from reports.tables.summary import PAPER, of_baseline, rows
+
+_ROLES: Final = ("seen", "unseen")
+_LEGEND_COLUMNS: Final = 5
+_TIME: Final = "time of a query, ns (one process, side by side)"
+
+
+def error_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw the colour's error against the time of a query, with the paper's step, from `tradeoff.tradeoff_table`."""
+    table = table.assign(x=table["ns"], y=table["error"])
+    return _by_role(scheme, table, _TIME, "relative RMSE of the colour", _percent, paper=True)
+
+
+def aliasing_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw the flicker's distance from the truth's against the time of a query, from `tradeoff.tradeoff_table`."""
+    table = table.assign(x=table["ns"], y=table["flicker"], front=table["front_flicker"])
+    return _by_role(scheme, table, _TIME, "flicker, distance from the truth’s", _plain)
+
+
+def error_against_bytes(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw the colour's error against what is stored for one fabric, from `tradeoff.tradeoff_table`."""
+    table = table.assign(x=table["bytes_stored"], y=table["error"], front=table["front_bytes"])
+    figure = _by_role(scheme, table, "bytes stored for one fabric", "relative RMSE of the colour", _percent)
+    for axes in figure.axes:
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: re.sub(r"\.0+ ", " ", size(value))))
+    return figure
+
+
+def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw error against time for each size of footprints: colour above, its specular part below.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `equal_time.size_table`.
+    """
+    table = table.rename(columns={"ns": "time", "size": "panel"})
+    panels = {size: f"sigma {size}" for size in SIZES if size in set(table["panel"])}
+    measures = {name: f"relative RMSE, {name}" for name in ("colour", "specular")}
+    return _against_time(scheme, table, panels, measures, "time of a query, ns", _percent)
+
+
+def scenes(scheme: Scheme, table: pd.DataFrame) -> Figure:
+    """Draw MSE, HDR-FLIP and the flicker's distance from the truth's against the time of a frame, a column a scene.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `summary.scene_table`.
+    """
+    table = table.rename(columns={"frame_time": "time", "scene": "panel"}).assign(distance=table["flicker"].abs())
+    panels = {name: name for name in dict.fromkeys(table["panel"])}
+    measures = {"mse": "MSE", "flip_hdr": "HDR-FLIP", "distance": "flicker, distance"}
+    return _against_time(scheme, table, panels, measures, "time of a frame, ms", _plain, paper="mse")
+
+
+def _by_role(
+    scheme: Scheme, table: pd.DataFrame, cost: str, fault: str, worded: Callable[[float], str], paper: bool = False
+) -> Figure:
+    """Draw `y` against `x` with the front of each role, a panel a role."""
+    table = table[(table["x"] > 0) & (table["y"] > 0)]
+    roles = [role for role in _ROLES if role in set(table["role"])]
+    colours = scheme.colours(table["method"])
+    paper = paper and bool(of_baseline(table).any())
+    height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
+    figure, panels = new_figure(max(4.9 * len(roles), NARROWEST), height, len(roles), sharey=True)
+    for axes, role in zip(panels, roles, strict=True):
+        found = table[table["role"] == role]
+        _band(axes, scheme, found[found["front"]].sort_values("x"))
+        for method, knobs in found.groupby("method", sort=False):
+            _knob_curve(axes, scheme, str(method), knobs, colours[str(method)], role)
+        for row in rows(found[of_baseline(found)]) if paper else ():
+            _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
+        axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
+        _name_faults(axes, worded)
+        axes.margins(0.12)
+    panels[0].set_ylabel(fault)
+    _legend(figure, scheme, colours, f"the paper: {math.sqrt(PAPER[0]):.1f}× lower" if paper else "")
+    return figure
+
+
+def _against_time(
+    scheme: Scheme,
+    table: pd.DataFrame,
+    panels: Mapping[str, str],
+    measures: Mapping[str, str],
+    axis: str,
+    worded: Callable[[float], str],
+    paper: str = "",
+) -> Figure:
+    """Draw measures (a line each) against `time` in panels (a column each); in that named `paper` the paper's step.
+
+    What has no point that can be drawn is left out.
+    """
+    table = table[(table["time"] > 0) & (table[[*measures]] > 0).any(axis=1)]
+    panels = {panel: title for panel, title in panels.items() if panel in set(table["panel"])}
+    measures = {name: label for name, label in measures.items() if (table[name] > 0).any()}
+    colours = scheme.colours(table["method"])
+    height = 0.6 + 2.4 * len(measures) + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
+    width = max(2.3 * len(panels), NARROWEST)
+    figure, flat = new_figure(width, height, len(panels), sharey=True, lines=len(measures))
+    grid = np.asarray(flat).reshape(len(measures), len(panels))
+    for place, ((measure, label), line) in enumerate(zip(measures.items(), grid, strict=True)):
+        for axes, (panel, title) in zip(line, panels.items(), strict=True):
+            found = table[(table["panel"] == panel) & (table[measure] > 0)]
+            found = found.assign(x=found["time"], y=found[measure])
+            best = np.array(front(list(zip(found["x"], found["y"], strict=True))), np.bool_)
+            _band(axes, scheme, found[best].sort_values("x"), 5.0)
+            for method, knobs in found.groupby("method", sort=False):
+                knobs = knobs.sort_values("x")
+                axes.plot(
+                    knobs["x"], knobs["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
+                    markersize=4.5, linewidth=1.1,
+                )  # fmt: skip
+            for row in rows(found[of_baseline(found)]) if measure == paper else ():
+                _paper_arrow(axes, scheme, (row.x, row.y), PAPER[0])
+            axes.set(xscale="log", yscale="log", title="" if place else title)
+            _name_faults(axes, worded, 8)
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        line[0].set_ylabel(label)
+    grid[-1, len(panels) // 2].set_xlabel(axis)
+    _legend(figure, scheme, colours, f"the paper: {PAPER[0]}× lower" if paper and of_baseline(table).any() else "")
+    return figure
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.3g} %"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.3g}".replace("e-0", "e−")
+
+
+def _name_faults(axes: Axes, worded: Callable[[float], str], most: int | None = None) -> None:
+    """Label the vertical axis at 1, 2 and 5 of every decade; at its powers alone where those are many."""
+    low, high = axes.get_ylim()
+    subs = (1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)
+    axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=most))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _legend(figure: Figure, scheme: Scheme, colours: Mapping[str, str], paper: str) -> None:
+    """Name the methods, once for all panels: names at the marks would cover each other."""
+    handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
+    if paper:
+        step = f"{paper} at {PAPER[1]}× the time"
+        handles.append(Line2D([], [], color=scheme.muted, linestyle=(0, (3, 2)), label=step))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
+
+
+def _band(axes: Axes, scheme: Scheme, best: pd.DataFrame, width: float = 7.0) -> None:
+    """Draw the front."""
+    axes.plot(best["x"], best["y"], color=scheme.line, linewidth=width, zorder=1, solid_capstyle="round")
+
+
+def _knob_curve(axes: Axes, scheme: Scheme, method: str, knobs: pd.DataFrame, colour: str, role: str) -> None:
+    """Draw a method's knobs as one curve; the first and the last are numbered, and so is the baseline."""
+    face = colour if role == "seen" else scheme.ground
+    axes.plot(
+        knobs["x"], knobs["y"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
+        markeredgewidth=1.6, linewidth=1.3, zorder=3,
+    )  # fmt: skip
+    ends = {knobs["setting"].iloc[0], knobs["setting"].iloc[-1]}
+    for row in rows(knobs[knobs["setting"].isin(ends) | of_baseline(knobs)]):
+        if row.setting:
+            axes.annotate(
+                row.setting.removeprefix("k = "), (row.x, row.y), xytext=(-7, -5), textcoords="offset points",
+                ha="right", va="top", fontsize=8, color=colour, zorder=4,
+                path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)],
+            )  # fmt: skip
+
+
+def _paper_arrow(axes: Axes, scheme: Scheme, start: tuple[float, float], lower: float) -> None:
+    """Draw what the paper's ratios would mean from here."""
+    time, fault = start
+    target = (time * PAPER[1], fault / lower)
+    axes.scatter(*target, alpha=0.0)  # an arrow alone does not widen the axes
+    axes.annotate(
+        "", target, xytext=(time, fault), zorder=5,
+        arrowprops={"arrowstyle": "-|>", "color": scheme.muted, "linestyle": (0, (3, 2)), "shrinkA": 6, "shrinkB": 0},
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Records condensed into tables and sentences: summary, front, trade-off, cells, wording."""

@@ -1,0 +1,292 @@
+"""Rows of the tables of methods, already worded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from reports.measure.extremes import FOOTPRINTS, error_name
+from reports.measure.memory import UNSURE
+from reports.record import TRUTH, Record
+from reports.tables.numbers import (
+    NO_BREAK,
+    NONE,
+    display,
+    fixed,
+    grouped,
+    interval,
+    missing,
+    percent,
+    plain,
+    scientific,
+    signed,
+    significant,
+    size,
+    times,
+)
+from reports.tables.summary import BASELINE, COMPONENTS, rows
+from reports.tables.wording import learnt
+
+Row = dict[str, Any]
+
+
+def groups(lines: Sequence[Row]) -> list[Row]:
+    """Gather rows of methods: each group is a method's name and its rows; a method with knobs has a head of its own."""
+    found: dict[str, list[Row]] = {}
+    for line in lines:
+        found.setdefault(line["method"], []).append(line)
+    return [
+        {"method": method, "label": display(method), "head": len(rows_) > 1, "rows": rows_}
+        for method, rows_ in found.items()
+    ]
+
+
+def row_of(method: str, setting: str) -> Row:
+    """Return what any row of a method says: whose it is, and both its names, whole and within its group."""
+    return {
+        "method": method,
+        "label": display(method, setting),
+        "setting": setting.replace(" ", NO_BREAK) or display(method),
+        "baseline": (method, setting) == BASELINE,
+    }
+
+
+def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, list[Row]]:
+    """Return the rows of the error table by role, in groups."""
+    result: dict[str, list[Row]] = {}
+    for row in rows(errors):
+        known = row.role == "unseen" and row.method in per_material
+        line = row_of(row.method, row.setting) | {
+            "cells": [
+                scientific(row.mse),
+                f"{scientific(row.low)} … {scientific(row.high)}",
+                percent(row.noise_share),
+                times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
+                interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
+                fixed(row.colour_rrmse),
+                *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
+            ],
+        }
+        line["label"] += " *" if known else ""
+        result.setdefault(row.role, []).append(line)
+    return {role: groups(lines) for role, lines in result.items()}
+
+
+def fabric_rows(table: pd.DataFrame) -> dict[str, Any]:
+    """Return the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked."""
+    labels = [column for column in table.columns if column not in ("role", "fabric")]
+    records = table.to_dict("records")
+    best = [min((r[label] for label in labels if not missing(r[label])), default=math.nan) for r in records]
+    lines = []
+    for label in labels:
+        values = [(record[label], lowest) for record, lowest in zip(records, best, strict=True)]
+        cells = [{"text": scientific(value), "best": value == lowest} for value, lowest in values]
+        lines.append(row_of(*_split(label)) | {"cells": cells})
+    fabrics = [{"title": plain(str(record["fabric"])), "role": record["role"]} for record in records]
+    return {"fabrics": fabrics, "groups": groups(lines)}
+
+
+FRONT: Final = ("ns a query", "error of the colour", "bytes stored")
+"""Columns of `front_rows` after the method."""
+
+
+def front_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
+    """Return what is on the front by role, the fastest first."""
+    result: dict[str, list[Row]] = {}
+    for row in rows(table[table["front"]].sort_values("ns", kind="stable") if len(table) else table):
+        cells = [f"{row.ns:,.0f}", percent(row.error, 2), size(row.bytes_stored)]
+        line = row_of(row.method, row.setting) | {"cells": cells}
+        result.setdefault(row.role, []).append(line)
+    return result
+
+
+def equal_time_rows(table: pd.DataFrame) -> dict[str, Row]:
+    """Return for each measure the names of the sizes, and a row a method and rival: its error, and the rival's over it.
+
+    A rival that has no setting as fast says so.
+    """
+    result: dict[str, Row] = {}
+    for measure, group in table.groupby("measure", sort=False) if len(table) else ():
+        sizes, lines = list(dict.fromkeys(group["size"])), []
+        for (method, setting, rival), found in group.groupby(["method", "setting", "rival"], sort=False):
+            by_size = {row.size: row for row in rows(found)}
+            cells = []
+            for row in (by_size[name] for name in sizes):
+                other = times(row.ratio) if math.isfinite(row.rival_error) else "too slow"
+                cells.append({"text": f"{percent(row.error)} · {other}", "beaten": row.ratio < 1.0})
+            lines.append(row_of(str(method), str(setting)) | {"rival": display(str(rival)), "cells": cells})
+        result[str(measure)] = {"sizes": sizes, "rows": lines}
+    return result
+
+
+def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str, Any]:
+    """Return the rows of the aliasing table in groups, and the variance that the motion itself brings."""
+    motion = [record.value for record in records if record.metric == "motion"]
+    roles = list(dict.fromkeys(aliasing["role"])) if len(aliasing) else []
+    found: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for row in rows(aliasing):
+        found.setdefault((row.method, row.setting), {})[row.role] = [signed(row.flicker), signed(row.excess_energy)]
+    lines = [
+        row_of(*key) | {"cells": [text for role in roles for text in by_role.get(role, [NONE, NONE])]}
+        for key, by_role in found.items()
+    ]
+    return {
+        "groups": groups(lines),
+        "roles": roles,
+        "motion": scientific(float(np.mean(motion))) if motion else NONE,
+    }
+
+
+ENERGY: Final = ("diffuse, k_d = 1", "specular, k_s = 1", "in its own colours", "MSE, seen", "ns a query")
+"""Columns of `energy_rows` after the method."""
+
+
+def energy_rows(energy: pd.DataFrame, errors: pd.DataFrame, timing: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of energies, in groups; what sends back more than arrives is marked."""
+    lines = []
+    for row in rows(energy):
+        albedos = (row.diffuse, row.specular, row.colour)
+        cells = [f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in albedos]
+        mse = _number(errors[errors["role"] == "seen"] if len(errors) else errors, row, "mse")
+        lines.append(
+            row_of(row.method, row.setting)
+            | {"cells": [*cells, scientific(mse), grouped(_number(timing, row, "median_ns"))]}
+        )
+    return groups(lines)
+
+
+def _number(table: pd.DataFrame, row: Any, column: str) -> float:
+    """Return a column of the row of the same method and setting in another table; NaN if there is none."""
+    if table.empty:
+        return math.nan
+    found = table[(table["method"] == row.method) & (table["setting"] == row.setting)][column]
+    return float(found.iloc[0]) if len(found) else math.nan
+
+
+SILHOUETTE: Final = ("coverage, RMSE", "edge too far out, yarn spacings", "light, RMSE", "fabrics")
+"""Columns of `silhouette_rows` after the method."""
+
+
+def silhouette_rows(table: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of silhouettes, in groups."""
+    lines = []
+    for row in rows(table):
+        cells = [fixed(row.coverage), f"{row.displacement:+.4f}".replace("-", "−"), fixed(row.light), f"{row.fabrics}"]
+        lines.append(row_of(row.method, row.setting) | {"cells": cells})
+    return groups(lines)
+
+
+def timing_columns(timing: pd.DataFrame) -> list[str]:
+    """Return the columns of `timing_rows` after the method."""
+    fewest, most = (timing[name].max() if len(timing) else math.nan for name in ("threads", "most_threads"))
+    few = f", {fewest:.0f} threads" if fewest > 1 else ""
+    many = f", {most:.0f} threads" if most > 1 else ", more threads"
+    names = [f"ns a query{few}", "quartiles", "× time", f"ms a frame{few}", f"ns a query{many}", f"ms a frame{many}"]
+    return [*names, "ms to add a fabric", "memory of a call", "bytes stored"]
+
+
+def timing_rows(timing: pd.DataFrame) -> list[Row]:
+    """Return the rows of the timing table, in groups."""
+    return groups(
+        [
+            row_of(row.method, row.setting)
+            | {
+                "cells": [
+                    f"{row.median_ns:,.0f}",
+                    f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}",
+                    times(row.time_ratio),
+                    significant(row.frame_ms),
+                    significant(row.most_threads_ns),
+                    significant(row.most_threads_frame_ms),
+                    significant(row.prepare_ms),
+                    size(row.memory) if not row.memory < UNSURE else "below " + size(UNSURE),
+                    NONE if row.method == TRUTH else size(row.bytes_stored),
+                ],
+            }
+            for row in rows(timing)
+        ]
+    )
+
+
+def figures_of_merit(
+    records: Sequence[Record],
+    errors: pd.DataFrame,
+    timing: pd.DataFrame,
+    untrained: Collection[str] = (BASELINE[0],),
+) -> list[Row]:
+    """Return the few numbers at the head of the page, of the first learnt method and of the truth."""
+    result = []
+    methods = learnt(errors, untrained) if len(errors) else []
+    if methods:
+        method, setting = methods[0]
+        for row in rows(errors[(errors["method"] == method) & (errors["setting"] == setting)]):
+            if not missing(row.ratio):
+                fabrics = "fabric" if row.fabrics == 1 else "fabrics"
+                note = f"MSE of 2 points over that of {display(method, setting)}, {row.fabrics} {row.role} {fabrics}"
+                result.append({"value": times(row.ratio), "note": note, "paper": "paper: 4.1×"})
+        cost = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
+        if len(cost) and not missing(cost.iloc[0]):
+            note = f"time of a query of {display(method, setting)} over that of 2 points"
+            result.append({"value": times(float(cost.iloc[0])), "note": note, "paper": "paper: 0.83×"})
+    truth = [record.value for record in records if record.metric == "truth_relative_error"]
+    if truth:
+        note = "relative standard error of the truth: median over queries, mean over fabrics"
+        result.append({"value": percent(float(np.mean(truth)), 2), "note": note, "paper": ""})
+    return result
+
+
+EXTREMES: Final = (
+    *(f"σ {size:g}" for size in FOOTPRINTS),
+    "89.9°",
+    "α = .01",
+    "from fp32",
+    "far",
+    "1e4 − 1e2",
+    "NaN, ∞",
+    "below 0",
+)
+"""Columns of `extreme_rows` after the method."""
+
+
+def extreme_rows(table: pd.DataFrame) -> list[Row]:
+    """Return the rows of the table of methods at their extremes, in groups; what none may answer is marked."""
+    lines = []
+    for row in rows(table):
+        errors = [percent(getattr(row, name)) for name in map(error_name, FOOTPRINTS)]
+        errors += [percent(row.grazing), percent(row.lustrous)]
+        others = [NONE if missing(x) else "0" if x == 0 else f"{x:.1e}" for x in (row.rounding, row.far, row.large)]
+        wrong = [f"{count} of {row.asked} ✗" if count else "0" for count in (row.not_finite, row.negative)]
+        lines.append(row_of(row.method, row.setting) | {"cells": [*errors, *others, *wrong]})
+    return groups(lines)
+
+
+def path_rows(table: pd.DataFrame) -> list[list[str]]:
+    """Return the rows of the table of what lies between: method, path, way, then the error at every share of it."""
+    lines: dict[tuple[str, ...], list[str]] = {}
+    for row in rows(table):
+        path = f"{plain(row.fabric)} → {plain(row.to)}"
+        lines.setdefault((display(row.method, row.setting), path, row.how), []).append(percent(row.error))
+    return [[*key, *errors] for key, errors in lines.items()]
+
+
+def edit_rows(records: Sequence[Record]) -> list[list[str]]:
+    """Return the rows of the table of edits: method, what is edited, median time, quartiles."""
+    return [
+        [
+            display(record.method, record.setting),
+            record.note,
+            f"{record.value:.3g} {record.unit}",
+            f"{record.low:.3g} … {record.high:.3g}" if record.low is not None and record.high is not None else NONE,
+        ]
+        for record in records
+        if record.metric == "encode_time"
+    ]
+
+
+def _split(label: str) -> tuple[str, str]:
+    method, _, setting = label.partition(" ")
+    return method, setting

@@ -1,0 +1,171 @@
+"""Which differences between two benchmarks are real.
+
+Times are compared by their raw samples with the test of Mann and Whitney [Mann1947Test]: no distribution is assumed,
+and a few slow calls do not matter. It takes readings to be independent; what was different on the machine while the two
+benchmarks ran, its clock or other work, is a difference too: under changing load the same code was marked 1.4 times
+slower than itself, so that two runs of A belong before one of B (how busy the machine was stands beside the times:
+`reports.tables.waiting`). Mean squared errors are compared by
+z = (b - a) / sqrt(s_a^2 + s_b^2) with their standard errors; where both were measured on the same queries these are not
+independent, and the test is the stricter for it. All p-values of a comparison are corrected together
+[Holm1979Simple]: the chance that the readings' own scatter marks any difference is at most `LEVEL`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from scipy import stats
+
+from reports.record import Machine, Metric, Record
+from weaves.errors import BadInput
+
+LEVEL: Final = 0.05
+"""Chance that a comparison marks any difference where there is none."""
+
+TIMES: Final[tuple[Metric, ...]] = ("time", "prepare_time", "encode_time")
+"""Metrics that are compared by their samples."""
+
+Verdict = Literal["faster", "slower", "lower", "higher", "no difference shown", "not tested"]
+
+_Key = tuple[Metric, str, str, str, int, str]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One measurement in both benchmarks."""
+
+    a: Record
+    b: Record
+    sign: float
+    """Above 0 if B is the larger: by ranks for times."""
+    p: float
+    """Probability of a difference at least as large by chance, corrected for all rows; NaN if it cannot be tested."""
+
+    @property
+    def ratio(self) -> float:
+        """B over A; NaN where A is not positive."""
+        return self.b.value / self.a.value if self.a.value > 0 else math.nan
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is shown of B, held against A."""
+        if math.isnan(self.p):
+            return "not tested"
+        if self.p > LEVEL:
+            return "no difference shown"
+        words: tuple[Verdict, Verdict] = ("faster", "slower") if self.a.metric in TIMES else ("lower", "higher")
+        return words[self.sign > 0]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All that two benchmarks share, and what they do not."""
+
+    times: list[Difference]
+    errors: list[Difference]
+    only_a: int
+    """Measurements that A alone has, of those that can be compared."""
+    only_b: int
+    unlike: list[str]
+    """What else differs, of which the numbers may speak: data sets, versions."""
+
+
+def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[str]:
+    """Refuse measurements of different machines, or say in a sentence what differs if they are allowed.
+
+    Raises
+    ------
+    BadInput
+        Naming the first thing that differs.
+    """
+    for name in ("cpu", "cores", "threads"):
+        first, second = getattr(a, name), getattr(b, name)
+        if first != second and not allow:
+            allowed = f"A was measured with {first!r}; times of two machines are compared with --other-machine only"
+            raise BadInput("compare", f"{name} of B", second, allowed)
+        if first != second:
+            return [f"A and B were measured on different machines: {name} {first} and {second}"]
+    return []
+
+
+def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
+    """Compare two benchmarks, measurement by measurement.
+
+    Parameters
+    ----------
+    a, b : sequence of Record
+        Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times
+        (`TIMES`) and the MSE on held-out queries. Of several that are alike the last counts.
+
+    Raises
+    ------
+    BadInput
+        If they share none.
+    """
+    first, second = _comparable(a), _comparable(b)
+    shared = [key for key in first if key in second]
+    if not shared:
+        raise BadInput("compare", "", "A and B share no measurement", "times or errors of the same methods are needed")
+    found = [Difference(first[key], second[key], *_test(first[key], second[key])) for key in shared]
+    adjusted = holm([one.p for one in found])
+    found = [replace(one, p=p) for one, p in zip(found, adjusted, strict=True)]
+    return Comparison(
+        [one for one in found if one.a.metric in TIMES],
+        [one for one in found if one.a.metric not in TIMES],
+        len(first) - len(shared),
+        len(second) - len(shared),
+        _unlike(found),
+    )
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Return p-values corrected for their number, so that the least is multiplied by it, the next by one less.
+
+    p'_(i) = max over j <= i of min(1, (m - j + 1) p_(j)) [Holm1979Simple]; NaN stays NaN and does not count.
+    """
+    order = sorted((index for index, p in enumerate(p_values) if not math.isnan(p)), key=lambda index: p_values[index])
+    result, largest = [math.nan] * len(p_values), 0.0
+    for rank, index in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - rank) * p_values[index]))
+        result[index] = largest
+    return result
+
+
+def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
+    """Return times and errors by what they are of."""
+    chosen = (one for one in records if one.metric in TIMES or (one.metric == "mse" and one.scene == "queries"))
+    return {_key(one): one for one in chosen}
+
+
+def _key(one: Record) -> _Key:
+    edit = one.note if one.metric == "encode_time" else ""
+    return one.metric, one.method, one.setting, one.fabric, one.threads, edit
+
+
+def _test(a: Record, b: Record) -> tuple[float, float]:
+    """Return which is larger, and the two-sided p-value: NaN without samples or standard errors."""
+    gap = b.value - a.value
+    if a.metric in TIMES:
+        if not a.samples or not b.samples:
+            return gap, math.nan
+        found = stats.mannwhitneyu(b.samples, a.samples, alternative="two-sided")
+        return float(found.statistic) - 0.5 * len(a.samples) * len(b.samples), float(found.pvalue)
+    if a.standard_error is None or b.standard_error is None:
+        return gap, math.nan
+    spread = math.hypot(a.standard_error, b.standard_error)
+    return gap, float(2.0 * stats.norm.sf(abs(gap) / spread)) if spread else float(gap == 0)
+
+
+def _unlike(found: Sequence[Difference]) -> list[str]:
+    """Say in which respects the two benchmarks did not measure the same."""
+    sentences = []
+    if any(one.a.provenance.dataset != one.b.provenance.dataset for one in found):
+        sentences.append("A and B were measured on different data sets")
+    if any(one.a.provenance.version != one.b.provenance.version for one in found):
+        sentences.append("A and B were measured by different versions of the benchmark")
+    if methods := [one.a.method for one in found if one.a.metric == "time" and one.a.note != one.b.note]:
+        sentences.append(f"calls of different sizes were timed: {', '.join(dict.fromkeys(methods))}")
+    return sentences

@@ -1,0 +1,108 @@
+"""Numbers and names as the page and the terminal print them; what was not measured is a dash."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Final
+
+NONE = "–"
+
+NO_BREAK: Final = "\N{NO-BREAK SPACE}"
+
+NAMES: Final = {
+    "neumip": "NeuMIP",
+    "point_sampled": "points",
+    "r2_points": "R2 points",
+    "unified_btf": "unified BTF",
+    "btf_autoencoder": "BTF autoencoder",
+    "curved_grazing": "curved, grazing",
+}
+"""What a person calls a method, where its name with spaces is not it."""
+
+
+def plain(name: str) -> str:
+    """Return a fabric's name as words: ``wool gabardine``, ``twill 4/4``."""
+    return re.sub(r"(?<=\d)_(?=\d)", "/", name).replace("_", " ")
+
+
+def display(method: str, setting: str = "") -> str:
+    """Return what a person calls a method."""
+    name = NAMES.get(method, method.replace("_", " "))
+    return f"{name}, {setting.replace(' ', NO_BREAK)}" if setting else name
+
+
+def scientific(value: float | None) -> str:
+    """Return ``2.62e-3``."""
+    if missing(value):
+        return NONE
+    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    return f"{mantissa}e{int(exponent)}".replace("-", "−")
+
+
+def beyond_noise(value: float, worded: Callable[[float], str]) -> str:
+    """Return an error in words, or that nothing of it is left after the noise of the truth was subtracted."""
+    return "in the noise" if value <= 0 else worded(value)
+
+
+def scientific_interval(low: float, high: float) -> str:
+    """Return both ends in the power of ten of the larger: ``(1.97 … 2.73)e-2``."""
+    exponent = int(f"{max(low, high, key=abs):e}".partition("e")[2])
+    ends = (f"{end / 10.0**exponent:.2f}" for end in (low, high))
+    return f"({' … '.join(ends)})e{exponent}".replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """Return a number with its sign; 0 has none."""
+    return NONE if missing(value) else ("+" if value > 0 else "") + scientific(value)
+
+
+def times(value: float) -> str:
+    """Return ``4.1×``."""
+    return NONE if missing(value) else f"{value:.2g}×" if value < 10 else f"{value:,.0f}×"
+
+
+def significant(value: float) -> str:
+    """Return a number with three digits or all those before the point: ``1,696``, ``12.3``, ``.0456``."""
+    if missing(value):
+        return NONE
+    digits = max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
+    return re.sub(r"^0(?=\.)", "", f"{value:,.{digits}f}")
+
+
+def percent(value: float, digits: int = 1) -> str:
+    """Return ``1.5 %``."""
+    return NONE if missing(value) else f"{100 * value:.{digits}f} %"
+
+
+def grouped(value: float) -> str:
+    """Return ``1,696``."""
+    return NONE if missing(value) else f"{value:,.0f}"
+
+
+def fixed_to(value: float, digits: int) -> str:
+    """Return ``31.4``."""
+    return NONE if missing(value) else f"{value:,.{digits}f}"
+
+
+def fixed(value: float) -> str:
+    """Return ``.123``."""
+    return NONE if missing(value) else f"{value:.3f}".removeprefix("0")
+
+
+def size(value: float) -> str:
+    """Return bytes in the unit that suits them."""
+    if missing(value):
+        return NONE
+    return f"{value:,.0f} B" if value < 1e3 else f"{value / 1e3:,.1f} kB" if value < 1e6 else f"{value / 1e6:,.2f} MB"
+
+
+def interval(low: float, high: float) -> str:
+    """Return both ends with two digits: ``1.2 … 3.4``."""
+    return NONE if missing(low) else " … ".join(f"{v:.2g}" if v < 100 else f"{v:,.0f}" for v in (low, high))
+
+
+def missing(value: float | None) -> bool:
+    """Say whether there is no finite number."""
+    return value is None or not math.isfinite(value)

@@ -1,0 +1,96 @@
+"""Rows of the tables of scenes: a number, its 95 % interval beneath, and last what the truth's noise alone scores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import pandas as pd
+
+from reports.tables.cells import Row, groups, row_of
+from reports.tables.numbers import (
+    NO_BREAK,
+    NONE,
+    beyond_noise,
+    fixed,
+    fixed_to,
+    missing,
+    percent,
+    scientific,
+    scientific_interval,
+    signed,
+    significant,
+    times,
+)
+from reports.tables.summary import rows
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table of a scene."""
+
+    title: str
+    metric: str
+    """Column of `summary.scene_table`."""
+    worded: Callable[[float], str]
+    floor: str = ""
+    """Column of what the truth's noise alone scores."""
+    in_powers: bool = False
+    """Whether intervals are in powers of ten."""
+
+    def interval(self, low: float, high: float) -> str:
+        """Return an interval in words; empty where there is none."""
+        if missing(low) or missing(high):
+            return ""
+        if self.in_powers:
+            return scientific_interval(low, high)
+        return " … ".join("0" if end <= 0 else self.worded(end).removesuffix(" %") for end in (low, high))
+
+
+COLUMNS: Final = (
+    Column("colour", "colour_rrmse", lambda value: beyond_noise(value, percent)),
+    Column("MSE", "mse", lambda value: beyond_noise(value, scientific), "truth_noise", in_powers=True),
+    Column(f"×{NO_BREAK}lower", "ratio", times),
+    Column("PSNR, dB", "psnr", lambda value: fixed_to(value, 1), "psnr_floor"),
+    Column("SSIM", "ssim", fixed, "ssim_floor"),
+    Column("FLIP", "flip_ldr", fixed, "flip_ldr_floor"),
+    Column("HDR-FLIP", "flip_hdr", fixed, "flip_hdr_floor"),
+    Column("ΔE", "delta_e", lambda value: fixed_to(value, 2), "delta_e_floor"),
+    Column("flicker", "flicker", signed, in_powers=True),
+    Column("excess energy", "excess_energy", signed),
+    Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
+    Column("not its own", "fallback_share", lambda value: percent(value, 0)),
+    Column("ms a frame", "frame_time", significant),
+)
+"""All that there may be; `scene_columns` says which are shown."""
+
+
+def scene_columns(table: pd.DataFrame) -> list[Column]:
+    """Return the columns of `scene_rows`: those of `COLUMNS` but FovVideoVDP where nobody measured it."""
+    return [column for column in COLUMNS if column.metric != "fovvideovdp" or table[column.metric].notna().any()]
+
+
+def scene_rows(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Return for each scene the rows of its table, in groups, and the row of the truth's noise.
+
+    Times on the front of MSE and time are marked.
+    """
+    columns, result = scene_columns(table), {}
+    for scene, group in table.groupby("scene", sort=False) if len(table) else ():
+        lines: list[Row] = []
+        for row in rows(group):
+            cells = [_cell(row, column) for column in columns]
+            cells[-1]["best"] = bool(row.front)
+            lines.append(row_of(row.method, row.setting) | {"cells": cells})
+        noise = [column.worded(group[column.floor].mean()) if column.floor else NONE for column in columns]
+        result[str(scene)] = {"groups": groups(lines), "noise": noise}
+    return result
+
+
+def _cell(row: Any, column: Column) -> Row:
+    """Return a number and its interval, which is empty where there is none."""
+    low, high = (getattr(row, f"{column.metric}_{end}", math.nan) for end in ("low", "high"))
+    text = column.worded(getattr(row, column.metric))
+    return {"text": text, "interval": column.interval(low, high), "best": False}

@@ -1,0 +1,284 @@
+"""Records condensed: one row a method, over all fabrics of a role.
+
+Means over fabrics weigh every fabric alike, as one picture of all of them would. A ratio compares a method with point
+sampling at 2 points on the very fabrics that the method covers; its interval is that of
+`reports.error.ratio`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from reports.error import ratio
+from reports.record import TRUTH, Metric, Record, to_table
+from reports.tables.front import front
+
+BASELINE: Final = ("point_sampled", "k = 2")
+"""Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
+
+PAPER: Final = (4.1, 0.83)
+"""How much lower the published network's MSE is, and its time relative to the baseline's [Chen2024Woven]."""
+
+FRAME: Final = 1920 * 1080
+"""Queries of a frame, one a pixel."""
+
+COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
+
+_KEYS: Final = ["method", "setting"]
+
+
+def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
+    """Say which rows of a table with `method` and `setting` are the baseline's."""
+    return (table["method"] == BASELINE[0]) & (table["setting"] == BASELINE[1])
+
+
+def error_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return errors on held-out queries, one row a method and role.
+
+    Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
+    mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
+    over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics).
+    """
+    wide = _wide(records, "queries")
+    result = []
+    for (method, setting, role), group in wide.groupby([*_KEYS, "role"], sort=False):
+        mse, spread = _mean_error(group)
+        base, base_spread = _mean_error(_baseline(wide, role, set(group["fabric"])))
+        found = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
+        row = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
+        row |= {"queries": int(group["count"].sum()), "mse": mse, "standard_error": spread}
+        row |= {"low": mse - 1.96 * spread, "high": mse + 1.96 * spread}
+        measured, noise = (float(group[name].mean()) for name in ("mse_measured", "truth_noise"))
+        row |= {"mse_measured": measured, "truth_noise": noise}
+        row["noise_share"] = noise / measured if measured > 0 else math.nan
+        row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
+        relative = ["zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+        row |= {name: group[name].mean() if name in group else math.nan for name in relative}
+        result.append(row)
+    return pd.DataFrame(result)
+
+
+def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the MSE on held-out queries, one row a fabric and one column a method (``method setting``)."""
+    table = to_table(records)
+    table = table[(table["metric"] == "mse") & (table["scene"] == "queries")]
+    labels = (table["method"] + " " + table["setting"]).str.strip()
+    wide = table.assign(label=labels).pivot(index=["role", "fabric"], columns="label", values="value")
+    order = list(dict.fromkeys(labels))
+    keys = list(dict.fromkeys(zip(table["role"], table["fabric"], strict=True)))
+    return wide.reindex(index=keys, columns=order).reset_index().rename_axis(columns=None)
+
+
+def picture_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the MSE of the pictures: columns method, setting, fabric, scene, mse, mse_measured, truth_noise."""
+    columns = [*_KEYS, "role", "fabric", "scene", "mse", "mse_measured", "truth_noise"]
+    found = [part for part in (_wide(records, scene) for scene in ("sphere", "plane")) if "mse" in part]
+    if not found:
+        return pd.DataFrame(columns=columns)
+    return pd.concat([part[part["mse"].notna()] for part in found], ignore_index=True).reindex(columns=columns)
+
+
+def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return flicker and excess energy: one row a method and role, means over fabrics, and over how many."""
+    wide = _wide(records, "plane")
+    if "flicker" not in wide:
+        return pd.DataFrame(columns=[*_KEYS, "role", "fabrics", "flicker", "excess_energy"])
+    wide = wide[wide["flicker"].notna()]
+    groups = wide.groupby([*_KEYS, "role"], sort=False)
+    table = groups.agg(fabrics=("fabric", "size"), flicker=("flicker", "mean"), excess_energy=("excess_energy", "mean"))
+    return table.reset_index()
+
+
+SCENE_METRICS: Final[tuple[Metric, ...]] = (
+    "mse",
+    "mse_relative",
+    "psnr",
+    "ssim",
+    "flip_ldr",
+    "flip_hdr",
+    "delta_e",
+    "flicker",
+    "excess_energy",
+    "fallback_share",
+    "frame_time",
+    "colour_rrmse",
+    "fovvideovdp",
+)
+"""What is measured of every method on a scene."""
+
+SCENE_FLOORS: Final[tuple[Metric, ...]] = (
+    "truth_noise",
+    "mse_relative_floor",
+    "psnr_floor",
+    "ssim_floor",
+    "flip_ldr_floor",
+    "flip_hdr_floor",
+    "delta_e_floor",
+)
+"""What the truth's noise alone scores on a scene (`reports.measure.scene.image_error`); the same for every method."""
+
+SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
+    "mse",
+    "mse_relative",
+    "psnr",
+    "ssim",
+    "flip_ldr",
+    "flip_hdr",
+    "delta_e",
+    "flicker",
+    "colour_rrmse",
+)
+"""Which of `SCENE_METRICS` have a 95 % interval."""
+
+
+def scene_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the benchmark's scenes, one row a scene, method and setting.
+
+    Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms, its quartiles in the Records) and
+    `SCENE_FLOORS`; of each of `SCENE_INTERVALS` the ends of its 95 % interval, <metric>_low and <metric>_high; ratio
+    (MSE of 2 points over the method's); front (nothing beats it on both MSE and time in its scene). An MSE that is not
+    above 0, lost in the noise of the truth, has no ratio and is on no front.
+    """
+    table = to_table(records)
+    metrics = [*SCENE_METRICS, *SCENE_FLOORS]
+    table = table[(table["fabric"] == "") & (table["scene"] != "") & table["metric"].isin(metrics)]
+    keys, ends = ["scene", *_KEYS], [f"{name}_{end}" for name in SCENE_INTERVALS for end in ("low", "high")]
+    if table.empty:
+        return pd.DataFrame(columns=[*keys, *metrics, *ends, "ratio", "front"])
+    wide = table[keys].drop_duplicates()
+    for column, names in (("value", metrics), ("low", SCENE_INTERVALS), ("high", SCENE_INTERVALS)):
+        part = table.pivot(index=keys, columns="metric", values=column).reindex(columns=list(names))
+        part = part if column == "value" else part.add_suffix(f"_{column}")
+        wide = wide.merge(part.reset_index(), on=keys)
+    wide = wide[[*keys, *metrics, *ends]]
+    base = wide[of_baseline(wide)].set_index("scene")["mse"]
+    found = wide["mse"].where(wide["mse"] > 0)
+    wide["ratio"] = wide["scene"].map(base) / found
+    wide["front"] = False
+    for _, group in wide.groupby("scene"):
+        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], found[group.index], strict=True)))
+    return wide.rename_axis(columns=None)
+
+
+def energy_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the worst furnace figures over all fabrics, one row a method: diffuse, specular, colour, fabrics."""
+    wide = _wide(records, "queries")
+    names = [name for name in wide.columns if str(name).startswith("furnace_")]
+    if not names:
+        return pd.DataFrame(columns=[*_KEYS, "diffuse", "specular", "colour", "fabrics"])
+    groups = wide[wide[names[0]].notna()].groupby(_KEYS, sort=False)
+    worst = {name: (f"furnace_{name}", "max") for name in ("diffuse", "specular", "colour")}
+    return groups.agg(**worst, fabrics=("fabric", "size")).reset_index()
+
+
+def path_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return errors between fabrics, one row a share of a path: method, setting, fabric, to, how, share, error."""
+    ways = {"path_error": "latents blended", "reencode_error": "encoded anew"}
+    lines = [
+        (record.method, record.setting, record.fabric, record.note, ways[record.metric], share, error)
+        for record in records
+        if record.metric in ways
+        for share, error in record.curve
+    ]
+    return pd.DataFrame(lines, columns=[*_KEYS, "fabric", "to", "how", "share", "error"])
+
+
+def timing_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return what answers cost, one row a method.
+
+    Columns: method, setting; on the fewest threads that were timed median_ns, first_quartile_ns, third_quartile_ns (a
+    query), repeats, threads and frame_ms; on the most, where those are more, most_threads, most_threads_ns and
+    most_threads_frame_ms; bytes_stored, memory (bytes a call adds), prepare_ms; time_ratio, the time over that of 2
+    points. A frame is 1920 × 1080 queries.
+    """
+    table = to_table(records)
+    times = table[table["metric"] == "time"]
+    threads = times.groupby(_KEYS, sort=False)["threads"]
+    fewest, most = threads.transform("min"), threads.transform("max")
+    names = {"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
+    result = times[times["threads"] == fewest].rename(columns=names).set_index(_KEYS)[[*names.values(), "threads"]]
+    more = times[(times["threads"] == most) & (most > fewest)].set_index(_KEYS)[["threads", "value"]]
+    result = result.join(more.set_axis(["most_threads", "most_threads_ns"], axis=1))
+    result["frame_ms"] = result["median_ns"] * FRAME / 1e6
+    result["most_threads_frame_ms"] = result["most_threads_ns"] * FRAME / 1e6
+    for metric, name in (("bytes_stored", "bytes_stored"), ("peak_memory", "memory"), ("prepare_time", "prepare_ms")):
+        result = result.join(table[table["metric"] == metric].set_index(_KEYS)["value"].rename(name))
+    result = result.reset_index()
+    base = result.loc[of_baseline(result), "median_ns"]
+    result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
+    return result
+
+
+def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float, float]]]:
+    """Return the power spectrum of each method and of the truth, averaged over fabrics."""
+    curves: dict[tuple[str, str], list[np.ndarray[tuple[int, int], np.dtype[np.float64]]]] = {}
+    for record in records:
+        if record.metric == "spectrum":
+            curves.setdefault((record.method, record.setting), []).append(np.array(record.curve))
+    return {
+        key: [(float(k), float(p)) for k, p in np.mean(found, axis=0)]
+        for key, found in curves.items()
+        if len({len(curve) for curve in found}) == 1
+    }
+
+
+def summary_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the whole benchmark as one row a method, for the terminal.
+
+    Index: method and setting. Columns, where measured: MSE and ratio to 2 points on seen and unseen fabrics, flicker,
+    nanoseconds a query and their ratio to 2 points, bytes stored.
+    """
+    parts = []
+    errors = error_table(records)
+    for role in ("seen", "unseen"):
+        part = errors[errors["role"] == role].set_index(_KEYS)[["mse", "ratio"]] if len(errors) else pd.DataFrame()
+        if len(part):
+            parts.append(part.rename(columns={"mse": f"MSE {role}", "ratio": f"× lower, {role}"}))
+    aliasing = aliasing_table(records)
+    if len(aliasing):
+        parts.append(aliasing.groupby(_KEYS, sort=False)[["flicker"]].mean())
+    timing = timing_table(records)
+    timing = timing[timing["method"] != TRUTH]
+    if len(timing):
+        columns = {"median_ns": "ns/query", "time_ratio": "× time", "bytes_stored": "bytes"}
+        parts.append(timing.set_index(_KEYS)[list(columns)].rename(columns=columns))
+    return pd.concat(parts, axis=1) if parts else pd.DataFrame()
+
+
+def rows(table: pd.DataFrame) -> Iterator[Any]:
+    """Iterate over the rows of a table as tuples named by its columns."""
+    return iter(table.itertuples())
+
+
+def _wide(records: Sequence[Record], scene: str) -> pd.DataFrame:
+    """Return one row a method and fabric with a column for each metric of a scene; the truth's own left out."""
+    table = to_table(records)
+    table = table[(table["scene"] == scene) & (table["method"] != TRUTH) & (table["fabric"] != "")]
+    index = [*_KEYS, "role", "fabric", "scene"]
+    if table.empty:
+        return pd.DataFrame(columns=[*index, "count", "mse_error"])
+    order = list(dict.fromkeys(table[index].itertuples(index=False, name=None)))
+    wide = table.pivot(index=index, columns="metric", values="value").reindex(order)
+    mse = table[table["metric"] == "mse"].set_index(index)
+    wide["count"] = mse["count"]
+    wide["mse_error"] = mse["standard_error"]
+    return wide.reset_index().rename_axis(columns=None)
+
+
+def _mean_error(group: pd.DataFrame) -> tuple[float, float]:
+    """Return the mean MSE over fabrics and its standard error, that of independent queries a fabric."""
+    if group.empty:
+        return math.nan, math.nan
+    errors = group["mse_error"].fillna(0.0).to_numpy(dtype=np.float64)
+    return float(group["mse"].mean()), float(np.sqrt(np.square(errors).sum()) / len(group))
+
+
+def _baseline(wide: pd.DataFrame, role: object, fabrics: set[str]) -> pd.DataFrame:
+    """Return the baseline's rows; empty unless it was measured on every one of the fabrics."""
+    rows = wide[of_baseline(wide) & (wide["role"] == role) & wide["fabric"].isin(fabrics)]
+    return rows if set(rows["fabric"]) == fabrics else rows.iloc[:0]

@@ -1,0 +1,71 @@
+"""What is bought with time and with bytes: which methods nothing beats on both, and the cheapest within a limit."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import pandas as pd
+
+from reports.record import TRUTH
+from reports.tables.front import front
+
+LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
+"""Errors that the page names the cheapest method for."""
+
+FLICKER_LIMITS: Final = (0.1, 0.01, 0.001)
+"""Distances of the flicker from the truth's that the page names the cheapest method for."""
+
+COLUMNS: Final = (
+    "role",
+    "method",
+    "setting",
+    "fabrics",
+    "ns",
+    "error",
+    "bytes_stored",
+    "flicker",
+    "front",
+    "front_flicker",
+    "front_bytes",
+)
+
+
+def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.DataFrame | None = None) -> pd.DataFrame:
+    """Return cost and faults of every method that answers for all fabrics of a role, and which fronts it is on.
+
+    Parameters
+    ----------
+    errors, timing, aliasing : DataFrame
+        From `summary.error_table`, `summary.timing_table` and `summary.aliasing_table`.
+
+    Returns
+    -------
+    DataFrame
+        Columns: role, method, setting, fabrics; ns (median, a query), error (relative RMSE of the colour, mean over
+        fabrics; NaN where it is lost in the noise of the truth), bytes_stored, flicker (distance from the truth's);
+        front (of error and time), front_flicker (of flicker and time), front_bytes (of error and bytes).
+    """
+    if errors.empty or timing.empty:
+        return pd.DataFrame(columns=[*COLUMNS])
+    timing = timing[timing["method"] != TRUTH]
+    keys = ["method", "setting", "role"]
+    moving = aliasing if aliasing is not None and len(aliasing) else pd.DataFrame(columns=[*keys, "flicker"])
+    parts: list[pd.DataFrame] = []
+    for _, group in errors.groupby("role", sort=False):
+        whole = group[group["fabrics"] == group["fabrics"].max()]
+        found = whole.merge(timing, on=["method", "setting"]).merge(moving[[*keys, "flicker"]], on=keys, how="left")
+        found = found.rename(columns={"median_ns": "ns", "colour_rrmse": "error"})
+        found["error"] = found["error"].where(found["error"] > 0)
+        found["flicker"] = found["flicker"].astype(float).abs()
+        for name, cost, fault in (
+            ("front", "ns", "error"), ("front_flicker", "ns", "flicker"), ("front_bytes", "bytes_stored", "error"),
+        ):  # fmt: skip
+            found[name] = front(list(zip(found[cost], found[fault], strict=True)))
+        parts.append(found[[*COLUMNS]])
+    return pd.concat(parts, ignore_index=True)
+
+
+def cheapest(table: pd.DataFrame, limit: float, cost: str = "ns", fault: str = "error") -> Any | None:
+    """Return the row of least cost among those whose fault is at most a limit; None if there is none."""
+    within = table[(table[fault] <= limit) & table[cost].notna()]
+    return None if within.empty else next(within.sort_values([cost, fault], kind="stable").itertuples())

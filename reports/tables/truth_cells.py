@@ -1,0 +1,118 @@
+"""Rows of the tables about the ground truth itself: its speed, accuracy, bias and effort, its sampler, its rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from reports.record import Record
+from reports.tables.numbers import NONE, missing, percent, plain, times
+from reports.tables.summary import COMPONENTS
+from reports.truth.accuracy import Accuracy
+from reports.truth.bias import Bias
+from reports.truth.effort import Effort
+from reports.truth.finding import Finding
+from reports.truth.sampling import SETTINGS, Saving
+
+COMPONENT_TITLES: Final = ("S warp", "S weft", "C warp", "C weft")
+
+
+def stability_rows(findings: Sequence[Finding]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of the table of extremes by arithmetic: worst error, limit, the textbook's, what cannot be."""
+    result: dict[str, list[dict[str, Any]]] = {}
+    for finding in findings:
+        share = finding.naive_not_finite / finding.count
+        lost = f"{100 * share:.0f} % NaN" if share else ""
+        naive = "" if missing(finding.naive) or share == 1 else f"{finding.naive:.1e}"
+        result.setdefault(finding.arithmetic, []).append(
+            {
+                "expression": finding.expression,
+                "corner": finding.corner,
+                "cells": [
+                    f"{finding.worst:.1e}",
+                    f"{finding.limit:.1e}",
+                    ", ".join(filter(None, (naive, lost))) or NONE,
+                    str(finding.not_finite),
+                    str(finding.negative),
+                ],
+                "holds": finding.holds,
+                "verdict": "ok" if finding.holds else "limit",
+                "at": finding.at,
+            }
+        )
+    return result
+
+
+def rate_rows(records: Sequence[Record]) -> list[list[str]]:
+    """Return the rows of the table of speeds: what, fabric, value with unit, note."""
+    return [
+        [record.setting, record.fabric or NONE, f"{record.value:,.3g} {record.unit}", record.note]
+        for record in records
+        if record.metric == "rate"
+    ]
+
+
+ACCURACY: Final = ("RMSE", "error", "stated", "points", "queries a second", "× fewer than mc")
+"""Columns of `accuracy_rows` after the setting."""
+
+
+def accuracy_rows(found: Sequence[Accuracy]) -> dict[str, list[list[str]]]:
+    """Return the rows of the tables of accuracy by fabric: setting, then `ACCURACY`."""
+    result: dict[str, list[list[str]]] = {}
+    for row in found:
+        numbers = [percent(row.rmse, 2), percent(row.true_error, 2), percent(row.stated_error, 2)]
+        numbers += [f"{row.points:,.0f}", f"{row.rate:,.0f}", times(row.saved)]
+        result.setdefault(row.fabric, []).append([row.setting, *numbers])
+    return result
+
+
+BIAS: Final = ("light", *COMPONENT_TITLES)
+"""Columns of `bias_rows` after the fabric."""
+
+
+def bias_rows(found: Sequence[Bias]) -> list[list[str]]:
+    """Return the rows of the table of bias: fabric, then `BIAS`; a cell ends in ✓ if it is small, in ✗ if it is not."""
+    marks = {"below": " ✓", "above": " ✗", "open": ""}
+    lines: dict[tuple[str, str], dict[str, str]] = {}
+    for bias in found:
+        value = round(100 * bias.value, 2) + 0.0  # no zero is negative
+        text = f"{value:+.2f} ± {100 * bias.standard_error:.2f} %{marks[bias.verdict]}".replace("-", "−")
+        lines.setdefault((bias.fabric, bias.side), {})[bias.component] = text
+    return [
+        [plain(fabric), side.removeprefix("light "), *(cells.get(name, NONE) for name in COMPONENTS)]
+        for (fabric, side), cells in lines.items()
+    ]
+
+
+SAMPLERS: Final = tuple(label for label, points in SETTINGS if points)
+"""Columns of `sampler_rows` after the fabric."""
+
+
+def sampler_rows(found: Sequence[Saving]) -> list[list[str]]:
+    """Return how many times less variance each sampler has than the cosine, and what a direction takes."""
+    lines: dict[str, dict[str, str]] = {}
+    for one in found:
+        lines.setdefault(one.fabric, {})[one.sampler] = f"{times(one.variance_saved)} · {one.sample_time:,.0f} ns"
+    return [[plain(fabric), *(cells.get(name, NONE) for name in SAMPLERS)] for fabric, cells in lines.items()]
+
+
+EFFORT: Final = ("how", "queries", "points", "µs a query", "time")
+"""Columns of `effort_rows` after the fabric."""
+
+
+def effort_rows(found: Sequence[Effort]) -> list[list[str]]:
+    """Return the rows of the table of where the time goes: fabric, then `EFFORT`; shares are of the fabric's."""
+    whole: dict[str, float] = {}
+    for row in found:
+        whole[row.fabric] = whole.get(row.fabric, 0.0) + row.share * row.seconds
+    return [
+        [
+            plain(row.fabric),
+            row.kind,
+            percent(row.share),
+            f"{row.points:,.0f}",
+            f"{1e6 * row.seconds:,.0f}",
+            percent(row.share * row.seconds / whole[row.fabric], 0) if whole[row.fabric] else NONE,
+        ]
+        for row in found
+    ]

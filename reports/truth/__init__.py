@@ -1,0 +1,1 @@
+"""Measurements of the ground truth itself: accuracy, bias, effort, throughput, sampling, stability."""

@@ -1,0 +1,169 @@
+"""What accuracy costs: the true errors of every estimator, beside the errors it states and what it takes.
+
+Errors are of the four components as a vector, |mean - reference| / |reference|, over patches that return light; the
+reference is `owen` with `REFERENCE` points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
+median true errors e_N at N points, c is the geometric mean of e_N sqrt(N), and (c / e)^2 points of it have the median
+true error e. "Points saved" is that number over the points used.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import EstimatorName, TruthOptions
+from pipeline.truth.query import Answers, Queries
+from reports.error import COLOUR_WEIGHTS
+from reports.measure.timing import set_threads
+from reports.record import TRUTH, Metric, Record, by_subject
+from reports.truth.throughput import FABRICS
+from weaves.fabric import Fabric, load_fabric
+
+REFERENCE: Final = 1 << 16
+"""Points of a converged answer."""
+
+COUNTS: Final = (64, 256, 1024)
+"""Points of the estimators that sample."""
+
+_ROWS = 150
+_REPEATS = 3
+_SEED = 21
+_DARK = 1e-3  # 1/sr: patches below return too little for a relative error
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """One setting of the truth on one fabric."""
+
+    setting: str
+    """Estimator, and points or error asked for."""
+    fabric: str
+    """On which cloth."""
+    rmse: float
+    """Root-mean-square error of .3 (S_warp + S_weft) + .5 (C_warp + C_weft) over its mean."""
+    true_error: float
+    """Median relative error."""
+    stated_error: float
+    """Median stated one."""
+    points: float
+    """Points, or nodes, a query; the mean."""
+    rate: float
+    """Queries a second; the median of a few calls."""
+    saved: float
+    """Points that `mc` would need for the same true error over those used."""
+    reference: float
+    """Median relative error that the reference states."""
+    count: int
+    """Queries."""
+
+
+def fixed(estimator: EstimatorName, count: int) -> TruthOptions:
+    """Return options that take `count` points whatever their error."""
+    return TruthOptions(estimator=estimator, relative_error=1e-9, absolute_error=0.0, min_count=count, max_count=count)
+
+
+_SAMPLED: Final[tuple[EstimatorName, ...]] = ("mc", "jittered", "r2", "owen")
+SETTINGS: Final[dict[str, TruthOptions]] = {
+    **{f"{name}, {count} points": fixed(name, count) for name in _SAMPLED for count in COUNTS},
+    "quadrature at 2 %": TruthOptions(estimator="quadrature", relative_error=0.02),
+    "table": TruthOptions(estimator="table"),
+    "auto at 2 %": TruthOptions(relative_error=0.02, max_count=1 << 14),
+    "auto at 1 %": TruthOptions(relative_error=0.01, max_count=1 << 14),
+}
+"""What is measured, by the name it is shown under."""
+
+
+def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = REFERENCE) -> Iterator[Accuracy]:
+    """Measure every setting on every fabric, single-threaded, on queries of the default distribution.
+
+    Parameters
+    ----------
+    rows : int
+        Queries a fabric.
+    fabrics : sequence of str
+        Presets.
+    reference : int
+        Points of a converged answer, a power of two.
+    """
+    set_threads(1)
+    for name in fabrics:
+        fabric = load_fabric(name)
+        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+        truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
+        found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
+        spread = _spread([row for row in found if row.setting.startswith("mc,")])
+        for row in found:
+            needed = (spread / max(row.true_error, 1e-12)) ** 2
+            yield Accuracy(**{**vars(row), "saved": needed / row.points})
+
+
+def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, options: TruthOptions) -> Accuracy:
+    """Return the errors and the cost of one setting; what it saves is not known yet."""
+    answers = estimate(fabric, queries, options, _SEED)
+    times = []
+    for _ in range(_REPEATS):
+        start = time.perf_counter()
+        estimate(fabric, queries, options, _SEED)
+        times.append(time.perf_counter() - start)
+    lit = np.linalg.norm(truth.mean, axis=1) > _DARK
+    size = np.linalg.norm(truth.mean[lit], axis=1)
+    wrong = np.linalg.norm(answers.mean[lit] - truth.mean[lit], axis=1) / size
+    stated = np.linalg.norm(answers.standard_error[lit], axis=1) / size
+    colour, true_colour = ((a.mean.astype(np.float64) @ COLOUR_WEIGHTS)[:, 0] for a in (answers, truth))
+    return Accuracy(
+        setting=setting,
+        fabric=fabric.name,
+        rmse=float(np.sqrt(np.mean((colour - true_colour) ** 2)) / true_colour.mean()),
+        true_error=float(np.median(wrong)),
+        stated_error=float(np.median(stated)),
+        points=float(answers.count.mean()),
+        rate=len(lit) / float(np.median(times)),
+        saved=1.0,
+        reference=float(np.median(np.linalg.norm(truth.standard_error[lit], axis=1) / size)),
+        count=len(lit),
+    )
+
+
+def _spread(random: Sequence[Accuracy]) -> float:
+    """Return c of the law e = c N^-1/2 from plain Monte Carlo's median errors: their geometric mean times sqrt(N)."""
+    return float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
+
+
+_METRICS: Final[dict[Metric, tuple[str, str]]] = {
+    "true_rmse": ("rmse", "1"),
+    "true_error": ("true_error", "1"),
+    "stated_error": ("stated_error", "1"),
+    "points": ("points", "points/query"),
+    "query_rate": ("rate", "queries/s"),
+    "points_saved": ("saved", "1"),
+    "reference_error": ("reference", "1"),
+}
+
+
+def to_records(found: Iterable[Accuracy]) -> list[Record]:
+    """Return measurements as Records, one a number."""
+    return [
+        Record(method=TRUTH, setting=row.setting, fabric=row.fabric).of(
+            metric, getattr(row, name), row.count, unit=unit
+        )
+        for row in found
+        for metric, (name, unit) in _METRICS.items()
+    ]
+
+
+def from_records(records: Sequence[Record]) -> list[Accuracy]:
+    """Return the measurements that records hold; records of others are passed over."""
+    found = []
+    for (fabric, setting), numbers in by_subject(records, _METRICS).items():
+        values: dict[str, Any] = {name: numbers[metric].value for metric, (name, _) in _METRICS.items()}
+        found.append(Accuracy(setting=setting, fabric=fabric, count=numbers["true_rmse"].count, **values))
+    return found

@@ -1,0 +1,129 @@
+"""Where the time goes: how many queries `auto` answers by tables alone, by their borders refined, by sampling.
+
+Answers do not say where they come from, but they tell. What is sampled as a whole takes more points if more are the
+least; of the rest, what depends on the seed was refined, and what does not is a table's own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries
+from reports.measure.timing import set_threads
+from reports.record import TRUTH, Metric, Record, by_subject
+from reports.truth.throughput import FABRICS
+from weaves.fabric import Fabric, load_fabric
+
+CLASSES: Final = ("table alone", "borders refined", "sampled")
+"""How a query is answered, the cheapest first."""
+
+RELATIVE_ERROR: Final = 0.01
+"""Error asked for."""
+
+_ROWS = 1000
+_REPEATS = 3
+_SEED = 23
+_FEW, _MANY = 32, 2048  # hidden patches take up to 16 times as many: no count of the one is a count of the other
+
+
+@dataclass(frozen=True)
+class Effort:
+    """One way of answering on one fabric."""
+
+    kind: str
+    """One of `CLASSES`."""
+    fabric: str
+    """On which cloth."""
+    share: float
+    """Of the queries."""
+    points: float
+    """Nodes and points a query of this kind."""
+    seconds: float
+    """Time of a query of this kind."""
+    count: int
+    """Queries of all kinds."""
+
+
+def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Effort]:
+    """Measure how `auto` at `RELATIVE_ERROR` answers queries of the default distribution, single-threaded.
+
+    Parameters
+    ----------
+    rows : int
+        Queries a fabric.
+    fabrics : sequence of str
+        Presets.
+    """
+    set_threads(1)
+    for name in fabrics:
+        fabric = load_fabric(name)
+        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+        options = TruthOptions(relative_error=RELATIVE_ERROR, max_count=1 << 14)
+        kinds = classify(fabric, queries, options, _SEED)
+        counts = estimate(fabric, queries, options, _SEED).count
+        for number, kind in enumerate(CLASSES):
+            chosen = np.flatnonzero(kinds == number)
+            yield Effort(
+                kind=kind,
+                fabric=name,
+                share=chosen.size / rows,
+                points=float(counts[chosen].mean()) if chosen.size else 0.0,
+                seconds=_seconds(fabric, queries.take(chosen), options) if chosen.size else 0.0,
+                count=rows,
+            )
+
+
+def classify(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> npt.NDArray[np.int64]:
+    """Return for each query the place in `CLASSES` of the way in which `auto` answers it."""
+
+    def answers(count: int, seed: int) -> Answers:
+        fixed = options.model_copy(update={"estimator": "auto", "min_count": count, "max_count": count})
+        return estimate(fabric, queries, fixed, seed)
+
+    few, many, other = answers(_FEW, seed), answers(_MANY, seed), answers(_FEW, seed + 1)
+    random = (few.mean != other.mean).any(axis=1)
+    return np.where(few.count != many.count, 2, np.where(random, 1, 0)).astype(np.int64)
+
+
+def _seconds(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
+    """Return the median time of a query among others of its kind."""
+    times = []
+    for _ in range(_REPEATS):
+        start = time.perf_counter()
+        estimate(fabric, queries, options, _SEED)
+        times.append(time.perf_counter() - start)
+    return float(np.median(times)) / len(queries.u)
+
+
+_METRICS: Final[dict[Metric, tuple[str, str]]] = {
+    "kind_share": ("share", "1"),
+    "kind_points": ("points", "points/query"),
+    "kind_time": ("seconds", "s/query"),
+}
+
+
+def to_records(found: Iterable[Effort]) -> list[Record]:
+    """Return measurements as Records, one a number; the setting is the kind."""
+    return [
+        Record(method=TRUTH, setting=row.kind, fabric=row.fabric).of(metric, getattr(row, name), row.count, unit=unit)
+        for row in found
+        for metric, (name, unit) in _METRICS.items()
+    ]
+
+
+def from_records(records: Sequence[Record]) -> list[Effort]:
+    """Return the measurements that records hold; records of others are passed over."""
+    found = []
+    for (fabric, kind), numbers in by_subject(records, _METRICS).items():
+        values: dict[str, Any] = {name: numbers[metric].value for metric, (name, _) in _METRICS.items()}
+        found.append(Effort(kind=kind, fabric=fabric, count=numbers["kind_share"].count, **values))
+    return found

@@ -1,0 +1,216 @@
+"""Findings: an expression of the model over corner inputs, and how far rounding takes it from the reference.
+
+Every expression is computed over corner inputs, in the form that the package uses and, where there is one, in the form
+of the textbook. It holds if its worst relative error is at most `SLACK` times the figure listed for it, if no value is
+NaN or infinite, and if none is negative. The figures listed for single precision were measured once, elsewhere; those
+for double precision are the same times 2^-29, the ratio of the two arithmetics.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from reports.record import Metric, Record
+
+SLACK: Final = 2.0
+"""How far beyond the listed figure a worst error may lie: it is an extreme of random corners."""
+
+DOUBLE: Final = 2.0**-29
+"""Rounding of float64 over that of float32."""
+
+ILL: Final = "ill-conditioned"
+"""Ending of the corners in which the rounding of the input alone makes the error."""
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One expression over one set of corners."""
+
+    expression: str
+    """What is computed."""
+    corner: str
+    """Over which inputs."""
+    arithmetic: str
+    """``float32`` or ``float64``: what computes it; the next better one is the reference."""
+    count: int
+    """Inputs."""
+    worst: float
+    """Worst relative error of the finite values."""
+    at: str
+    """The input that did it."""
+    listed: float
+    """The error this form is known to make."""
+    not_finite: int
+    """Values that are NaN or infinite."""
+    negative: int
+    """Values below 0 where none can be."""
+    naive: float = math.nan
+    """Worst relative error of the textbook's form; NaN if there is none."""
+    naive_not_finite: int = 0
+    """How often that one is NaN or infinite."""
+
+    @property
+    def limit(self) -> float:
+        """What the worst error must not exceed."""
+        return SLACK * self.listed
+
+    @property
+    def holds(self) -> bool:
+        """Whether it does not, and every value is a number that can be."""
+        return not self.fault
+
+    @property
+    def fault(self) -> str:
+        """What is wrong, in words; empty if nothing is."""
+        if self.not_finite:
+            return f"{self.not_finite} of {self.count} values are NaN or infinite"
+        if self.negative:
+            return f"{self.negative} of {self.count} values are negative"
+        return f"worst error {self.worst:.1e}, beyond the limit {self.limit:.1e}" if self.worst > self.limit else ""
+
+
+def judge(
+    expression: str,
+    corner: str,
+    arithmetic: str,
+    inputs: Mapping[str, npt.ArrayLike],
+    value: npt.ArrayLike,
+    reference: npt.ArrayLike,
+    listed: float,
+    *,
+    naive: npt.ArrayLike | None = None,
+    floor: float = 0.0,
+    absolute: bool = False,
+    signed: bool = False,
+) -> Finding:
+    """Compare values with their reference.
+
+    Parameters
+    ----------
+    expression, corner, arithmetic, listed
+        As in `Finding`.
+    inputs : mapping
+        Name and value (N,) of what the N corners differ in.
+    value, reference : float (N,) or (N, k)
+        What was computed, and what it should be; objects of 50 digits are welcome. Of k numbers the length of the
+        error vector over that of the reference counts.
+    naive : float, like `value`
+        The textbook's form.
+    floor : float
+        Size below which the reference counts as this large.
+    absolute : bool
+        Errors are not divided by the reference.
+    signed : bool
+        Values may be negative.
+    """
+    found, naive_found = np.asarray(value, np.float64), None if naive is None else np.asarray(naive, np.float64)
+    error = _errors(value, reference, floor, absolute)
+    finite = np.isfinite(found).reshape(len(found), -1).all(axis=1)
+    error = np.where(finite, error, 0.0)
+    # What cannot be at all comes before what is merely wrong.
+    impossible = ~finite if signed else ~finite | (found < 0).reshape(len(found), -1).any(axis=1)
+    row = int(impossible.argmax() if impossible.any() else error.argmax())
+    other, lost = math.nan, 0
+    if naive is not None and naive_found is not None:
+        good = np.isfinite(naive_found)
+        lost = int((~good).sum())
+        other = float(np.where(good, _errors(np.where(good, naive, 0.0), reference, floor, absolute), 0.0).max())
+    return Finding(
+        expression=expression,
+        corner=corner,
+        arithmetic=arithmetic,
+        count=len(error),
+        worst=float(error.max()),
+        at=", ".join(f"{name} {_word(np.asarray(column)[row])}" for name, column in inputs.items()),
+        listed=listed,
+        not_finite=int((~finite).sum()),
+        negative=int((impossible & finite).sum()),
+        naive=other,
+        naive_not_finite=lost,
+    )
+
+
+def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool) -> npt.NDArray[np.float64]:
+    """Return relative errors (N,); the differences are taken in the better of the two arithmetics."""
+    truth = np.asarray(reference)
+    found = np.asarray(value)
+    if truth.dtype == object:
+        from reports.truth.formulas import exact
+
+        # Infinite and NaN values are counted elsewhere.
+        found = exact(np.where(np.isfinite(np.asarray(value, np.float64)), value, 0.0))
+    else:
+        found, truth = found.astype(np.float64), truth.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        difference = np.abs(np.asarray(found - truth)).reshape(len(truth), -1)
+    size = np.abs(truth).reshape(len(truth), -1)
+    if difference.shape[1] > 1:
+        difference, size = (np.sqrt((part * part).sum(axis=1, keepdims=True)) for part in (difference, size))
+    if absolute:
+        return np.asarray(difference[:, 0], np.float64)
+    nothing = np.equal(size, 0).astype(np.bool_)
+    # Where the truth is 0, so must be the value.
+    bounded = np.where(np.less(size, floor).astype(np.bool_), floor, np.where(nothing, 1, size))
+    return np.asarray((difference / bounded)[:, 0], np.float64)
+
+
+def failures(findings: Iterable[Finding]) -> list[Finding]:
+    """Return what does not hold."""
+    return [finding for finding in findings if not finding.holds]
+
+
+_METRICS: Final[dict[Metric, str]] = {
+    "worst_error": "worst",
+    "listed_error": "listed",
+    "naive_error": "naive",
+    "not_finite": "not_finite",
+    "negative": "negative",
+    "naive_not_finite": "naive_not_finite",
+}
+_JOINT: Final = " | "
+
+
+def to_records(findings: Iterable[Finding]) -> list[Record]:
+    """Return findings as Records: method the arithmetic, setting ``expression | corner``, one a number."""
+    records = []
+    for finding in findings:
+        subject = Record(method=finding.arithmetic, setting=f"{finding.expression}{_JOINT}{finding.corner}")
+        for metric, name in _METRICS.items():
+            value = float(getattr(finding, name))
+            if not math.isnan(value):
+                note = finding.at if metric == "worst_error" else ""
+                records.append(subject.of(metric, value, finding.count).model_copy(update={"note": note}))
+    return records
+
+
+def from_records(records: Sequence[Record]) -> list[Finding]:
+    """Return the findings that records hold; records of other measurements are passed over."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for record in records:
+        if record.metric in _METRICS:
+            row = found.setdefault((record.method, record.setting), {"at": "", "count": record.count})
+            row[_METRICS[record.metric]] = record.value
+            row["at"] = record.note or row["at"]
+    findings = []
+    for (arithmetic, setting), row in found.items():
+        expression, _, corner = setting.partition(_JOINT)
+        row |= {name: int(row[name]) for name in ("not_finite", "negative", "naive_not_finite")}
+        findings.append(Finding(expression=expression, corner=corner, arithmetic=arithmetic, **row))
+    return findings
+
+
+def _word(value: Any) -> str:
+    """Write an input with the digits that matter."""
+    if isinstance(value, str | np.str_):
+        return str(value)
+    if np.ndim(value):
+        return "(" + " ".join(f"{float(part):.7g}" for part in value) + ")"
+    return f"{float(value):.7g}"

@@ -1,0 +1,252 @@
+"""How fast the ground truth is: points and patch queries a second, beside a plain NumPy version in the same process.
+
+Every rate is the median over repeats of a call that takes long enough for the clock. The NumPy version is what one
+writes first: surface and point model by array expressions, visibility from the same table of horizons.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.cloth import columns_of, model_of
+from pipeline.truth.estimator import estimate
+from pipeline.truth.node_table.build import Table, tabulate
+from pipeline.truth.options import EstimatorName, TruthOptions
+from pipeline.truth.query import Queries
+from reports.measure.timing import set_threads
+from reports.record import TRUTH, Record
+from reports.truth.rate import MULTIPLY_ADDS, OPERATIONS, evaluate_points, multiply_adds
+from weaves.fabric import Fabric, load_fabric
+from weaves.surface import surface_at
+
+FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
+"""One of each family, and the largest repeats."""
+
+_REPEATS = 5
+_SEED = 20
+
+
+class Rate(NamedTuple):
+    """One measured speed.
+
+    Attributes
+    ----------
+    what, fabric : str
+        What was counted, and on which cloth.
+    value : float
+        In `unit`; the median.
+    low, high : float
+        The quartiles.
+    unit : str
+        Such as ``points/s``.
+    note : str
+        What else is to be known.
+    """
+
+    what: str
+    fabric: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    note: str = ""
+
+
+def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate]:
+    """Measure everything, one rate after the other; single-threaded but where two threads are compared.
+
+    Parameters
+    ----------
+    rows : int
+        Queries of each timed call.
+    fabrics : sequence of str
+        Presets whose patch queries are timed.
+    """
+    set_threads(1)
+    yield from _points()
+    for name in fabrics:
+        yield from _queries(load_fabric(name), rows)
+    yield _two_threads(load_fabric(fabrics[0]), rows)
+    yield _memory(load_fabric(fabrics[0]), rows)
+
+
+def to_records(rates: Sequence[Rate]) -> list[Record]:
+    """Return rates as Records: the setting says what was counted."""
+    return [
+        Record(
+            method=TRUTH,
+            setting=rate.what,
+            fabric=rate.fabric,
+            metric="rate",
+            value=rate.value,
+            low=rate.low,
+            high=rate.high,
+            count=_REPEATS,
+            unit=rate.unit,
+            note=rate.note,
+        )
+        for rate in rates
+    ]
+
+
+def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: str = "") -> Rate:
+    """Time a call that says how much it did."""
+    call()
+    rates = []
+    for _ in range(_REPEATS):
+        start = time.perf_counter()
+        done = call()
+        rates.append(done / (time.perf_counter() - start))
+    low, middle, high = np.percentile(rates, [25, 50, 75]).tolist()
+    return Rate(what, fabric, middle, low, high, unit, note)
+
+
+def _points() -> Iterator[Rate]:
+    """Yield points a second: vectorised kernels, NumPy, and what arithmetic alone could do."""
+    fabric = load_fabric("polyester_lining")
+    model = model_of(fabric, TruthOptions())
+    table = tabulate(model.front, model.back, False)
+    queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, _SEED, 0, 2000)
+    columns = columns_of(queries)
+
+    plain = _rate(lambda: float(_numpy_points(fabric, table, queries)), "points, NumPy", fabric.name, "points/s")
+    yield plain
+    values = np.linspace(0.1, 0.9, 4096, dtype=np.float32)
+
+    def arithmetic() -> float:
+        multiply_adds(values, 200)
+        return 200.0 * values.size * MULTIPLY_ADDS
+
+    limit = _rate(arithmetic, "multiply-adds alone", "", "1/s")
+    yield limit
+    for name, visibility in (("specular", False), ("everything", True)):
+        rate = _rate(
+            lambda visibility=visibility: float(evaluate_points(model, table, columns, visibility)[1]),  # type: ignore[misc]
+            f"points, {name}",
+            fabric.name,
+            "points/s",
+        )
+        arithmetic_share = rate.value * OPERATIONS[name][0] / limit.value
+        yield rate._replace(note=f"{rate.value / plain.value:.0f} x NumPy; {arithmetic_share:.0%} of arithmetic alone")
+    exact = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1024, max_count=1024)
+    few = queries.take(slice(200))
+    yield _rate(
+        lambda: float(estimate(fabric, few, exact, _SEED).count.sum()),
+        "points, sampled with exact visibility",
+        fabric.name,
+        "points/s",
+        "float64",
+    )
+
+
+def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
+    """Yield patch queries a second of the default distribution, and what plain Monte Carlo would need."""
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+    start = time.perf_counter()
+    model = model_of(fabric, TruthOptions())
+    tabulate(model.front, model.back, False)
+    built = time.perf_counter() - start
+    settings: tuple[tuple[EstimatorName, float], ...] = (("table", 0.01), ("auto", 0.02), ("auto", 0.01))
+    for estimator, error in settings:
+        options = TruthOptions(estimator=estimator, relative_error=error, max_count=1 << 14)
+        answers = estimate(fabric, queries, options, _SEED)
+        size, doubt = (np.linalg.norm(v, axis=1) for v in (answers.mean, answers.standard_error))
+        lit = size > 1e-3
+        reached = float(np.mean(doubt[lit] <= error * size[lit]))
+        saved = _saved(fabric, queries.take(slice(200)), options)
+        yield _rate(
+            lambda options=options: float(len(estimate(fabric, queries, options, _SEED).count)),  # type: ignore[misc]
+            f"queries, {estimator}" + (f" at {error:.0%}" if estimator == "auto" else ""),
+            fabric.name,
+            "queries/s",
+            f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
+            f"{saved:.0f} x fewer points than mc; table built in {built:.2f} s",
+        )
+
+
+def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
+    """Return the median ratio of points that independent sampling needs for the same stated error to those used."""
+    answers = estimate(fabric, queries, options, _SEED)
+    count = 4096
+    plain = TruthOptions(estimator="mc", relative_error=1e-9, absolute_error=0.0, min_count=count, max_count=count)
+    random = estimate(fabric, queries, plain, _SEED)
+    doubt, random_doubt = (np.linalg.norm(a.standard_error, axis=1) for a in (answers, random))
+    lit = np.linalg.norm(answers.mean, axis=1) > 1e-3
+    needed = random.count[lit] * (random_doubt[lit] / np.maximum(doubt[lit], 1e-12)) ** 2
+    return float(np.median(needed / answers.count[lit]))
+
+
+def _two_threads(fabric: Fabric, rows: int) -> Rate:
+    """Return how much faster two threads answer than one; kernels run without the interpreter's lock."""
+    options = TruthOptions(estimator="table")
+    halves = [draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, k * 4 * rows, 4 * rows) for k in range(2)]
+
+    def answer(queries: Queries) -> int:
+        return len(estimate(fabric, queries, options, _SEED).count)
+
+    with ThreadPoolExecutor(2) as pool:
+        one = _rate(lambda: float(sum(map(answer, halves))), "queries, one thread", fabric.name, "queries/s")
+        two = _rate(lambda: float(sum(pool.map(answer, halves))), "queries, two threads", fabric.name, "queries/s")
+    return two._replace(note=f"{two.value / one.value:.2f} x one thread")
+
+
+def _memory(fabric: Fabric, rows: int) -> Rate:
+    """Return what the peak of memory grows by for ten times as many queries, answered in chunks as shards are."""
+    options = TruthOptions(estimator="table")
+
+    def peak(total: int) -> int:
+        for start in range(0, total, rows):
+            estimate(
+                fabric, draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, start, rows), options, _SEED, start
+            )
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+    few, many = peak(2 * rows), peak(20 * rows)
+    return Rate("memory for ten times the queries", fabric.name, float(many - few), 0.0, 0.0, "bytes")
+
+
+def _numpy_points(fabric: Fabric, table: Table, queries: Queries, points: int = 20_000) -> int:
+    """Evaluate random points of the repeat by array expressions; return how many."""
+    random = np.random.default_rng(1)
+    ends, picks = fabric.weave.repeat
+    x, y = random.random(points) * ends, random.random(points) * picks
+    nodes = random.integers(0, table.slope.shape[1], points)
+    done = 0
+    for wi, wo in zip(queries.wi[:4].astype(np.float64), queries.wo[:4].astype(np.float64), strict=True):
+        surface = surface_at(fabric, x, y)
+        visible = [_clears(table, nodes, w) & (surface.normal @ w > 0) for w in (wi, wo)]
+        alpha = np.where(surface.yarn == 0, fabric.warp.roughness, fabric.weft.roughness)
+        cos_i, cos_o = (np.maximum(surface.normal @ w, 1e-9) for w in (wi, wo))
+        half = (wi + wo) / np.linalg.norm(wi + wo)
+        across = np.sum(np.cross(half, surface.tangent) ** 2, axis=-1)
+        q = alpha**2 * across + (surface.tangent @ half) ** 2
+        density = alpha**3 / (np.pi * q**2)
+        sigma_i, sigma_o = (
+            np.sqrt(np.sum(np.cross(w, surface.tangent) ** 2, axis=-1) + alpha**2 * (surface.tangent @ w) ** 2)
+            for w in (wi, wo)
+        )
+        depth = fabric.optical_thickness * (sigma_i / cos_i + sigma_o / cos_o)
+        specular = density * -np.expm1(-depth) / (4 * (sigma_i * cos_o + sigma_o * cos_i)) * cos_i
+        diffuse = (0.5 * cos_i + 0.5 * wi[2]) / np.pi
+        area = np.where(visible[1], cos_o / surface.normal[:, 2], 0.0)
+        lit = np.where(visible[0], area, 0.0)
+        sums = (np.sum(specular * lit), np.sum(diffuse * lit), np.sum(area))
+        done += points * bool(np.isfinite(sums).all())
+    return done
+
+
+def _clears(table: Table, nodes: npt.NDArray[np.int64], w: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Say which nodes see a direction, by linear interpolation between two azimuths."""
+    place = np.arctan2(w[1], w[0]) / (2 * np.pi) * len(table.slope)
+    row = int(np.floor(place))
+    share = place - row
+    low, high = (table.slope[k % len(table.slope)][nodes] for k in (row, row + 1))
+    return np.asarray(w[2] / np.hypot(w[0], w[1]) > low + share * (high - low))

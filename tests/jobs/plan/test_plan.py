@@ -1,0 +1,254 @@
+import dataclasses
+
+import pytest
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+
+
+def ids(tasks, stage, word=""):
+    return [task.id for task in tasks if task.stage == stage and word in task.title]
+
+
+@pytest.fixture
+def tasks(files):
+    return plan(load_recipe(files.write()))
+
+
+def edited(files, old, new):
+    return plan(load_recipe(files.exchange(old, new).write()))
+
+
+def test_every_row_once_in_tasks_of_shard_rows(tasks):
+    rows = {}
+    for task in tasks:
+        if task.stage == "generate":
+            key = task.spec["name"], task.spec["split"]
+            assert task.spec["start"] == rows.get(key, 0)
+            rows[key] = task.spec["start"] + task.rows
+            assert task.rows <= 1000
+    named = {(name, split): count for name in ("denim", "own", "twill_4_4") for split, count in SPLITS.items()}
+    assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
+
+
+SPLITS = {"train": 2500, "validation": 100, "test": 500}
+
+
+def test_plans_are_pure_and_in_order_of_need(files, tasks):
+    assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.path))]
+    assert len({task.id for task in tasks}) == len(tasks)
+    before = set()
+    for task in tasks:
+        assert before.issuperset(task.needs)
+        before.add(task.id)
+
+
+def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
+    unseen, test = set(ids(tasks, "generate", "twill_4_4")), set(ids(tasks, "generate", " test "))
+    for task in tasks:
+        if task.stage == "train":
+            assert test.isdisjoint(task.needs)
+            assert unseen.isdisjoint(task.needs) == (task.title != "neumip on twill_4_4")
+            assert ("twill_4_4" in task.spec["fabrics"]) == (task.title == "neumip on twill_4_4")
+    woven = next(task for task in tasks if task.title.startswith("woven"))
+    assert woven.spec["fabrics"] == ["denim", "own", "random_000", "random_001", "random_002"]
+
+
+def test_without_a_model_of_one_material_the_unseen_fabric_has_no_training_rows(files):
+    tasks = edited(files, '[[models]]\nmodel = "neumip"\n', "")
+    assert {task.spec["split"] for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name = "tiny"', 'name = "another"'),
+        ('diffuse = "#804020"', 'diffuse = "#0000ff"'),
+        ('source = "made up"', 'source = "measured"'),
+        ('seen = ["denim", "own.toml"]', 'seen = ["own.toml", "denim"]'),
+        ("frames = 4", "frames = 5"),
+        ("steps = 10", "steps = 11"),
+    ],
+    ids=["recipe name", "colour", "source", "order", "bench", "training"],
+)
+def test_what_does_not_shape_a_shard_does_not_change_its_identity(files, tasks, old, new):
+    assert set(ids(edited(files, old, new), "generate")) == set(ids(tasks, "generate"))
+
+
+def test_a_roughness_changes_the_shards_of_its_fabric_alone(files, tasks):
+    after = edited(files, "roughness = 0.3", "roughness = 0.31")
+    assert set(ids(after, "generate", "own")).isdisjoint(ids(tasks, "generate", "own"))
+    for other in ("denim", "random", "twill_4_4"):
+        assert ids(after, "generate", other) == ids(tasks, "generate", other)
+    assert ids(after, "train", "neumip on denim") == ids(tasks, "train", "neumip on denim")
+    for model in ("neumip on own", "woven"):
+        assert ids(after, "train", model) != ids(tasks, "train", model)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("seed = 3", "seed = 4"),
+        ("sigma = [0.05, 8.0]", "sigma = [0.05, 9.0]"),
+        ("relative_error = 0.05", "relative_error = 0.04"),
+    ],
+)
+def test_what_shapes_every_shard_changes_every_identity(files, tasks, old, new):
+    assert set(ids(edited(files, old, new), "generate")).isdisjoint(ids(tasks, "generate"))
+
+
+def test_a_coarser_truth_for_training_leaves_the_other_rows_alone(files, tasks):
+    after = edited(
+        files,
+        '[[models]]\nmodel = "woven"',
+        '[dataset.training_truth]\nrelative_error = 0.1\n[[models]]\nmodel = "woven"',
+    )
+    assert set(ids(after, "generate", " train ")).isdisjoint(ids(tasks, "generate", " train "))
+    for split in (" validation ", " test "):
+        assert ids(after, "generate", split) == ids(tasks, "generate", split)
+
+
+def test_more_rows_keep_the_shards_that_are_full(files, tasks):
+    after = edited(files, "train = 2500", "train = 4500")
+    before, later = (set(ids(plan_, "generate", "denim train")) for plan_ in (tasks, after))
+    assert len(before & later) == 2 and len(later) == 5
+
+
+def test_where_and_how_often_a_training_is_saved_is_not_its_identity(files, tasks):
+    after = edited(files, "steps = 10", 'steps = 10\ndevice = "cpu"\ncheckpoint_every = 7')
+    assert ids(after, "train") == ids(tasks, "train")
+    assert ids(edited(files, "hidden = 32", "hidden = 16"), "train", "woven") != ids(tasks, "train", "woven")
+
+
+def test_a_colour_changes_what_is_shown_of_its_fabric_and_no_training(files, tasks):
+    after = edited(files, 'diffuse = "#804020"', 'diffuse = "#0000ff"')
+    assert ids(after, "train") == ids(tasks, "train")
+    assert set(ids(after, "bench", "own")).isdisjoint(ids(tasks, "bench", "own"))
+    for other in ("denim", "twill_4_4"):
+        assert ids(after, "bench", other) == ids(tasks, "bench", other)
+
+
+def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
+    assert not ids(tasks, "bench", ", edge")
+    # Models that know curved cloth.
+    files.exchange('model = "woven"\nhidden = 32', 'model = "curved"')
+    files.exchange('model = "neumip"', 'model = "neumip"\nignore_curvature = true')
+    after = edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 8.0]\ncurvature = [0.01, 0.5]")
+    edges = ids(after, "bench", ", edge")
+    assert len(edges) == 3
+    for task in after:
+        if task.stage == "bench" and task.title.endswith(" on denim"):
+            assert edges[0] in task.needs
+            assert task.setting["truth"]["edge"].startswith("records/truth-denim-edge-")
+    again = edited(files, "frames = 4", "frames = 4\nedge = { radius = 20.0 }")
+    assert set(ids(again, "bench", ", edge")).isdisjoint(edges)
+    assert ids(again, "bench", ", sphere") == ids(after, "bench", ", sphere")
+
+
+def test_models_of_one_kind_are_told_apart_on_the_page(files):
+    tasks = edited(files, 'model = "neumip"', 'model = "neumip"\n\n[[models]]\nmodel = "neumip"\nname = "fine"')
+    page = tasks[-1]
+    notes = {note["name"]: note for note in page.setting["models"]}
+    assert notes["fine"]["kind"] == "neumip" and notes["fine"]["about"].startswith("neumip: ")
+    assert {"neumip", "fine"} <= {picture["method"] for picture in page.setting["pictures"]}
+    assert len({(p["fabric"], p["scene"], p["method"], p["setting"]) for p in page.setting["pictures"]}) == len(
+        page.setting["pictures"]
+    )
+
+
+def test_truth_of_pictures_is_shared_by_all_models_and_data_sets(files, tasks):
+    pictures = ids(tasks, "bench", "truth of ")
+    assert len(pictures) == 3 * 3
+    assert ids(edited(files, "hidden = 32", "hidden = 16"), "bench", "truth of ") == pictures
+    assert ids(edited(files, "seed = 3", "seed = 4"), "bench", "truth of ") == pictures
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "truth of denim, sphere") == pictures[:1]
+
+
+def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tasks):
+    measured = {task.title: task for task in tasks if task.stage == "bench"}
+    for fabric in ("denim", "own", "twill_4_4"):
+        for method, trainings in (("woven", ids(tasks, "train", "woven")), ("point_sampled", [])):
+            assert measured[f"{method} on {fabric}"].spec["models"] == trainings
+        neumip = measured[f"neumip on {fabric}"]
+        assert neumip.spec["models"] == ids(tasks, "train", f"neumip on {fabric}")
+        assert set(ids(tasks, "generate", f"{fabric} test")) < set(neumip.needs)
+    assert [task.title for task in tasks if task.alone] == ["latents of woven", "timing of all methods"]
+    assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
+
+
+def test_what_lies_between_fabrics_needs_the_training_alone(files, tasks):
+    """Its pairs are presets: no row and no fabric of the recipe enters but through the network and the questions."""
+    (task,) = [task for task in tasks if task.title.startswith("latents")]
+    assert task.title == "latents of woven" and list(task.needs) == ids(tasks, "train", "woven")
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "latents") == [task.id]
+    assert ids(edited(files, "test = 500", "test = 600"), "bench", "latents") == [task.id]
+    assert ids(edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 9.0]"), "bench", "latents") != [task.id]
+
+
+def test_extremes_need_the_trainings_alone_and_know_one_fabric_of_each_role(files, tasks):
+    found = {task.title: task for task in tasks if task.title.startswith("extremes")}
+    assert set(found) == {"extremes of woven", "extremes of neumip", "extremes of point_sampled"}
+    assert list(found["extremes of woven"].needs) == ids(tasks, "train", "woven")
+    ends = ids(tasks, "train", "neumip on denim") + ids(tasks, "train", "neumip on twill_4_4")
+    assert list(found["extremes of neumip"].needs) == ends
+    assert [(name, role) for name, _, role in found["extremes of woven"].spec["fabrics"]] == [
+        ("denim", "seen"),
+        ("twill_4_4", "unseen"),
+    ]
+    every = ids(tasks, "bench", "extremes")
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "extremes") == every
+    assert ids(edited(files, "test = 500", "test = 600"), "bench", "extremes") == every
+
+
+def test_ways_to_run_are_measured_again_and_nothing_is_trained_again(files, tasks):
+    after = edited(files, "frames = 4", 'frames = 4\nruntimes = ["onnx", "eager-bf16"]')
+    assert ids(after, "train") == ids(tasks, "train")
+    for title in ("woven on denim", "timing of all methods"):
+        assert set(ids(after, "bench", title)).isdisjoint(ids(tasks, "bench", title))
+
+
+def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):
+    after = edited(files, "frames = 4", "frames = 4\ntiming_repeats = 21")
+    changed = {task.id for task in after} ^ {task.id for task in tasks}
+    touched = [key for one in (tasks, after) for key in ids(one, "bench", "timing") + ids(one, "report")]
+    assert changed == set(touched)
+
+
+def test_what_was_measured_without_a_recipe_touches_the_page_alone(files, tasks):
+    after = plan(load_recipe(files.path), {"records/truth.json": "0" * 64})
+    changed = {task.id for task in after} ^ {task.id for task in tasks}
+    assert changed == {key for one in (tasks, after) for key in ids(one, "report")}
+    other = plan(load_recipe(files.path), {"records/truth.json": "1" * 64})
+    assert ids(other, "report") != ids(after, "report")
+
+
+def test_no_two_tasks_write_one_file(tasks):
+    products = [path for task in tasks for path in task.products]
+    assert len(set(products)) == len(products)
+
+
+def test_the_full_plan_is_paper_sized():
+    tasks = plan(load_recipe("full"))
+    assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
+
+
+def test_rows_that_nobody_learns_from_are_not_drawn():
+    quick = load_recipe("quick")
+    idle = dataclasses.replace(quick, models=tuple(m for m in quick.models if not m.learns))
+    drawn = {task.setting["question"]["split"] for task in plan(idle) if task.stage == "generate"}
+    assert drawn == {"test"}
+    every = {task.setting["question"]["split"] for task in plan(quick) if task.stage == "generate"}
+    assert every == {"train", "validation", "test"}
+
+
+def test_settings_are_measured_on_scenes_one_by_one():
+    """Of smoke, with one more number of points: what was there stays, but the timing of all side by side."""
+    smoke = load_recipe("smoke")
+    (points,) = (model for model in smoke.models if model.options.name == "point_sampled")
+    more = points.options.model_copy(update={"counts": [*points.options.counts, 128]})
+    models = [m.model_copy(update={"options": more}) if m is points else m for m in smoke.models]
+    before, after = plan(smoke), plan(dataclasses.replace(smoke, models=tuple(models)))
+    title = "on the scene curtain"
+    assert len(ids(before, "bench", title)) == len(ids(after, "bench", title)) - 1
+    assert set(ids(before, "bench", title)) < set(ids(after, "bench", title))
+    assert ids(after, "bench", f"point_sampled k = 128 {title}")

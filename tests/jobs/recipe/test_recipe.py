@@ -1,0 +1,175 @@
+import json
+import tomllib
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from jobs.recipe.load import load_recipe, recipe_names
+from pipeline.scenes.catalogue import load_scene
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_recipes_of_the_package_load(name):
+    recipe = load_recipe(name)
+    assert recipe.name == name and recipe.about
+
+
+def test_the_quick_recipe_sees_six_fabrics_and_never_the_4_4_twill():
+    recipe = load_recipe("quick")
+    assert len(recipe.seen) >= 6
+    assert [fabric.name for fabric in recipe.unseen] == ["twill_4_4"]
+    unseen = recipe.unseen[0].weave.canonical()
+    assert unseen not in {fabric.weave.canonical() for fabric in recipe.seen + recipe.population}
+
+
+def test_a_recipe_of_ones_own(files):
+    recipe = load_recipe(files.write())
+    assert [fabric.name for fabric in recipe.seen] == ["denim", "own"]
+    assert len(recipe.population) == 3
+    assert [model.options.name for model in recipe.models] == ["woven", "neumip", "point_sampled"]
+    assert [model.learns for model in recipe.models] == [True, True, False]
+    assert [model.of_one_material for model in recipe.models] == [False, True, False]
+    assert recipe.models[0].training.steps == 10
+    assert recipe.bench.frames == 4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('name = "tiny"', 'name = "a/b"', ["name = 'a/b'", "match pattern"]),
+        ("seed = 3", "sed = 3", ["dataset.sed = 3", "unknown key", "did you mean 'seed'"]),
+        ("seed = 3", "seed = -1", ["dataset.seed = -1", "greater than or equal to 0"]),
+        ("seed = 3", "seed = 3\nseed = 4", ["broken TOML", "line"]),
+        ("train = 2500", "", ["dataset.rows.train is missing"]),
+        ("train = 2500", "train = 0", ["dataset.rows.train = 0"]),
+        ("train = 2500", 'train = "many"', ["dataset.rows.train = 'many'", "integer"]),
+        ('"denim"', '"denin"', ["dataset.seen.0 = 'denin'", "did you mean 'denim'"]),
+        ('"own.toml"', '"missing.toml"', ["dataset.seen.1 = 'missing.toml'"]),
+        ('"own.toml"', '"denim"', ["dataset = 'denim'", "names must differ"]),
+        ('"twill_4_4"', '"denim"', ["dataset = 'denim'", "names must differ"]),
+        ("sigma = [0.05, 8.0]", "sigma = [0.0, 8.0]", ["dataset.queries = ", "0 < low"]),
+        ("sigma = [0.05, 8.0]", "sigma = [nan, 8.0]", ["dataset.queries.sigma.0 = nan", "finite"]),
+        ("relative_error = 0.05", "relative_error = inf", ["dataset.truth.relative_error = inf", "finite"]),
+        ("relative_error = 0.05", "max_count = 100", ["dataset.truth", "power of two"]),
+        (
+            "relative_error = 0.05",
+            '[dataset.training_truth]\nfootprint = "box"',
+            ["dataset.training_truth.footprint = 'box'", "must be that of dataset.truth, 'gaussian'"],
+        ),
+        ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
+        ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
+        ('model = "woven"', "", ["models.0.model is missing"]),
+        ("hidden = 32", "hiden = 32", ["models.0.hiden = 32", "did you mean 'hidden'"]),
+        ("steps = 10", "stepps = 10", ["models.0.training.stepps = 10", "did you mean 'steps'"]),
+        ("counts = [1, 2]", "[models.training]", ["models.2", "nothing to train"]),
+        ('model = "neumip"', 'model = "neumip"\nname = "woven"', ["models = 'woven'", "names must differ"]),
+        ("sigma = [0.05, 8.0]", "behind = 0.5", ["models.0.name = 'woven'", "does not know queries with behind"]),
+        ("relative_error = 0.05", 'frame = "macro"', ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
+        ("frames = 4", "frmes = 4", ["bench.frmes = 4", "did you mean 'frames'"]),
+        ("frames = 4", 'runtimes = ["onx"]', ["bench.runtimes.0 = 'onx'", "'eager-bf16'", "'onnx' or 'onnx-int8'"]),
+        ("population = 800", "", ["dataset.rows.population = 0", "must be > 0"]),
+        ('exclude = ["twill 4/4"]', 'exclude = ["twill 4/5"]', ["dataset.population.exclude = 'twill 4/5'"]),
+        ("move = 2", "move = 0", ["own.toml", "draft"]),
+        ("roughness = 0.3", "roughness = 2.0", ["own.toml: warp.roughness = 2.0", "less than or equal to 1"]),
+        ("roughness = 0.3", "roughness = 0.0", ["own.toml: warp.roughness = 0.0"]),
+    ],
+)
+def test_bad_input_is_one_sentence(files, old, new, words):
+    with pytest.raises(BadInput) as caught:
+        load_recipe(files.exchange(old, new).write())
+    sentence = str(caught.value)
+    assert "\n" not in sentence and ".toml" in sentence
+    for word in words:
+        assert word in sentence, sentence
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["spere"], ["bench.scenes.names.0 = 'spere'", "did you mean 'sphere'", "known: curtain, drape"]),
+        (["sphere", "attic.toml"], ["bench.scenes.names.1 = 'attic.toml'", "beside the recipe"]),
+        (["sphere", "sphere"], ["bench.scenes.names.1 = 'sphere'", "must differ"]),
+        (["own.toml"], ["own.toml", "unknown key"]),
+        (["a\0b.toml"], ["bench.scenes.names.0"]),
+        ([""], ["bench.scenes.names.0 = ''"]),
+    ],
+)
+def test_scenes_that_are_not_there_are_one_sentence(files, names, words):
+    files.text += f"[bench.scenes]\nnames = {json.dumps(names)}\n"
+    with pytest.raises(BadInput) as caught:
+        load_recipe(files.write())
+    sentence = str(caught.value)
+    assert "\n" not in sentence and ".toml" in sentence
+    for word in words:
+        assert word in sentence, sentence
+
+
+def test_scenes_beside_the_recipe_are_found_from_anywhere(files, tmp_path, monkeypatch):
+    (files.folder / "attic.xml").write_text("<scene version='3.0.0'/>")
+    (files.folder / "loft.toml").write_text('name = "loft"\nsource = "attic.xml"\n[cloths.a]\nfabric = "own.toml"\n')
+    files.text += '[bench.scenes]\nnames = ["sphere", "attic.xml", "loft.toml"]\n'
+    path = files.write()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    names = load_recipe(path).bench.scenes.names
+    assert names == ("sphere", str(files.folder / "attic.xml"), str(files.folder / "loft.toml"))
+    scene = load_scene(names[2])
+    assert load_fabric(scene.cloths["a"].fabric).name == "own" and scene.source.is_file()
+
+
+def test_the_unseen_draft_must_be_kept_out_of_the_population(files):
+    files.exchange('exclude = ["twill 4/4"]', 'families = ["twill"]').exchange("count = 3", "count = 300")
+    with pytest.raises(BadInput, match="must name 'twill 4/4', else the draft of twill_4_4 is seen in training"):
+        load_recipe(files.write())
+
+
+@pytest.mark.parametrize("name", ["quik", "", "no/such/recipe.toml", "a\0b.toml"])
+def test_a_recipe_that_does_not_exist(name):
+    with pytest.raises(BadInput):
+        load_recipe(name)
+
+
+VALUES = st.sampled_from(
+    ["nan", "-inf", "0", "-1", "1e300", "99999999999999999999", '""', '"x"', "true", "[]", "[[]]", "{}", "1979-05-27"]
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 99), VALUES, st.sampled_from(["value", "key", "drop", "cut"]))
+def test_a_broken_recipe_raises_bad_input_and_nothing_else(files, index, value, kind):
+    """Exchange a line's value or key, leave it out, or cut the file there: a Recipe or BadInput comes, nothing else."""
+    lines = files.recipe.splitlines()
+    assigning = [number for number, line in enumerate(lines) if "=" in line]
+    index = assigning[index % len(assigning)]
+    key, _, before = lines[index].partition(" = ")
+    match kind:
+        case "value":
+            lines[index] = f"{key} = {value}"
+        case "key":
+            lines[index] = f"{key}_{index} = {before}"
+        case "drop":
+            del lines[index]
+        case "cut":
+            lines = [*lines[:index], lines[index][: len(lines[index]) // 2]]
+    files.text = "\n".join(lines)
+    path = files.write()
+    try:
+        load_recipe(path)
+    except BadInput as error:
+        assert "\n" not in str(error)
+        if kind == "key" and key != "model":
+            assert "unknown key" in str(error)
+    else:
+        assert kind != "key"
+        tomllib.loads(files.text)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=200))
+def test_any_bytes_raise_bad_input(files, content):
+    files.path.write_bytes(content)
+    with pytest.raises(BadInput):
+        load_recipe(files.path)

@@ -1,0 +1,145 @@
+import hashlib
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from rich.console import Console
+
+from jobs.plan.task import Task
+from jobs.run.executor import execute
+from jobs.run.ledger import Ledger, measure
+from weaves.errors import BadInput, WorkFailed
+
+HERE = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    monkeypatch.syspath_prepend(HERE)
+    import fake_stages
+
+    return fake_stages
+
+
+def quiet():
+    return Console(file=io.StringIO())
+
+
+def hashes(out):
+    files = sorted(path for folder in ("generate", "train") for path in (out / folder).glob("*"))
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
+    good, timed = fake.task("good"), fake.task("timed", "bench", alone=True, seconds=0.3)
+    bad = fake.task("bad", fails="ZeroDivisionError('by zero')")
+    forgetful = fake.task("forgetful", forgets=True)
+    fine, stuck = fake.task("fine", "train", needs=[good]), fake.task("stuck", "train", needs=[bad])
+    slow = [fake.task(f"slow {index}", seconds=0.5) for index in range(2)]
+    tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
+    recorded = []
+    summary = execute(
+        tasks, tmp_path, fake.run, workers=2, recorded=lambda task: recorded.append(task.title), console=quiet()
+    )
+
+    assert {task.title for task in summary.ran} == {"good", "fine", "timed", "slow 0", "slow 1"} == set(recorded)
+    assert {task.title for task in summary.failed} == {"bad", "forgetful"}
+    assert [task.title for task in summary.waiting] == ["stuck"]
+    ledger = Ledger(tmp_path)
+    assert ledger.reason(bad) == "ZeroDivisionError: by zero"
+    assert "forgetful.txt" in ledger.reason(forgetful)
+    assert ledger.state(stuck) == "missing"
+
+    # What measures time ran after all else, alone, in a process that had done nothing before.
+    events = fake.events(tmp_path)
+    assert events[-1]["name"] == events[-2]["name"] == "timed"
+    assert events[-1]["pid"] not in {event["pid"] for event in events[:-2]}
+    assert {event["threads"] for event in events} == {"1"}
+
+    # A second run does the failed ones again and nothing else.
+    again = execute(tasks, tmp_path, fake.run, workers=1, console=quiet())
+    assert {task.title for task in again.ran + again.failed} == {"bad", "forgetful"}
+    assert len(again.before) == 5
+
+
+def test_a_killed_worker_costs_one_retry(tmp_path, fake):
+    tasks = [fake.task("victim", dies=True, seconds=0.2), fake.task("other", seconds=0.4)]
+    summary = execute(tasks, tmp_path, fake.run, workers=2, console=quiet())
+    assert {task.title for task in summary.ran} == {"victim", "other"}
+    starts = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
+    assert starts.count("victim") == 2
+
+
+def test_work_left_out_before_is_named(tmp_path, fake):
+    with pytest.raises(WorkFailed, match="train: 8 tasks that it needs are not done; run `twillight generate` first"):
+        execute(fake.chain(), tmp_path, fake.run, stages=["train"], console=quiet())
+
+
+def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
+    with pytest.raises(BadInput, match="no dask scheduler answers"):
+        execute(fake.chain(), tmp_path, fake.run, scheduler="nonsense://", console=quiet())
+
+
+def driver(out):
+    command = [sys.executable, str(HERE / "fake_stages.py"), str(out)]
+    path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
+    # A background shell hands down an ignored SIGINT; the driver is to hear it as from a terminal.
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": path},
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    deadline = time.monotonic() + 30
+    while len(list((out / "ledger").glob("[!.]*.json"))) < 2:  # whole ones
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.02)
+    return process, psutil.Process(process.pid).children(recursive=True)
+
+
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGINT])
+def test_a_stopped_run_goes_on_to_the_same_bytes(tmp_path, fake, blow):
+    """Stop the driver in the middle; its workers end, and the next run comes to the bytes of an undisturbed one."""
+    process, workers = driver(tmp_path)
+    if blow == signal.SIGINT:
+        os.killpg(process.pid, blow)  # as a terminal does: to the workers too
+    else:
+        process.kill()
+    _, told = process.communicate(timeout=30)
+    _, alive = psutil.wait_procs(workers, timeout=10)
+    assert not alive
+    if blow == signal.SIGINT:
+        assert (
+            told.count("Traceback") == 1
+        )  # the driver's KeyboardInterrupt, which the command line turns into a sentence
+
+    tasks = fake.chain()
+    done = sum(Ledger(tmp_path).state(task) == "done" for task in tasks)
+    assert 2 <= done < len(tasks)
+    summary = execute(tasks, tmp_path, fake.run, workers=2, console=quiet())
+    assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
+    expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
+    assert hashes(tmp_path) == expected
+
+
+def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
+    """A second data set that shares a shard must hear of it: its manifest was written when the shard was not there."""
+    (tmp_path / "datasets" / "a").mkdir(parents=True)
+    (tmp_path / "datasets" / "a" / "part-x.parquet").write_bytes(b"twelve bytes")
+    first, twin = (Task("generate", "shards", "a shard", {"rows": 3}, (f"datasets/{n}/part-x.parquet",)) for n in "ab")
+    ledger = Ledger(tmp_path)
+    ledger.finish(first, {"part-x.parquet": measure(tmp_path / first.products[0])}, 1.0)
+    recorded = []
+    summary = execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    assert recorded == [twin] == summary.before and not summary.ran
+    recorded.clear()
+    execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    assert not recorded

@@ -1,0 +1,149 @@
+"""`twillight evaluate` as a user meets it: what it prints, one sentence for whatever is wrong, what a kill leaves."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import pipeline.shards.evaluate
+from jobs.cli import main
+from jobs.verbs.evaluate import truth_options
+from pipeline.truth.options import TruthOptions
+
+ROWS = 40
+
+
+def questions():
+    rng = np.random.default_rng(2)
+    ones = np.ones(ROWS)
+    wi = {"wi_x": 0.6 * ones, "wi_y": 0.0 * ones, "wi_z": 0.8 * ones}
+    wo = {"wo_x": 0.0 * ones, "wo_y": 0.28 * ones, "wo_z": 0.96 * ones}
+    return {"id": np.arange(ROWS), "u": rng.random(ROWS), "v": rng.random(ROWS), "sigma": ones, **wi, **wo}
+
+
+@pytest.fixture
+def twillight(capsys, monkeypatch, tmp_path):
+    """Run the verb in a folder with a file of questions; return exit code, output and complaint."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    pq.write_table(pa.table(questions()), "queries.parquet")
+
+    def call(*tokens, fabric="denim"):
+        code = main(["evaluate", fabric, *tokens])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_a_summary_tells_what_was_done(twillight, tmp_path):
+    code, text, complaint = twillight("queries.parquet", "--out", "deep/result.parquet", "--relative-error", "0.1")
+    assert (code, complaint) == (0, "")
+    table = pq.read_table(tmp_path / "deep" / "result.parquet")
+    assert table["id"].to_pylist() == list(range(ROWS))
+    cells = text.splitlines()[1].split()
+    assert cells[:2] == [str(ROWS), str(ROWS)] and cells[2].endswith("%")
+    assert float(cells[3].replace(",", "")) == pytest.approx(table["count"].to_numpy().mean(), rel=0.01)
+    assert "deep/result.parquet" in text
+    # The same command writes the same bytes on any number of threads; another seed, estimator or footprint does not.
+    first = (tmp_path / "deep" / "result.parquet").read_bytes()
+    twillight("queries.parquet", "--out", "deep/one.parquet", "--relative-error", "0.1", "--workers", "1")
+    assert (tmp_path / "deep" / "one.parquet").read_bytes() == first
+    for choice in ((), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
+        twillight("queries.parquet", "--out", "deep/result.parquet", "--relative-error", "0.1", *choice)
+        assert ((tmp_path / "deep" / "result.parquet").read_bytes() == first) == (not choice), choice
+
+
+def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
+    columns = questions()
+    columns["sigma"][3] = 0.0
+    pq.write_table(pa.table(columns), tmp_path / "queries.parquet")
+    code, text, complaint = twillight("queries.parquet", "--out", "result.parquet", "--skip-bad")
+    assert (code, complaint) == (0, "") and "1 bad row has no answer; see result.bad.csv" in text
+    listed = (tmp_path / "result.bad.csv").read_text().splitlines()
+    assert listed == ["row,column,value,reason", "3,sigma,0.0,must be greater than 0"]
+
+
+@pytest.mark.parametrize(
+    ("tokens", "said"),
+    [
+        (["missing.parquet"], "missing.parquet: no such file"),
+        (["file"], "file: not a whole Parquet file"),
+        (["cut.parquet"], "cut.parquet: not a whole Parquet file"),
+        (["."], "not a whole Parquet file"),
+        (["bad.parquet"], "row 4, column wi_x..z = [0.6, 0.0, 3.0]: must have unit length (1 more bad row;"),
+        (["queries.parquet", "--out", "queries.parquet"], "must not be the file of the queries"),
+        (["queries.parquet", "--out", "."], "is a folder"),
+        (["queries.parquet", "--out", "file/result.parquet"], "a folder that can be written is needed"),
+        (["queries.parquet", "--estimator", "oven"], "--estimator = 'oven': did you mean 'owen'? known: "),
+        (["queries.parquet", "--relative-error", "0"], "--relative-error = 0.0: Input should be greater than 0"),
+        (["queries.parquet", "--relative-error", "1.5"], "--relative-error = 1.5"),
+        (["queries.parquet", "--relative-error", "nan"], "--relative-error = nan"),
+        (["queries.parquet", "--footprint", "ring"], "--footprint = 'ring': Input should be 'gaussian' or 'box'"),
+        (["queries.parquet", "--max-count", "1000"], "must be a power of two"),
+        (["queries.parquet", "--seed", "-1"], "--seed = -1: must be from 0"),
+        (["queries.parquet", "--seed", "one"], "one"),
+        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be 0, for one a core, or more"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, tokens, said):
+    (tmp_path / "file").write_text("no table")
+    content = (tmp_path / "queries.parquet").read_bytes()
+    (tmp_path / "cut.parquet").write_bytes(content[:-100])
+    columns = questions()
+    columns["wi_z"][[4, 9]] = 3.0
+    pq.write_table(pa.table(columns), tmp_path / "bad.parquet")
+    before = sorted(path.name for path in tmp_path.iterdir())
+    code, text, complaint = twillight(*tokens, *([] if "--out" in tokens else ["--out", "result.parquet"]))
+    assert code == 2 and text == "" and said in complaint, complaint
+    assert complaint.count("\n") == 1 and "Traceback" not in complaint
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+    assert (tmp_path / "queries.parquet").read_bytes() == content
+
+
+def test_an_unknown_fabric_and_a_missing_option_are_named(twillight):
+    assert "did you mean 'denim'" in twillight("queries.parquet", "--out", "result.parquet", fabric="denin")[2]
+    code, _, complaint = twillight("queries.parquet")
+    assert code == 2 and "--out" in complaint
+
+
+def test_ctrl_c_says_that_nothing_was_written(twillight, tmp_path, monkeypatch):
+    def stop(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", stop)
+    code, _, complaint = twillight("queries.parquet", "--out", "result.parquet")
+    assert code == 130 and complaint == "stopped; result.parquet was not written\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
+
+
+def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(twillight, tmp_path):
+    """The process kills itself after half of the rows, with rows already handed to the writer."""
+    code = (
+        "import os, signal, pipeline.shards.questions as q, pipeline.shards.evaluate as e\n"
+        "from pathlib import Path; from weaves.fabric import load_fabric\n"
+        "from pipeline.truth.options import TruthOptions\n"
+        "q.ROW_GROUP = 8\n"
+        "e.evaluate_file(load_fabric('denim'), Path('queries.parquet'), Path('result.parquet'), TruthOptions(), 0,\n"
+        "    skip_bad=True, progress=lambda share: share < 0.5 or os.kill(os.getpid(), signal.SIGKILL))\n"
+    )
+    root = Path(__file__).parents[3]
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}"], cwd=tmp_path
+    )
+    assert done.returncode == -signal.SIGKILL
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left <= {"queries.parquet", ".tmp-result.parquet", ".tmp-result.bad.csv"} and ".tmp-result.parquet" in left
+    assert twillight("queries.parquet", "--out", "result.parquet", "--skip-bad")[0] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["queries.parquet", "result.bad.csv", "result.parquet"]
+    assert pq.read_table(tmp_path / "result.parquet").num_rows == ROWS
+
+
+def test_options_that_are_left_out_keep_their_defaults():
+    assert truth_options(estimator=None, relative_error=None) == TruthOptions()
+    assert truth_options(estimator="mc").estimator == "mc"

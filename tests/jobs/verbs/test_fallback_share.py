@@ -1,0 +1,48 @@
+"""What a model will leave to quadrature is known from its recipe: as a benchmark of the trained one would find it."""
+
+import numpy as np
+import pytest
+
+from jobs.recipe.load import load_recipe
+from jobs.verbs.fallback_share import left_to_quadrature
+from pipeline.models.domain import Domain
+from pipeline.models.fallback import Fallback
+from pipeline.shards.queries import QueryOptions, draw_queries
+from weaves.fabric import load_fabric
+
+QUICK = load_recipe("quick")
+MODELS = {model.options.name: model for model in QUICK.models}
+OPTIONS = QueryOptions(behind=0.3, stretch=4.0, sigma=(0.02, 20.0))
+
+
+def asked(*names, options=OPTIONS):
+    return [(load_fabric(name), draw_queries(options, (4, 4), 1, 0, 2000)) for name in names]
+
+
+@pytest.mark.parametrize(
+    ("model", "fabrics", "share"),
+    [
+        ("woven", ["denim"], 0.30 + 0.70 * 0.12),
+        ("woven", ["voile"], 1.0),  # open cloth, and it saw solid cloth alone
+        ("woven", ["denim", "voile"], 0.69),
+        ("neumip", ["denim"], 0.30 + 0.70 * 0.12),
+        ("neumip", ["twill_4_4"], 0.30 + 0.70 * 0.12),  # unseen by general models, and trained on by this one
+        ("neumip", ["voile"], 1.0),
+        ("sums", ["voile"], 0.30),  # nothing is trained: only light from behind
+        ("point_sampled", ["voile"], 0.0),
+    ],
+)
+def test_shares(model, fabrics, share):
+    """Light from behind, 30 %; sizes below .0439 of log-uniform ones between .02 and 20, 11.4 %; or all."""
+    found = left_to_quadrature(MODELS[model], QUICK, asked(*fabrics))
+    assert found == pytest.approx(share, abs=0.03)
+
+
+def test_it_is_what_the_model_itself_will_leave():
+    class Trained:
+        name = setting = ""
+        domain = Domain.of(QUICK.dataset.model_dump(mode="json"), QUICK.seen + QUICK.population)
+
+    (pair,) = asked("denim")
+    method = Fallback(Trained(), MODELS["woven"].options.kinds)
+    assert left_to_quadrature(MODELS["woven"], QUICK, [pair]) == np.mean(method.strange(*pair))

@@ -1,0 +1,134 @@
+"""A scene's own recipe: what it keeps of the general one, what it leaves out, and that its paths hold anywhere."""
+
+import dataclasses
+import os
+
+import pytest
+
+from jobs.recipe.load import load_recipe
+from jobs.verbs.narrow_recipe import SAMPLED, alone, effort_of, savings, write_recipe
+from pipeline.models.curved.options import CurvedOptions
+from pipeline.scenes.requirement import Requirement
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+QUICK = load_recipe("quick")
+FLAT = QueryOptions(sigma=(0.3, 3.0), max_angle=70.0)
+
+
+def require(options=FLAT, names=("denim",), scene="sphere"):
+    asked = {name: draw_queries(options, (4, 4), 1, 0, 2000) for name in names}
+    return Requirement.of(scene, 1, asked, (0.0, 1.0), ("small", "large"))
+
+
+def narrowed(path, general=QUICK, method="woven", setting="", requirement=None, scene="sphere", worn=None, **effort):
+    requirement = requirement or require()
+    worn = worn or {name: (name, load_fabric(name)) for name in requirement.fabrics}
+    write_recipe(path, requirement, general, method, setting, scene, worn, **effort)
+    return load_recipe(path)
+
+
+def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
+    own = narrowed(tmp_path / "r.toml")
+    assert own.dataset.truth == QUICK.dataset.truth and own.dataset.training_truth == QUICK.dataset.training_truth
+    # Where the general recipe renders frames, so does this one: the same frames, by the same truth.
+    assert own.bench.scenes.model_copy(update={"names": ()}) == QUICK.bench.scenes.model_copy(update={"names": ()})
+    assert own.bench.scenes.names == ("sphere",) and not own.bench.bounds
+    assert [model.options.name for model in own.models] == ["woven", "point_sampled"]
+    assert own.models[1].options.counts == [2]
+    assert [fabric.name for fabric in own.fabrics] == ["denim"]
+
+
+def test_physics_and_stated_errors_of_a_truth_are_kept(tmp_path):
+    dataset = QUICK.dataset.model_copy(
+        update={
+            "truth": TruthOptions(estimator="owen", relative_error=0.01, max_count=8192, frame="macro"),
+            "training_truth": TruthOptions(relative_error=0.3, frame="macro"),
+        }
+    )
+    general = dataclasses.replace(QUICK, dataset=dataset, models=QUICK.models[1:2])
+    own = narrowed(tmp_path / "r.toml", general, "neumip")
+    # Points know no other frame, and the general recipe has none.
+    assert [model.options.name for model in own.models] == ["neumip"]
+    assert own.dataset.truth == dataset.truth and own.dataset.training_truth == dataset.training_truth
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        QueryOptions(sigma=(0.3, 3.0), curvature=(0.01, 0.1), behind=0.3),
+        QueryOptions(sigma=(0.002, 0.01), curvature=(0.01, 0.1)),
+    ],
+)
+def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp_path, options):
+    curved = load_recipe("curved")
+    table = TruthOptions(estimator="table")
+    general = dataclasses.replace(curved, dataset=curved.dataset.model_copy(update={"training_truth": table}))
+    own = narrowed(tmp_path / "r.toml", general, "curved", requirement=require(options))
+    assert own.dataset.queries.curvature[1] > 0
+    assert own.dataset.training_truth == SAMPLED
+
+
+def test_the_training_is_cut_by_the_effort_and_its_average_with_it(tmp_path):
+    own = narrowed(tmp_path / "r.toml", effort=0.25).models[0].training
+    general = QUICK.models[0].training
+    assert own.steps == 1750 and (own.batch, own.learning_rate) == (general.batch, general.learning_rate)
+    # After a quarter of the steps, the average forgets four times as fast.
+    assert own.average**own.steps == pytest.approx(general.average**general.steps, rel=1e-2)
+    rows = narrowed(tmp_path / "r.toml", effort=0.25).dataset.rows
+    assert (rows.train, rows.population) == (16384, 0)
+    # No more rows than the general recipe has, whatever the effort.
+    assert narrowed(tmp_path / "r.toml", effort=3.0).dataset.rows.train == 65536
+
+
+def test_what_is_saved_is_counted(tmp_path):
+    own = narrowed(tmp_path / "r.toml", method="neumip", effort=0.5)
+    assert effort_of(own) == (32768 + 2048 + 4096, 1500 * 512)
+    # By itself neumip learns from the nine named fabrics; the population is drawn for the general recipe all the same.
+    rows, learnt = effort_of(alone(QUICK, {"neumip"}))
+    assert (rows, learnt) == (9 * (65536 + 2048 + 4096) + 24 * 16384, 9 * 3000 * 512)
+    said = savings(tmp_path / "r.toml", QUICK)
+    assert "38,912 rows to generate in place of 1,038,336 (26.7 times fewer)" in said
+    assert "768,000 queries to learn from in place of 13,824,000 (18.0 times)" in said
+
+
+@pytest.mark.parametrize(("method", "knob"), [("point_sampled", "counts"), ("quadrature", "nodes")])
+def test_one_setting_is_enough(tmp_path, method, knob):
+    own = narrowed(tmp_path / "r.toml", method=method, setting="k = 16")
+    assert getattr(own.models[0].options, knob) == [16]
+    assert len(own.models) == (1 if method == "point_sampled" else 2)
+    assert "nothing to train" in savings(tmp_path / "r.toml", QUICK)
+
+
+def test_a_model_can_be_made_smaller(tmp_path):
+    own = narrowed(tmp_path / "r.toml", options={"hidden": 64}).models[0].options
+    assert own == QUICK.models[0].options.model_copy(update={"hidden": 64})
+    with pytest.raises(BadInput, match=r"--set: hiden = 64: unknown key; did you mean 'hidden'"):
+        narrowed(tmp_path / "other.toml", options={"hiden": 64})
+    assert not (tmp_path / "other.toml").exists()
+
+
+def test_options_of_a_model_are_kept(tmp_path):
+    curved = load_recipe("curved")
+    own = narrowed(tmp_path / "r.toml", curved, "curved_grazing", requirement=require(curved.dataset.queries))
+    assert own.models[0].options == CurvedOptions(name="curved_grazing", silhouette="grazing")
+
+
+def test_scenes_and_fabrics_by_path_are_found_from_anywhere(tmp_path, monkeypatch, files):
+    """Named from one folder, written to another, read from a third."""
+    files.write()
+    (tmp_path / "attic.xml").write_text("<scene version='3.0.0'/>")
+    (tmp_path / "attic.toml").write_text('name = "attic"\nsource = "attic.xml"\n[cloths.own]\nfabric = "own.toml"\n')
+    monkeypatch.chdir(tmp_path)
+    requirement = require(names=("own", "denim"), scene="attic")
+    worn = {"own": ("own.toml", load_fabric("own.toml")), "denim": ("denim", load_fabric("denim"))}
+    narrowed(tmp_path / "out" / "recipes" / "r.toml", requirement=requirement, scene="attic.toml", worn=worn)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    for path in (tmp_path / "out" / "recipes" / "r.toml", os.path.relpath(tmp_path / "out" / "recipes" / "r.toml")):
+        own = load_recipe(path)
+        assert [fabric.name for fabric in own.seen] == ["own", "denim"]
+        assert own.bench.scenes.names == (str(tmp_path / "attic.toml"),)
+    assert str(tmp_path) not in (tmp_path / "out" / "recipes" / "r.toml").read_text()

@@ -1,0 +1,134 @@
+"""`twillight require`: from a page's Records and a scene to a recipe that can be run; wishes that cannot be met."""
+
+import pytest
+
+from jobs.cli import main
+from jobs.recipe.load import load_recipe
+from reports.measure.by_size import EDGES
+from reports.record import OF_A_PAGE, Record, this_machine, write_records
+
+RECIPE = """
+name = "wide"
+[dataset]
+seen = ["denim", "silk_charmeuse", "polyester_lining", "basket"]
+[dataset.rows]
+train = 8192
+[dataset.queries]
+sigma = [0.05, 8.0]
+max_angle = 80.0
+[dataset.training_truth]
+estimator = "table"
+[[models]]
+model = "woven"
+[models.training]
+steps = 400
+[[models]]
+model = "neumip"
+[[models]]
+model = "point_sampled"
+counts = [2, 16]
+[bench.scenes]
+names = ["plane"]
+size = [24, 18]
+"""
+
+ERRORS = {
+    ("woven", ""): (0.1, 900.0),
+    ("point_sampled", "k = 2"): (0.6, 100.0),
+    ("point_sampled", "k = 16"): (0.2, 800.0),
+}
+
+
+@pytest.fixture
+def require(tmp_path, capsys, monkeypatch):
+    """Call the command in a folder that holds a page with errors and times by size."""
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wide.toml").write_text(RECIPE)
+    records = []
+    for (method, setting), (error, ns) in ERRORS.items():
+        one = Record(method=method, setting=setting)
+        for metric, value in (("size_colour", error), ("size_time", ns)):
+            records.append(one.of(metric, value, 9, curve=tuple((low, value) for low in EDGES[:-1])))
+    folder = tmp_path / "out" / "report" / "wide"
+    folder.mkdir(parents=True)
+    write_records(folder / OF_A_PAGE, records, this_machine(1))
+
+    def call(*tokens):
+        code = main(["require", *tokens, "--recipe", "wide.toml", "--frames", "1"])
+        captured = capsys.readouterr()
+        return code, " ".join(captured.out.split()), captured.err
+
+    return call
+
+
+def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
+    pytest.importorskip("mitsuba")
+    code, text, _ = require("plane", "--error", ".3")
+    assert code == 0
+    assert "denim 100 %" in text and "light from behind 0.0 %" in text
+    # 16 points err .2 and take less time than woven does.
+    monkeypatch.chdir("/")
+    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
+    assert own.models[0].options.counts == [16] and [fabric.name for fabric in own.fabrics] == ["denim"]
+    assert own.bench.scenes.names == ("plane",) and own.bench.scenes.size == (24, 18)
+
+
+def test_a_method_may_be_wished_for(require, tmp_path):
+    pytest.importorskip("mitsuba")
+    code, text, _ = require("plane", "--method", "woven", "--effort", ".5", "--set", "hidden=16")
+    assert code == 0 and "(from its footprints)" in text
+    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
+    assert own.models[0].options.model == "woven" and own.models[0].options.hidden == 16
+    assert own.models[0].training.steps == 200 and own.dataset.rows.train == 4096
+
+
+def test_what_lies_beyond_the_general_domain_counts_as_quadratures(require, monkeypatch):
+    """The plane reaches the horizon: of a model trained up to 80 degrees, what is seen steeper is not its own."""
+    pytest.importorskip("mitsuba")
+    import jobs.verbs.require as module
+
+    seen = {}
+    before = module._left
+    monkeypatch.setattr(module, "_left", lambda model, *rest: seen.setdefault(model.options.name, before(model, *rest)))
+    assert require("plane")[0] == 0
+    assert 0.1 < seen["woven"] < 0.9 and seen["woven"] == seen["neumip"] and seen["point_sampled"] == 0.0
+
+
+def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
+    pytest.importorskip("mitsuba")
+    code, _, told = require("plane", "--error", ".01", "--time", ".001")
+    assert code == 2 and told.count("\n") == 1
+    assert "no method meets it" in told and "point_sampled k = 2" in told
+    code, _, told = require("plane", "--method", "woven", "--error", ".01")
+    assert code == 2 and "woven: " in told and "point_sampled" not in told
+
+
+def test_a_method_that_was_not_measured_is_refused(require):
+    pytest.importorskip("mitsuba")
+    code, _, told = require("plane", "--method", "neumip")
+    assert code == 2 and told.count("\n") == 1 and "--method = 'neumip': it was not measured" in told
+
+
+@pytest.mark.parametrize(
+    ("tokens", "words"),
+    [
+        (["plane", "--method", "wovn"], "did you mean 'woven'"),
+        (["plane", "--error", "0"], "--error = 0.0: must be > 0"),
+        (["plane", "--time", "nan"], "--time = nan: must be > 0"),
+        (["plane", "--margin", ".5"], "--margin = 0.5: must be >= 1"),
+        (["plane", "--effort", "0"], "--effort = 0.0: must be > 0"),
+        (["plane", "--set", "hidden"], "--set = 'hidden': must be KEY=VALUE"),
+        (["plain"], "did you mean 'plane'"),
+        (["attic.toml"], "no such file"),
+    ],
+)
+def test_bad_input_is_one_sentence(require, tokens, words):
+    code, text, told = require(*tokens)
+    assert (code, text) == (2, "") and told.count("\n") == 1 and words in told, told
+
+
+def test_without_a_page_it_says_so(require, tmp_path):
+    (tmp_path / "out" / "report" / "wide" / OF_A_PAGE).unlink()
+    code, _, told = require("plane")
+    assert code == 2 and told.count("\n") == 1 and "no page of the recipe wide" in told

@@ -1,0 +1,234 @@
+"""What a scene's own recipe saved: sums over receipts, numbers of two pages, and what is missing in one sentence."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+from jobs.cli import main
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger, measure
+from jobs.verbs.narrow_recipe import write_recipe
+from jobs.verbs.savings import DIFFERENCE, Saving, Value, saved, verdict
+from pipeline.scenes.requirement import Requirement
+from pipeline.shards.queries import QueryOptions, draw_queries
+from reports.measure.pictures import write_picture
+from reports.record import OF_A_PAGE, Record, this_machine, write_records
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+GENERAL = """
+name = "wide"
+[dataset]
+seen = ["silk_charmeuse", "denim", "basket"]
+shard_rows = 4096
+[dataset.rows]
+train = 8192
+validation = 512
+test = 1024
+[[models]]
+model = "neumip"
+[models.training]
+steps = 400
+batch = 64
+[[models]]
+model = "woven"
+[models.training]
+steps = 100
+batch = 32
+[[models]]
+model = "point_sampled"
+counts = [2, 4]
+[bench.scenes]
+names = ["sphere"]
+"""
+
+
+class Runs:
+    """A folder of products in which both recipes have run, or seem to have."""
+
+    def __init__(self, folder):
+        self.out = folder / "out"
+        self.general = folder / "wide.toml"
+        self.general.write_text(GENERAL)
+
+    def require(self, method="neumip", setting="", effort=0.25):
+        asked = {"silk_charmeuse": draw_queries(QueryOptions(sigma=(0.3, 3.0)), (5, 5), 1, 0, 500)}
+        requirement = Requirement.of("sphere", 1, asked, (0.0,), ("all",))
+        self.own = self.out / "recipes" / "require-sphere.toml"
+        worn = {"silk_charmeuse": ("silk_charmeuse", load_fabric("silk_charmeuse"))}
+        write_recipe(self.own, requirement, load_recipe(self.general), method, setting, "sphere", worn, effort)
+        return self
+
+    def run(self, recipe, seconds):
+        """Write receipts of all shards and trainings, each of which took so many seconds."""
+        ledger = Ledger(self.out)
+        for task in plan(load_recipe(recipe)):
+            if task.stage not in ("generate", "train"):
+                continue
+            for path in task.products:
+                file = self.out / path
+                file.parent.mkdir(parents=True, exist_ok=True)
+                steps = task.setting.get("training", {}).get("steps")
+                file.write_text(json.dumps({"steps_taken": steps}) if path.endswith("card.json") else "1234567")
+            files = {(self.out / path).name: measure(self.out / path) for path in task.products}
+            ledger.finish(task, files, seconds)
+        return self
+
+    def page(self, name, mse, ms, method="neumip", setting=""):
+        """Write a page's Records of a method and of 2 points, whose frame takes 10 ms."""
+        one = Record(method=method, setting=setting, scene="sphere", threads=1)
+        records = [
+            one.of("mse", mse, 100, low=0.8 * mse, high=1.2 * mse),
+            one.of("colour_rrmse", math.sqrt(mse), 100),
+            one.of("flicker", 0.1, 3),
+            one.of("fallback_share", 0.0, 100),
+            one.of("frame_time", ms, 20, unit="ms/frame", low=ms, high=ms),
+        ]
+        base = Record(method="point_sampled", setting="k = 2", scene="sphere", threads=1)
+        records.append(base.of("frame_time", 10.0, 20, unit="ms/frame"))
+        if setting == "k = 2":
+            records.pop(-2)
+        # Another setting of the method, which does not count.
+        records += [record.model_copy(update={"setting": "k = 99", "value": 99.0}) for record in records[:4]]
+        folder = self.out / "report" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        write_records(folder / OF_A_PAGE, records, this_machine(1))
+        if name != "wide":
+            self.finish_page()
+        return self
+
+    def finish_page(self):
+        """Write the receipt of the page of the scene's recipe."""
+        page = plan(load_recipe(self.own))[-1]
+        (self.out / page.products[0]).write_text("<html>")
+        Ledger(self.out).finish(page, {"index.html": measure(self.out / page.products[0])}, 1.0)
+
+
+@pytest.fixture
+def runs(tmp_path):
+    return Runs(tmp_path)
+
+
+def both(runs, method="neumip", setting="", **effort):
+    runs.require(method, setting, **effort).run(runs.general, 2.0).run(runs.own, 0.5)
+    return runs.page("wide", 4e-4, 40.0, method, setting).page("require-sphere", 3e-4, 20.0, method, setting)
+
+
+def by_quantity(runs):
+    return {row.quantity: row for row in saved("sphere", runs.out, load_recipe(runs.general))}
+
+
+def test_networks_of_one_fabric_each_are_charged_for_all_fabrics_and_weigh_what_the_scene_needs(runs):
+    rows = by_quantity(both(runs))
+    assert (rows["queries generated"].general.value, rows["queries generated"].narrow.value) == (3 * 9728, 2048 + 1536)
+    # Four shards a fabric against three, a training a fabric.
+    assert (rows["generation"].general.value, rows["generation"].narrow.value) == (3 * 4 * 2.0, 3 * 0.5)
+    assert (rows["training"].general.value, rows["training"].narrow.value) == (3 * 2.0, 0.5)
+    learnt = rows["queries learnt from"]
+    assert (learnt.general.value, learnt.narrow.value) == (3 * 400 * 64, 100 * 64) and learnt.ratio == 12.0
+    assert rows["weights"].general.value == rows["weights"].narrow.value == 7
+    assert rows["mse"].general == Value(4e-4, pytest.approx(3.2e-4), pytest.approx(4.8e-4))
+    assert rows["frame_time"].ratio == 2.0 and rows["frame_time over 2 points"].general.value == 4.0
+
+
+def test_a_model_of_many_fabrics_is_trained_once(runs):
+    rows = by_quantity(both(runs, "woven", effort=0.5))
+    assert (rows["queries learnt from"].general.value, rows["queries learnt from"].narrow.value) == (3200, 1600)
+    assert (rows["training"].general.value, rows["training"].narrow.value) == (2.0, 0.5)
+
+
+def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):
+    rows = by_quantity(both(runs, "point_sampled", "k = 2"))
+    assert rows["queries generated"].ratio == 3.0 and math.isnan(rows["queries learnt from"].ratio)
+    assert rows["frame_time over 2 points"].general.value == 1.0
+    assert "3.0 times fewer queries to generate; MSE 0.0003 in place of 0.0004." in verdict([*rows.values()])
+
+
+@pytest.mark.parametrize(
+    ("interval", "words"),
+    [((-2.0, -1.0), "paired: less"), ((1.0, 2.0), "paired: more"), ((-1.0, 1.0), "paired: no difference shown")],
+)
+def test_the_verdict_says_whether_the_error_differs(runs, interval, words):
+    rows = [*by_quantity(both(runs)).values()]
+    assert "paired" not in verdict(rows)
+    rows.append(Saving("sphere", "neumip", DIFFERENCE, "1", Value(0.0), Value(0.0, *interval)))
+    assert words in verdict(rows)
+
+
+def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
+    """Two pictures of four pixels with MSE .04 and .01 against a black truth, and its frames."""
+    both(runs)
+    cloth = load_fabric("silk_charmeuse")
+    for recipe, value in ((runs.general, 0.2), (runs.own, 0.1)):
+        for task in plan(load_recipe(recipe)):
+            if task.setting.get("make") == "shot":
+                write_frames(runs.out / task.products[0], cloth)
+            elif task.setting.get("make") == "scene" and task.setting["model"]["name"] == "neumip":
+                mask = np.ones((8, 8), np.bool_)
+                write_picture(runs.out / task.setting["pictures_of"][""], np.full((8, 8, 3), value), mask, {})
+    row = by_quantity(runs)[DIFFERENCE]
+    assert row.narrow == pytest.approx((-0.03, -0.03, -0.03), rel=1e-5) and math.isnan(row.ratio)
+
+
+def write_frames(path, fabric):
+    """Write one frame of 8 x 8 pixels, each with a question that is answered by darkness."""
+    queries = draw_queries(QueryOptions(), (5, 5), 1, 0, 64)
+    columns = queries._asdict() | {"frame": np.zeros(64, np.int64), "pixel": np.arange(64)}
+    columns |= {"weight": np.ones((64, 3), np.float32)}
+    columns |= dict.fromkeys(("mean", "standard_error", "stand_in"), np.zeros((64, 4), np.float32))
+    about = {"name": "sphere", "cloths": {"a": fabric.model_dump(mode="json")}}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    arrays = {f"a.{name}": column for name, column in columns.items()}
+    np.savez(path, about=np.array(json.dumps(about)), base=np.zeros((1, 8, 8, 3), np.float32), **arrays)
+
+
+def test_less_than_the_aim_is_said(runs):
+    few, same = Value(2.0), Value(1.0)
+    rows = [Saving("s", "m", name, "1", few, same) for name in ("queries generated", "queries learnt from", "mse")]
+    assert verdict(rows).endswith("less than 3 times.")
+
+
+def test_the_command_prints_and_writes_all_of_it(runs, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert main(["savings", str(both(runs).general), "sphere", "--out", str(runs.out)]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "queries generated 29,184 3.58e+03 8.14" in text
+    assert "sphere, neumip: 8.1 times fewer queries to generate, 12.0 times fewer to learn from" in text
+    with (runs.out / "report" / "savings.csv").open(newline="") as file:
+        rows = {row["quantity"]: row for row in csv.DictReader(file)}
+    assert float(rows["queries learnt from"]["ratio"]) == 12.0 and rows["training"]["unit"] == "s"
+    assert (float(rows["mse"]["general_high"]), float(rows["mse"]["own_low"])) == pytest.approx((4.8e-4, 2.4e-4))
+
+
+def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):
+    general = load_recipe(runs.general)
+
+    def refused():
+        with pytest.raises(BadInput) as caught:
+            saved("sphere", runs.out, general)
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    assert "twillight require sphere" in refused()
+    runs.require()
+    assert "15 of 15 tasks" in refused() and "twillight run wide" in refused()
+    runs.run(runs.general, 1.0)
+    assert "no page" in refused() and "twillight run wide" in refused()
+    runs.page("wide", 1e-4, 1.0)
+    assert f"twillight run {runs.own}" in refused() and "4 of 4 tasks" in refused()
+    runs.run(runs.own, 1.0).page("require-sphere", 1e-4, 1.0, "woven")
+    assert "no mse of neumip there" in refused()
+    runs.page("require-sphere", 1e-4, 1.0)
+    runs.own.write_text(runs.own.read_text() + "seed = 7\n")
+    assert "its page is older than the recipe" in refused()
+    runs.own.write_text(runs.own.read_text().replace('name = "neumip"', 'name = "other"'))
+    assert "no such method" in refused()
+
+
+def test_scenes_that_do_not_exist_are_refused(runs, capsys):
+    assert main(["savings", str(runs.general), "spere", "--out", str(runs.out)]) == 2
+    assert "did you mean 'sphere'" in capsys.readouterr().err

@@ -1,0 +1,242 @@
+"""The sampler of one point: chi-square over the sphere, normalisation, and its weight against microflake and slab."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from scipy import stats
+
+from pipeline.analytic.importance.point import flake_scatter_pdf, flake_scatter_weight, sample_flake_scatter
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.footprint.sequences import independent_pair, owen_pair
+from pipeline.truth.scattering.microflake import density, sigma
+from pipeline.truth.scattering.slab import reflection, transmission
+
+LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
+ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell
+
+
+def _unit(degrees, azimuth_degrees):
+    theta, phi = math.radians(degrees), math.radians(azimuth_degrees)
+    return math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)
+
+
+# Given direction and tangent: both tilted; grazing; nearly along the fibre; from behind, across the fibre.
+PAIRS = {
+    "tilted": (_unit(35, 20), _unit(75, 65)),
+    "grazing": (_unit(84, 200), _unit(97, 40)),
+    "along": (_unit(50, 110), _unit(51, 111)),
+    "behind": (_unit(140, 300), _unit(90, 30)),
+}
+CONFIGURATIONS = [(alpha, pair) for alpha in (0.1, 0.3, 1.0) for pair in PAIRS]
+
+
+@kernel
+def _directions(w, t, alpha, key, count, even):
+    """Return `count` sampled directions, from independent or from evenly spread random numbers."""
+    directions = np.empty((count, 3))
+    for k in range(count):
+        first, second = owen_pair(key, k) if even else independent_pair(key, k)
+        directions[k] = sample_flake_scatter(w[0], w[1], w[2], t[0], t[1], t[2], alpha, first, second)
+    return directions
+
+
+@kernel
+def _cell_integrals(w, t, alpha, rows, columns, nodes):
+    """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints.
+
+    Nodes equal in cosine would lie 4 degrees apart at the poles, and lose 6e-4 of a ridge that crosses them.
+    """
+    cells = np.zeros((rows, columns))
+    step = math.pi / (rows * nodes)
+    for row in range(rows * nodes):
+        z, r = math.cos((row + 0.5) * step), math.sin((row + 0.5) * step)
+        share = 4.0 * math.pi * r * math.sin(0.5 * step) / (columns * nodes)
+        for column in range(columns * nodes):
+            phi = 2.0 * math.pi * (column + 0.5) / (columns * nodes)
+            x, y = r * math.cos(phi), r * math.sin(phi)
+            pdf = flake_scatter_pdf(w[0], w[1], w[2], x, y, z, t[0], t[1], t[2], alpha)
+            cells[row // nodes, column // nodes] += share * pdf
+    return cells
+
+
+def _counts(directions):
+    """Return how many directions fall into each cell of `_cell_integrals`."""
+    azimuths = np.arctan2(directions[:, 1], directions[:, 0]) % (2 * math.pi)
+    ranges = ((0, math.pi), (0, 2 * math.pi))
+    return np.histogram2d(np.arccos(np.clip(directions[:, 2], -1, 1)), azimuths, bins=(ROWS, COLUMNS), range=ranges)[0]
+
+
+def _chi_square(counts, expected):
+    """Return the p-value, with all cells that expect fewer than 5 pooled into one."""
+    counts, expected = counts.ravel(), expected.ravel()
+    pooled = expected < 5
+    if pooled.any():
+        counts = np.append(counts[~pooled], counts[pooled].sum())
+        expected = np.append(expected[~pooled], expected[pooled].sum())
+    return stats.chi2.sf(((counts - expected) ** 2 / expected).sum(), len(counts) - 1)
+
+
+def _check_chi_square(index, count, folder):
+    """Rationale: samples must fall into the cells of the sphere as the pdf says.
+
+    Expected: p-values above the Sidak share of LEVEL over all configurations. The counts expected come from NODES^2
+    midpoints a cell; the pdf jumps at the direction opposite to the given one, and doubling the nodes moves no cell
+    by more than a small part of its statistical error.
+    """
+    alpha, pair = CONFIGURATIONS[index]
+    w, t = (np.array(x) for x in PAIRS[pair])
+    expected = count * _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES)
+    counts = _counts(_directions(w, t, alpha, np.uint64(100 + index), count, False))
+    value = _chi_square(counts, expected)
+    least = 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS))
+    if value <= least:
+        np.savez(folder / "evidence.npz", counts=counts, expected=expected, w=w, t=t, alpha=alpha)
+    assert value > least, f"p = {value:.2e} at alpha {alpha}, {pair}; counts and expected in {folder}/evidence.npz"
+
+
+@pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
+def test_directions_pass_a_chi_square_test(index, tmp_path):
+    _check_chi_square(index, 400_000, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
+def test_many_directions_pass_a_chi_square_test(index, tmp_path):
+    _check_chi_square(index, 10_000_000, tmp_path)
+
+
+def test_the_chi_square_test_sees_a_roughness_off_by_two_percent():
+    w, t = (np.array(x) for x in PAIRS["tilted"])
+    expected = 400_000 * _cell_integrals(w, t, 0.306, ROWS, COLUMNS, NODES)
+    assert _chi_square(_counts(_directions(w, t, 0.3, np.uint64(1), 400_000, False)), expected) < 1e-6
+
+
+@pytest.mark.parametrize(("alpha", "pair"), CONFIGURATIONS)
+def test_the_pdf_integrates_to_1(alpha, pair):
+    # The jump at -given leaves the midpoint rule an error of a node's area times the jump.
+    w, t = (np.array(x) for x in PAIRS[pair])
+    area = 2 * math.pi**2 / (ROWS * COLUMNS * NODES**2)
+    largest = 1 / (4 * math.pi * alpha * sigma(*w, *t, alpha))
+    total = _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES).sum()
+    assert total == pytest.approx(1.0, abs=10 * area * largest)
+
+
+def _random_configurations(count, seed):
+    """Yield given, tangent, alpha, thickness and the direction that the sampler finds."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        w, t = _unit(rng.uniform(0, 89.9), rng.uniform(0, 360)), _unit(rng.uniform(0, 180), rng.uniform(0, 360))
+        alpha, thickness = float(rng.choice([0.01, 0.1, 0.3, 1.0])), 10 ** rng.uniform(-3, 2)
+        yield w, t, alpha, thickness, sample_flake_scatter(*w, *t, alpha, rng.uniform(), rng.uniform())
+
+
+def test_the_weight_is_the_point_model_times_cosine_over_pdf():
+    # The given direction's own sigma over the cosine leads, not the sampled one's: which one, no chi-square test sees.
+    sides = {1: 0, -1: 0}
+    for w, t, alpha, thickness, s in _random_configurations(4000, 3):
+        sigmas, cosines = (sigma(*w, *t, alpha), sigma(*s, *t, alpha)), (abs(w[2]), abs(s[2]))
+        weight = flake_scatter_weight(*sigmas, w[2], s[2], thickness)
+        assert 0.0 <= weight <= 1.0
+        flakes = density(w[0] + s[0], w[1] + s[1], w[2] + s[2], *t, alpha)
+        form = reflection if s[2] > 0 else transmission
+        value = form(flakes, *sigmas, *cosines, thickness) * cosines[1]
+        assert weight * flake_scatter_pdf(*w, *s, *t, alpha) == pytest.approx(value, rel=1e-11, abs=1e-290)
+        sides[1 if s[2] > 0 else -1] += 1
+    assert min(sides.values()) > 1000
+
+
+@pytest.mark.parametrize("sampled", [0.5, -0.5])
+def test_swapping_given_and_sampled_changes_the_weight(sampled):
+    # Thin layer: the weight is the given direction's T sigma / cos, whatever the other one.
+    assert flake_scatter_weight(0.2, 0.9, 0.8, sampled, 1e-9) == pytest.approx(1e-9 * 0.2 / 0.8, rel=1e-8)
+    assert flake_scatter_weight(0.9, 0.2, sampled, 0.8, 1e-9) == pytest.approx(1e-9 * 0.9 / 0.5, rel=1e-8)
+
+
+def test_weights_lie_in_0_to_1_at_the_limits():
+    for cos_sampled in (0.0, 1e-300, -1e-300, 1e-8, -1e-8, 1.0, -1.0):
+        for thickness in (1e-6, 2.0, 1e6):
+            for sigma_given, cos_given in ((0.01, 1.0), (1.0, 1e-3), (0.3, -0.5)):
+                weight = flake_scatter_weight(sigma_given, 0.5, cos_given, cos_sampled, thickness)
+                assert 0.0 <= weight <= 1.0
+
+
+def test_pdf_times_sigma_is_reciprocal():
+    for w, t, alpha, _, s in _random_configurations(500, 5):
+        there = sigma(*w, *t, alpha) * flake_scatter_pdf(*w, *s, *t, alpha)
+        back = sigma(*s, *t, alpha) * flake_scatter_pdf(*s, *w, *t, alpha)
+        assert there == pytest.approx(back, rel=1e-14)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("pair", ["tilted", "grazing"])
+def test_sampled_energy_is_the_quadrature_of_the_point_model(alpha, pair):
+    # 2^16 Owen points against 480 x 480 midpoints a hemisphere: both are within a few 1e-4 of the truth.
+    (w, t), thickness = PAIRS[pair], 2.0
+    s = _directions(np.array(w), np.array(t), alpha, np.uint64(9), 2**16, True)
+    sigma_w = sigma(*w, *t, alpha)
+    weights = np.array([flake_scatter_weight(sigma_w, sigma(*x, *t, alpha), w[2], x[2], thickness) for x in s])
+    for side in (1.0, -1.0):
+        ours = weights[s[:, 2] * side > 0].sum() / len(s)
+        assert ours == pytest.approx(_energy(w, t, alpha, thickness, side), abs=5e-4)
+
+
+def _energy(w, t, alpha, thickness, side):
+    """Return the energy that the slab scatters once into one hemisphere, by midpoints; textbook matrices, no kernel."""
+    n = 480
+    z, phi = np.meshgrid(side * (np.arange(n) + 0.5) / n, 2 * math.pi * (np.arange(n) + 0.5) / n, indexing="ij")
+    r = np.sqrt(1 - z * z)
+    s = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+    shape = np.eye(3) - (1 - alpha**2) * np.outer(t, t)
+    h = s + w
+    h /= np.linalg.norm(h, axis=-1, keepdims=True)
+    q = np.einsum("abi,ij,abj->ab", h, np.linalg.inv(shape), h)
+    flakes = 1 / (math.pi * alpha * q * q)
+    near = math.sqrt(np.array(w) @ shape @ w) / w[2]
+    far = np.sqrt(np.einsum("abi,ij,abj->ab", s, shape, s)) / np.abs(z)
+    if side > 0:
+        crossing = -np.expm1(-thickness * (near + far)) / (near + far)
+    else:
+        crossing = (np.exp(-thickness * near) - np.exp(-thickness * far)) / (far - near)
+    return float((flakes * crossing / (4 * w[2])).mean() * 2 * math.pi)
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.1, 1.0])
+def test_samples_keep_their_digits_near_the_fibre_axis(alpha):
+    """Rationale: alpha = .01 and a given direction along the fibre is where matrix forms lose four digits.
+
+    Expected: n.d = sqrt(1 - first), where n and d are rebuilt from the returned direction with S^(1/2) and its inverse
+    in 50 digits. Tolerance: the direction is rounded to 1e-16; S^(-1/2) magnifies that by 1/alpha, and the half vector
+    by 1/|w + s|.
+    """
+    mpmath.mp.dps = 50
+    rng = np.random.default_rng(7)
+    for tilt in (0.0, 1e-9, 1e-4, 0.01, 0.3):
+        for _ in range(12):
+            t = np.array(_unit(rng.uniform(20, 160), rng.uniform(0, 360)))
+            across = np.cross(t, rng.normal(size=3))
+            w = math.cos(tilt) * t + math.sin(tilt) * across / np.linalg.norm(across)
+            w = t if tilt == 0.0 else w / np.linalg.norm(w)
+            first, second = rng.uniform(size=2)
+            s = np.array(sample_flake_scatter(*w, *t, alpha, first, second))
+            assert abs(np.linalg.norm(s) - 1) < 4e-16
+            assert np.isfinite(flake_scatter_pdf(*w, *s, *t, alpha))
+            exact = _cosine_to_axis(w, s, t, alpha)
+            assert abs(exact - mpmath.sqrt(1 - mpmath.mpf(first))) < 2e-15 / alpha / np.linalg.norm(w + s)
+
+
+def _cosine_to_axis(w, s, t, alpha):
+    """Return n.d in 50 digits: n = S^(-1/2) h and d = S^(1/2) w, both normalised."""
+    w, s, t = (mpmath.matrix([mpmath.mpf(float(x)) for x in v]) for v in (w, s, t))
+    projector = t * t.T / (t.T * t)[0]
+    d = (mpmath.eye(3) - (1 - mpmath.mpf(alpha)) * projector) * w
+    n = (mpmath.eye(3) - (1 - 1 / mpmath.mpf(alpha)) * projector) * (w + s)
+    return (n.T * d)[0] / mpmath.sqrt((n.T * n)[0] * (d.T * d)[0])
+
+
+def test_first_number_0_mirrors_in_the_axis_and_round_flakes_need_no_tangent():
+    # alpha = 1: n = m, so first = 0 returns the direction itself, and first = 1/2 turns it by 90 degrees.
+    w, t = PAIRS["tilted"]
+    assert sample_flake_scatter(*w, *t, 1.0, 0.0, 0.3) == pytest.approx(w, abs=1e-15)
+    assert np.dot(sample_flake_scatter(*w, *t, 1.0, 0.5, 0.3), w) == pytest.approx(0.0, abs=1e-15)

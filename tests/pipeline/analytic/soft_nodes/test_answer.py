@@ -1,0 +1,157 @@
+"""The sums against the truth: without shadows to the error of their rules, with soft shadows to some per cent."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.soft_nodes.answer import sum_queries
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from reports.measure.furnace import DIRECTIONS, furnace_queries
+from weaves.draft import Matrix
+from weaves.fabric import load_fabric
+
+COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
+
+
+def cloth(name, **changes):
+    fabric = load_fabric(name)
+    return fabric.model_copy(
+        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
+    )
+
+
+def bare(table, queries):
+    """Return the components with nothing hidden; the area of gaps has no other."""
+    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo)
+    found, gaps = sum_queries(table, *columns)
+    assert not gaps.any()
+    area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)
+    return np.concatenate([found[:, :, BARE_SPECULAR], found[:, :, BARE_DIFFUSE] / math.pi], axis=1) / area
+
+
+def relative_error(found, truth):
+    """Return the rms error of a grey fabric's colour over its mean."""
+    return math.sqrt(np.mean(((found - truth) @ COLOUR) ** 2)) / np.mean(truth @ COLOUR)
+
+
+@pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.3, 1.0), (3.0, 8.0)], ids=["narrow", "middle", "wide"])
+@pytest.mark.parametrize(("name", "bound"), [("polyester_lining", 0.02), ("cotton_twill", 0.02), ("satin_8", 0.03)])
+def test_without_shadows_they_are_quadrature(name, bound, sigma):
+    """What is left is the footprint's tail of 1 %, eight nodes across a yarn and a highlight's four places."""
+    fabric = load_fabric(name)
+    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.weave.repeat, 3, 0, 48)
+    options = TruthOptions(estimator="quadrature", shadows=False, relative_error=2e-3)
+    assert relative_error(bare(tabulate(fabric), queries), estimate(fabric, queries, options, 1).mean) < bound
+
+
+CASES = {
+    "plain": (cloth("polyester_lining"), (0.08, 0.025, 0.025)),
+    "twill": (cloth("cotton_twill"), (0.15, 0.03, 0.025)),
+    "satin": (cloth("silk_charmeuse"), (0.25, 0.05, 0.03)),
+    "plain with gaps": (cloth("polyester_lining", width=0.7), (0.08, 0.025, 0.025)),
+    "twill with gaps": (cloth("cotton_twill", width=0.8), (0.15, 0.04, 0.025)),
+    "gauze": (load_fabric("gauze"), (0.15, 0.04, 0.025)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_with_shadows_they_are_some_per_cent_off(case):
+    """Colour RMSE over the mean for narrow, middle and wide footprints; patches hidden almost wholly left out."""
+    fabric, bounds = CASES[case]
+    table = tabulate(fabric)
+    for sigma, bound in zip(((0.06, 0.24), (0.3, 1.0), (3.0, 8.0)), bounds, strict=True):
+        queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 7, 0, 80)
+        truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+        features, found, _ = read_queries(table, queries)
+        clear = features[:, 25] > 0.02
+        assert clear.mean() > 0.9
+        assert relative_error(found[clear], truth[clear]) < bound
+
+
+def test_footprints_along_the_axes():
+    """Stretched up to six times, either way round; the same through an angle of a right one."""
+    fabric = load_fabric("cotton_twill")
+    queries = draw_queries(QueryOptions(sigma=(0.3, 2.0), max_angle=70.0), fabric.weave.repeat, 9, 0, 60)
+    stretch = np.geomspace(1.0, 6.0, 60).astype(np.float32)
+    queries = queries._replace(sigma=queries.sigma * stretch, sigma_minor=queries.sigma / np.sqrt(stretch))
+    turned = queries._replace(angle=np.full(60, math.pi / 2, np.float32))
+    table = tabulate(fabric)
+    for asked in (queries, turned):
+        truth = estimate(fabric, asked, TruthOptions(relative_error=0.01), 1).mean
+        assert relative_error(read_queries(table, asked)[1], truth) < 0.04
+    swapped = queries._replace(sigma=queries.sigma_minor, sigma_minor=queries.sigma)
+    np.testing.assert_allclose(read_queries(table, turned)[1], read_queries(table, swapped)[1], rtol=1e-5)
+
+
+@pytest.mark.parametrize(("name", "bound"), [("cotton_twill", 0.03), ("silk_charmeuse", 0.045), ("gauze", 0.03)])
+def test_footprints_at_an_angle(name, bound):
+    """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
+    fabric = load_fabric(name)
+    kinds = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
+    queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
+    assert np.abs(deviations(queries)[2]).max() > 0.7
+    table, truth = tabulate(fabric), estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+    size = np.sqrt(queries.sigma * queries.sigma_minor)
+    rounded = queries._replace(sigma=size, sigma_minor=size)
+    wrong = relative_error(read_queries(table, queries)[1], truth)
+    assert wrong < bound
+    assert relative_error(read_queries(table, rounded)[1], truth) > 1.5 * wrong
+
+
+def test_translation_by_repeats_changes_nothing():
+    fabric = load_fabric("denim")
+    table = tabulate(fabric)
+    queries = draw_queries(QueryOptions(sigma=(0.06, 2.0)), fabric.weave.repeat, 4, 0, 100)
+    queries = queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
+    far = queries._replace(u=queries.u + np.float32(4096), v=queries.v - np.float32(4096))
+    np.testing.assert_array_equal(read_queries(table, far)[0], read_queries(table, queries)[0])
+
+
+@pytest.mark.parametrize("width", [1.0, 0.7, 0.1])
+def test_extremes_stay_finite_and_not_negative(width):
+    fabric = cloth("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
+    table = tabulate(fabric)
+    angles = np.radians([0.0, 60.0, 89.0, 89.9])
+    sizes = np.float32([1e-3, 0.1, 0.249, 0.251, 0.7, 3.0, 1e4])
+    grid = np.meshgrid(angles, angles, sizes, sizes, [0.3, 1e6 + 0.3, -1e6], [0.1, 2.0], indexing="ij")
+    i, o, major, minor, centre, turn = (axis.ravel() for axis in grid)
+    wi = np.stack([np.sin(i) * np.cos(turn), np.sin(i) * np.sin(turn), np.cos(i)], axis=1).astype(np.float32)
+    wo = np.stack([np.sin(o), 0 * o, np.cos(o)], axis=1).astype(np.float32)
+    centre, major, minor = (column.astype(np.float32) for column in (centre, major, minor))
+    queries = Queries.round(centre, centre, major, wi, wo)._replace(sigma_minor=minor)
+    for values in read_queries(table, queries):
+        assert np.isfinite(values).all()
+    assert (read_queries(table, queries)[1] >= 0).all()
+
+
+@pytest.mark.parametrize("side", [7, 12])
+def test_irregular_drafts_of_many_floats(side):
+    """Merged kinds: wide footprints within 4 %."""
+    random = np.random.default_rng(side)
+    rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
+    fabric = cloth("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
+    queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
+    truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
+    assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.04
+
+
+def test_without_shadows_no_cloth_makes_light():
+    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
+
+    Diffuse: exactly bounded. Specular, scattered once: far below.
+    """
+    for name in ("polyester_lining", "silk_charmeuse", "voile"):
+        fabric = load_fabric(name)
+        reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
+        energy = 2.0 * math.pi * reading.bounds.reshape(-1, DIRECTIONS, 4).mean(axis=1)
+        assert energy[:, 2:].sum(axis=1).max() < 1.005
+        assert energy[:, :2].sum(axis=1).max() < 0.7
+        assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()

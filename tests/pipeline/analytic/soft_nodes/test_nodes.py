@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, LANES, LEVELS, tabulate
+from weaves.draft import Matrix
+from weaves.fabric import load_fabric
+
+
+def irregular(side, width):
+    random = np.random.default_rng(4)
+    rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
+    fabric = load_fabric("polyester_lining")
+    yarns = {key: getattr(fabric, key).model_copy(update={"width": width}) for key in ("warp", "weft")}
+    return fabric.model_copy(update={"draft": Matrix(rows=rows), **yarns})
+
+
+@pytest.mark.parametrize(
+    ("fabric", "most"),
+    [
+        (load_fabric("polyester_lining"), 1e5),
+        (load_fabric("satin_8"), 3e5),
+        (irregular(8, 1.0), 1.3e6),
+        (irregular(8, 0.8), 1.3e6),
+    ],
+    ids=["plain", "satin", "irregular", "irregular with gaps"],
+)
+def test_tables_stay_small(fabric, most):
+    table = tabulate(fabric)
+    assert table.nbytes < most
+    assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
+    assert table.evenly.size <= 256 + 128 + 3 * LANES
+
+
+def test_horizons_of_narrow_and_wide_footprints_agree():
+    """A node's mean horizon is that of the grid over its box: both average to the same over a cell."""
+    table = tabulate(load_fabric("polyester_lining"))
+    for family in range(2):
+        a, b = table.starts[family], table.starts[family + 1]
+        weights = table.evenly[a:b] / table.evenly[a:b].sum()
+        nodes = (table.mean[:, a:b] * weights).sum(axis=(1, 2))
+        (block,) = {int(row[1]) for row in table.pieces if row[0] == family}
+        grid = table.grid[block] / LEVELS
+        size = grid.shape[-1]
+        across = np.diff(np.sin(np.pi * (np.linspace(0, 1, size + 1) - 0.5))) / 2
+        axes = (across, np.full(size, 1 / size))
+        x, y = axes if family == 0 else axes[::-1]
+        np.testing.assert_allclose(nodes, np.einsum("ayx,x,y->a", grid, x, y), atol=2e-3)
+    assert table.grid.shape[1] == AZIMUTHS

@@ -1,0 +1,39 @@
+"""Horizons over boxes against the cells they hold, and shares of a box against points of it."""
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.gauss_rules import overlap
+from pipeline.analytic.soft_horizons import above, azimuths_apart, over_boxes, ramp, seen_and_lit
+
+
+def test_boxes_of_whole_cells_have_the_moments_of_these():
+    grid = np.random.default_rng(1).random((3, 6, 8))
+    rows = overlap(np.array([0.0, 0.5, 1.0]), np.linspace(0, 1, 7))
+    columns = overlap(np.array([0.0, 0.25, 1.0]), np.linspace(0, 1, 9))
+    mean, variance = over_boxes(grid, grid**2, rows, columns)
+    boxes = [part.reshape(3, -1) for half in (grid[:, :3], grid[:, 3:]) for part in (half[..., :2], half[..., 2:])]
+    np.testing.assert_allclose(mean, np.stack([box.mean(axis=1) for box in boxes], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(variance, np.stack([box.var(axis=1) for box in boxes], axis=1), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("turn", "expected"), [(0.0, "less"), (90.0, "product"), (180.0, "both leave")])
+def test_what_hides_one_hides_or_shows_the_other(turn, expected):
+    """A box of 10,000 points; light and viewer are free of the same ones, of independent ones, or of opposite ones."""
+    azimuth = np.radians(turn)
+    ways = azimuths_apart(*np.array([0.6, 0.0, 0.3 * np.cos(azimuth), 0.3 * np.sin(azimuth)], np.float32))
+    assert sum(ways) == pytest.approx(1.0)
+    first, second = np.float32(0.7), np.float32(0.4)
+    points = (np.arange(10_000) + 0.5) / 10_000
+    free = points < first
+    chosen = {"less": points < second, "product": points * 100 % 1 < second, "both leave": points > 1 - second}
+    assert seen_and_lit(first, second, *ways) == pytest.approx((free & chosen[expected]).mean(), abs=1e-3)
+
+
+def test_a_ramp_is_the_share_of_a_spread_horizon():
+    """Horizons even between 0.3 and 0.5, of which a direction clears those beneath it."""
+    horizons = 0.3 + 0.2 * (np.arange(1000) + 0.5) / 1000
+    sharpness = np.float32(1.0 / (np.sqrt(12.0) * horizons.std()))
+    for rise in np.float32([0.2, 0.32, 0.4, 0.49, 0.6]):
+        found = ramp(above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
+        assert found == pytest.approx((horizons < rise).mean(), abs=2e-3)

@@ -1,0 +1,175 @@
+"""What a kernel computes does not depend on who compiled it, when, or what was compiled before.
+
+Kernels of a small copy, and the real ones in a slow test, in fresh processes: the first of them compile, the others
+read the cache, and every process uses the kernels in an order of its own.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+
+# `smooth` sums 48 products and is too long to be built into each of its callers; `plain` allows no regrouping and calls
+# the same function as `fast`, with an operation that numba writes in Python (`x**2`).
+KERNELS = """
+import numpy as np
+from pipeline.compiled.decorators import fast_kernel, inlined_kernel, kernel
+
+@kernel
+def shared(x):
+    total = np.float32(0)
+    for k in range(len(x)):
+        total += x[k] * x[k] + x[k]
+    return total
+
+@fast_kernel
+def inverse_length(x, y, z):
+    return np.float32(1) / (x**2 + y**2 + z**2)
+
+@fast_kernel
+def fast(x):
+    total = shared(x)
+    for k in range(len(x) - 2):
+        total += inverse_length(x[k], x[k + 1], x[k + 2])
+    return total
+
+@kernel
+def plain(x):
+    total = shared(x)
+    for k in range(len(x) - 2):
+        total += x[k] ** 2 + x[k + 2] ** 2 * np.float32(0.7)
+    return total
+
+@fast_kernel
+def smooth(x, out):
+    for j in range(len(out)):
+        out[j] = np.float32(0)
+        for k in range(len(x)):
+            out[j] += x[k] * x[k] * np.float32(1.1) + x[k] / np.float32(3) + out[j] * np.float32(0.01)
+        for k in range(len(x) - 1):
+            out[j] += np.sqrt(abs(x[k] * x[k + 1] + np.float32(0.3) * x[k] * x[j])) / (np.float32(1.7) + x[k] * x[k])
+
+@fast_kernel
+def twice(x):
+    out = np.zeros(5, np.float32)
+    smooth(x[:48], out)
+    first = out.sum()
+    smooth(x[7:48], out)
+    smooth(x[3:], out[1:4])
+    return first + out.sum()
+"""
+
+ASK = """
+import sys
+import numpy as np
+from pipeline.truth import small
+
+x = (np.random.default_rng(5).random(61) - 0.3).astype(np.float32)
+def smooth():
+    out = np.zeros(5, np.float32)
+    small.smooth(x, out)
+    return out
+asked = {name: (lambda name=name: getattr(small, name)(x)) for name in ("fast", "plain", "twice")}
+asked |= {"smooth": smooth, "shared": lambda: small.shared(x)}
+answers = {name: asked[name]() for name in sys.argv[1:]}
+for name in sorted(answers):
+    print(name, np.asarray(answers[name], np.float32).tobytes().hex())
+"""
+
+REAL = """
+import hashlib
+import sys
+import numpy as np
+from pipeline.models.gauss_nodes.options import GaussNodesOptions
+from pipeline.models.gauss_nodes.model import Quadrature
+from pipeline.models.soft_nodes.model import Sums
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.analytic.horizon_points.sampler import HorizonSampler
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import load_fabric
+
+fabric = load_fabric("denim")
+queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
+asked = {
+    "table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="table"), 1)[:2]),
+    "quadrature": lambda: Quadrature(4, GaussNodesOptions(model="quadrature")).predict(fabric, queries),
+    "sums": lambda: Sums().predict(fabric, queries),
+    "points": lambda: HorizonSampler(fabric).sample(queries, 16, True, 1),
+}
+answers = {name: asked[name]() for name in sys.argv[1:]}
+for name in sorted(answers):
+    print(name, hashlib.sha256(np.ascontiguousarray(answers[name]).tobytes()).hexdigest())
+"""
+
+
+def start(root: Path, script: str, *order: str) -> subprocess.Popen[str]:
+    """Start a fresh process that asks the kernels under `root` in this order."""
+    environment = os.environ | {"PYTHONPATH": str(root), "NUMBA_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", script, *order]
+    return subprocess.Popen(command, env=environment, cwd=root, text=True, stdout=subprocess.PIPE)
+
+
+def answers(process: subprocess.Popen[str]) -> str:
+    """Return what it printed, one kernel a line, sorted by name."""
+    out, _ = process.communicate()
+    assert process.returncode == 0
+    return out
+
+
+@pytest.fixture
+def copies(tmp_path: Path) -> list[Path]:
+    """Return three folders with the decorators and small kernels, nothing compiled."""
+    folders = [tmp_path / name for name in "abc"]
+    for folder in folders:
+        truth = folder / "pipeline" / "truth"
+        truth.mkdir(parents=True)
+        for name in ("kernel", "compiler"):
+            source = ROOT / "pipeline" / "truth" / f"{name}.py"
+            if source.exists():
+                shutil.copy(source, truth)
+        (truth / "small.py").write_text(KERNELS)
+    return folders
+
+
+def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies):
+    order = ("fast", "plain", "twice", "smooth", "shared")
+    cold = answers(start(copies[0], ASK, *order))
+    warm = answers(start(copies[0], ASK, *order))
+    warm_other = answers(start(copies[0], ASK, *order[::-1]))
+    cold_other = answers(start(copies[1], ASK, *order[::-1]))
+    assert cold == warm == warm_other == cold_other and len(cold.split()) == 10
+    together = [start(copies[2], ASK, *order), start(copies[2], ASK, *order[::-1])]
+    assert [answers(process) for process in together] == [cold, cold]
+
+
+WEAK = """
+import re
+import numpy as np
+from pipeline.truth import small
+
+small.twice(np.ones(61, np.float32))
+(code,) = small.twice.inspect_asm().values()
+print("call" in code and "smooth" in code, *re.findall(r"[.]weak\\s+(\\S+)", code))
+"""
+
+
+def test_a_kernel_runs_its_own_copies_of_what_it_calls(copies):
+    """A weak function is one that the linker replaces by whatever of its name came into the process first."""
+    assert answers(start(copies[0], WEAK)).split() == ["True"]
+
+
+@pytest.mark.slow
+def test_real_kernels_answer_the_same_cold_and_warm_in_any_order(tmp_path):
+    for name in "ab":
+        for package in ("weaves", "pipeline"):
+            shutil.copytree(ROOT / package, tmp_path / name / package, ignore=shutil.ignore_patterns("__pycache__"))
+    order = ("table", "quadrature", "sums", "points")
+    cold = answers(start(tmp_path / "a", REAL, *order))
+    assert answers(start(tmp_path / "a", REAL, *order[::-1])) == cold
+    assert answers(start(tmp_path / "b", REAL, *order[::-1])) == cold

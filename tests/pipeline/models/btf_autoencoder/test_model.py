@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+import torch
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.btf_autoencoder.model import build, restore
+from pipeline.models.btf_autoencoder.options import BtfAutoencoderOptions
+from pipeline.models.unified_btf.model import UnifiedBtf
+from pipeline.shards.queries import QueryOptions, draw_queries
+from weaves.fabric import load_fabric
+
+SMALL = BtfAutoencoderOptions(texels_per_yarn=2, samples=4, fewest_samples=2, encoder_hidden=8, weights=4, hidden=8)
+LINING, BASKET = load_fabric("polyester_lining"), load_fabric("basket")
+
+
+def card_of(fabric):
+    return {"fabrics": [{"name": fabric.name, "optics": fingerprint(fabric.optics()), "repeat": [0, 0]}]}
+
+
+def test_a_network_knows_one_fabric():
+    torch.manual_seed(0)
+    network = build(SMALL, [LINING])
+    (method,) = restore(SMALL, [(card_of(LINING), network.state_dict())])
+    assert method.covers(LINING)
+    assert method.covers(LINING.model_copy(update={"name": "other"}))
+    assert not method.covers(BASKET)
+    method.prepare(LINING)
+    queries = draw_queries(QueryOptions(), (2, 2), 5, 0, 32)
+    np.testing.assert_array_equal(method.predict(LINING, queries), UnifiedBtf(network).predict(LINING, queries))
+    with pytest.raises(ValueError, match="too many values"):
+        build(SMALL, [LINING, BASKET])
+
+
+def test_each_fabric_is_answered_by_its_own_network():
+    weights = []
+    for seed, fabric in enumerate((LINING, BASKET)):
+        torch.manual_seed(seed)
+        weights.append((card_of(fabric), build(SMALL, [fabric]).state_dict()))
+    (both,) = restore(SMALL, weights)
+    queries = draw_queries(QueryOptions(), (2, 2), 5, 0, 8)
+    for fabric, trained in zip((LINING, BASKET), weights, strict=True):
+        (alone,) = restore(SMALL, [trained])
+        np.testing.assert_array_equal(both.predict(fabric, queries), alone.predict(fabric, queries))
+        assert both.bytes_stored(fabric) == alone.bytes_stored(fabric)
+
+
+def test_eight_numbers_are_enough_for_a_texel():
+    assert BtfAutoencoderOptions().latent == 8
+    assert BtfAutoencoderOptions.of_one_material

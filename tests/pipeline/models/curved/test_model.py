@@ -1,0 +1,224 @@
+"""The network for curved surfaces: what each module sees, what is certain, and that it learns silhouettes."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.curved.model import Curved, CurvedNetwork, build
+from pipeline.models.curved.options import CurvedOptions
+from pipeline.models.curved.silhouettes import View, draw_silhouettes
+from pipeline.models.domain import Domain
+from pipeline.models.method import Batch
+from pipeline.models.neumip.model import Neumip, NeumipNetwork
+from pipeline.models.neumip.options import NeumipOptions
+from pipeline.truth.geometry.heightfield import height_field
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+SMALL = CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0))
+GRAZING = SMALL.model_copy(update={"silhouette": "grazing"})
+DENIM = load_fabric("denim")
+
+
+def _wo(cosine, azimuth=0.0):
+    cosine = np.asarray(cosine, np.float64)
+    sine = np.sqrt(1 - cosine**2)
+    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine + 0 * azimuth], -1).astype(np.float32)
+
+
+def _view(cosine, curvature, sigma=2.0):
+    wo = torch.from_numpy(_wo(np.atleast_1d(cosine)))
+    full = torch.full((len(wo),), 0.3)
+    return View(full, full, torch.full_like(full, sigma), wo, torch.full_like(full, curvature))
+
+
+def _queries(count, curvature=0.1, behind=False):
+    random = np.random.default_rng(count)
+    wo = _wo(random.uniform(0.05, 1, count), random.uniform(0, 6, count))
+    wi = wo[::-1] * np.float32([1, 1, -1 if behind else 1])
+    u, v, sigma = random.uniform(0.1, 4, (3, count)).astype(np.float32)
+    return Queries.round(u, v, sigma, wi, wo)._replace(curvature=np.full(count, curvature, np.float32))
+
+
+def _method(options=SMALL, domain=None):
+    torch.manual_seed(1)
+    network = CurvedNetwork(options, DENIM.weave.repeat)
+    return Curved("curved", {fingerprint(DENIM.optics()): network}, domain)
+
+
+def test_published_sizes():
+    """One texture and three hidden layers of 24 for each module; directions x and y, curvature as it is."""
+    options = SMALL.model_copy(update={"levels": 1, "directions": "projected", "curvature_input": "linear"})
+    network = CurvedNetwork(options, (4, 4))
+    widths = {
+        name: [layer.weight.shape for layer in getattr(network, name) if isinstance(layer, torch.nn.Linear)]
+        for name in ("opacity", "offset", "decoder")
+    }
+    hidden = [(24, 24), (24, 24)]
+    assert widths["opacity"] == widths["offset"] == [(24, 7 + 3), *hidden, (1, 24)]
+    assert widths["decoder"] == [(24, 7 + 5), *hidden, (4, 24)]
+    assert len(network.levels) == len(network.opacity_levels) == 1
+    assert network.architecture()["parameters"]["textures"] == 3 * 7 * 16 * 16
+
+
+def test_every_departure_is_named():
+    assert SMALL.model_copy(update={"levels": 1, "curvature_input": "linear", "certain": False}).departures == (
+        "four components in place of RGB",
+    )
+    assert len(SMALL.departures) == 4
+
+
+@pytest.mark.parametrize("way", ["linear", "root", "touch"])
+def test_curvature_enters_as_asked(way):
+    network = CurvedNetwork(SMALL.model_copy(update={"curvature_input": way}), (4, 4))
+    seen = network._view(_view([0.6, 1.0], 0.25))
+    expected = {"linear": [0.25], "root": [0.5], "touch": [0.5, 0.75 / math.sqrt(0.75**2 + 0.5)]}[way]
+    torch.testing.assert_close(seen[0], torch.tensor([0.8, 0.0, 0.6, *expected]))
+    if way == "touch":
+        assert seen[1, -1] == 1.0  # straight down
+        assert network._view(_view([0.01], 0.0))[0, -1] == 1.0  # flat: a ray never turns
+
+
+def test_neither_opacity_nor_offset_knows_the_light():
+    method, queries = _method(), _queries(50)
+    other = queries._replace(wi=-queries.wi)
+    np.testing.assert_array_equal(method.missed(DENIM, queries), method.missed(DENIM, other))
+    assert (method.predict(DENIM, queries) != method.predict(DENIM, other)).any()
+
+
+def test_rays_that_sink_below_every_yarn_have_hit_one():
+    """tan^2 >= 2 kappa fall; on flat cloth any ray. A network with gaps knows no such thing."""
+    fall, curvature = 0.5, 0.1
+    edge = math.sqrt(2 * curvature * fall)
+    cosine = edge / math.sqrt(1 + edge * edge) * np.array([0.99, 1.01])
+    network = CurvedNetwork(SMALL, (4, 4), fall=fall)
+    below, above = network.cover(_view(cosine, curvature)).tolist()
+    assert below < 1.0
+    assert above == 1.0
+    assert network.cover(_view([0.001], 0.0)).tolist() == [1.0]
+    assert CurvedNetwork(SMALL, (4, 4)).cover(_view([0.9], 0.0)).item() < 1.0
+
+
+def test_a_cloth_with_gaps_is_never_certain():
+    front = height_field(DENIM)
+    assert build(SMALL, [DENIM]).fall.item() == pytest.approx(front.highest - front.lowest)
+    narrow = {family: getattr(DENIM, family).model_copy(update={"width": 0.7}) for family in ("warp", "weft")}
+    assert build(SMALL, [DENIM.model_copy(update=narrow)]).fall.item() < 0.0
+
+
+def test_opacity_of_the_grazing_variant_is_the_gaussian_share_below_the_cosine():
+    network = CurvedNetwork(GRAZING, (4, 4))
+    with torch.no_grad():
+        for weight in network.opacity.parameters():
+            weight.zero_()
+        network.opacity[-1].bias.copy_(torch.tensor([0.4, -50.0]))
+    mean, deviation = network.grazing(_view([0.1], 0.25))
+    assert (mean.item(), deviation.item()) == (pytest.approx(0.4), pytest.approx(0.02))
+    # In units of sqrt(kappa) = 0.5: the step lies at 0.2, and its width is 0.01.
+    found = network.cover(_view([0.17, 0.19, 0.2, 0.21, 0.23], 0.25)).tolist()
+    assert found == pytest.approx([0.00135, 0.15866, 0.5, 0.84134, 0.99865], abs=1e-4)
+    assert network.cover(_view([0.01], 0.0)).tolist() == [1.0]
+
+
+def test_grazing_cosines_do_not_depend_on_the_angle_of_the_view():
+    network = CurvedNetwork(GRAZING, (4, 4))
+    steep, flat = (torch.stack(network.grazing(_view([cosine], 0.2))) for cosine in (0.9, 0.1))
+    torch.testing.assert_close(steep, flat)
+
+
+@pytest.mark.parametrize("options", [SMALL, GRAZING])
+def test_silhouettes_are_learnt(options):
+    """A few hundred steps find opacities that no constant comes near; silhouettes alone, which no light concerns."""
+    torch.manual_seed(0)
+    options = options.model_copy(update={"silhouette_rows": 2048, "blur": 0.0})
+    network = build(options, [DENIM]).train()
+    optimiser = torch.optim.Adam(network.parameter_groups(5e-3))
+    random = np.random.default_rng(3)
+    for _ in range(120):
+        loss = network._edge_loss(*network.silhouettes.draw(128, random))
+        assert loss > 0 or options.silhouette == "opacity"
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+    others = draw_silhouettes(SMALL.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256}), DENIM)
+    view = View(*(others.get_buffer(name) for name in View._fields))
+    target = others.get_buffer("target")[:, 0]
+    with torch.no_grad():
+        error = (network.eval().cover(view) - target).square().mean().sqrt()
+    assert target.std() > 0.3
+    assert error < 0.35 * target.std()
+
+
+def test_loss_adds_the_silhouettes_to_the_components():
+    network = build(SMALL, [DENIM]).eval()
+    random = np.random.default_rng(0)
+    columns = [torch.from_numpy(random.random((1, 64)).astype(np.float32)) for _ in range(7)]
+    directions = [torch.from_numpy(_wo(random.random((1, 64)))) for _ in range(2)]
+    u, v, sigma, minor, angle, curvature, through = columns
+    target = torch.from_numpy(random.random((1, 64, 4)).astype(np.float32))
+    fabric = torch.zeros(1, dtype=torch.int64)
+    batch = Batch(fabric, u, v, sigma, *directions, minor, angle, curvature, target, through)
+    both = network.loss(batch, np.random.default_rng(1))
+    edge = network._edge_loss(*network.silhouettes.draw(64, np.random.default_rng(1)))
+    network.silhouettes = None
+    alone = network.loss(batch, np.random.default_rng(1))
+    torch.testing.assert_close(both, alone + SMALL.silhouette_weight * edge)
+
+
+def test_questions_are_no_part_of_the_weights():
+    network = build(SMALL, [DENIM])
+    assert not [name for name in network.state_dict() if "silhouettes" in name]
+    restored = CurvedNetwork(SMALL, DENIM.weave.repeat)
+    restored.load_state_dict(network.state_dict())
+    assert restored.fall == network.fall
+
+
+def test_method_answers_at_extremes_and_refuses_what_it_was_not_taught():
+    method = _method()
+    for behind in (False, True):
+        queries = _queries(40, behind=behind)
+        queries = queries._replace(u=queries.u * np.float32(1e6), sigma=queries.sigma * np.float32(1e-4))
+        prediction, through = method.predict(DENIM, queries), method.missed(DENIM, queries)
+        assert prediction.shape == (40, 4)
+        assert np.isfinite(prediction).all()
+        assert (prediction >= 0).all()
+        assert ((through >= 0) & (through <= 1)).all()
+    assert method.predict(DENIM, queries.take(slice(0))).shape == (0, 4)
+    with pytest.raises(BadInput, match=r"curvature\[3\].*trained up to 0.5"):
+        curvature = np.float32([0, 0.1, 0.5, 0.6])
+        method.predict(DENIM, _queries(4)._replace(curvature=curvature))
+    about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.0}}
+    taught = _method(domain=Domain.of(about, [DENIM]))
+    with pytest.raises(BadInput, match=r"trained up to 0\.2"):
+        taught.missed(DENIM, _queries(4, curvature=0.3))
+    with pytest.raises(BadInput, match="wi"):
+        taught.predict(DENIM, _queries(4, behind=True))
+
+
+def test_a_flat_material_may_take_part():
+    """neumip with ignore_curvature: 0 for light from behind, rows lit from there weigh nothing, others as ever."""
+    options = NeumipOptions(texels_per_yarn=4, ignore_curvature=True)
+    torch.manual_seed(2)
+    network = NeumipNetwork(options, DENIM.weave.repeat)
+    method = Neumip("neumip", {fingerprint(DENIM.optics()): network})
+    front, behind = _queries(30), _queries(30, behind=True)
+    assert (method.predict(DENIM, behind) == 0).all()
+    assert (method.predict(DENIM, front) > 0).any()
+    # Options as they were leave no trace, so that trained models keep their fingerprints.
+    assert "ignore_curvature" not in NeumipOptions().model_dump(mode="json")
+    assert NeumipOptions.model_validate(options.model_dump(mode="json")) == options
+
+    random = np.random.default_rng(0)
+    columns = [torch.from_numpy(random.random((1, 60)).astype(np.float32)) for _ in range(7)]
+    u, v, sigma, minor, angle, curvature, through = columns
+    wi = torch.from_numpy(np.concatenate([front.wi, behind.wi]))[None]
+    target = torch.from_numpy(random.random((1, 60, 4)).astype(np.float32))
+    both = Batch(torch.zeros(1, dtype=torch.int64), u, v, sigma, wi, wi.abs(), minor, angle, curvature, target, through)
+    lit = Batch(both.fabric, *(column[:, :30] for column in both[1:]))
+    blind, plain = network.loss(both, random), NeumipNetwork(NeumipOptions(texels_per_yarn=4), DENIM.weave.repeat)
+    plain.load_state_dict(network.state_dict())
+    torch.testing.assert_close(blind, plain.loss(lit, random))

@@ -1,0 +1,70 @@
+import pytest
+import torch
+
+from pipeline.models.networks.texture import blurred, level_shapes, read_pyramid, read_texture, shifted
+
+
+def test_pyramid_halves_down_to_one_texel():
+    assert level_shapes(4, 0, (5, 2)) == [(8, 20), (4, 10), (2, 5), (1, 3), (1, 2), (1, 1)]
+    assert level_shapes(4, 2, (5, 2)) == [(8, 20), (4, 10)]
+
+
+def test_texture_is_read_bilinearly_and_wraps():
+    texture = torch.arange(12.0).reshape(1, 3, 4)
+    level = [torch.zeros(4, dtype=torch.int64)]
+    # A texel's centre; half way to the next; half way across the right edge; the same a repeat further.
+    u = torch.tensor([1.5 / 4, 2.0 / 4, 1.0, 2.0])
+    v = torch.full((4,), 1.5 / 3)
+    expected = [[5.0], [5.5], [(7 + 4) / 2], [(7 + 4) / 2]]
+    torch.testing.assert_close(read_texture([texture], u, v, level), torch.tensor(expected))
+
+
+def test_levels_are_blended():
+    fine, coarse = torch.full((2, 4, 4), 1.0), torch.full((2, 2, 2), 3.0)
+    levels = [torch.tensor([0]), torch.tensor([1])]
+    shares = [torch.tensor([0.25]), torch.tensor([0.75])]
+    read = read_texture([fine, coarse], torch.tensor([0.1]), torch.tensor([0.9]), levels, shares)
+    torch.testing.assert_close(read, torch.full((1, 2), 2.5))
+
+
+def test_blur_keeps_the_mean_and_spreads_as_a_gaussian():
+    texture = torch.zeros(1, 64, 64, dtype=torch.float64)
+    texture[0, 32, 32] = 1.0
+    smooth = blurred(texture, 2.0)[0]
+    distance = torch.arange(64) - 32.0
+    assert smooth.sum().item() == pytest.approx(1.0)
+    assert (smooth.sum(0) * distance**2).sum().item() == pytest.approx(4.0, rel=1e-3)
+    assert blurred(texture, 0.2) is texture
+    one = torch.ones(3, 1, 1)
+    assert blurred(one, 9.0) is one
+
+
+def test_every_level_is_blurred_by_its_own_texels():
+    fine = torch.zeros(1, 8, 8)
+    fine[0, 4, 4] = 1.0
+    sigma, place = torch.tensor([2.0 * 0.5 / 4]), torch.tensor([4.5 / 8])
+    coarse = torch.zeros(1, 4, 4)
+    coarse[0, 2, 2] = 1.0
+    read = read_pyramid([fine, coarse], torch.tensor([2.5 / 4]), torch.tensor([2.5 / 4]), sigma, 4, blur=4.0)
+    torch.testing.assert_close(read, blurred(coarse, 2.0)[:, 2, 2][None])
+    read = read_pyramid([fine], place, place, sigma, 4, blur=4.0)
+    torch.testing.assert_close(read, blurred(fine, 4.0)[:, 4, 4][None])
+
+
+def test_shift_is_clamped_at_grazing_views():
+    wo = torch.tensor([[0.6, 0.0, 0.8], [0.0, 0.96, 0.28]])
+    half = torch.full((2,), 0.5)
+    u, v = shifted(torch.full((2, 1), 1.5), half, half, wo, (4, 1))
+    torch.testing.assert_close(u, torch.tensor([0.5 + 0.15 * 0.6 / 0.8 * 2 / 4, 0.5]))
+    torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + 0.15 * 0.96 / 0.6 * 2 / 1]))
+
+
+def test_what_is_exported_reads_the_same(monkeypatch):
+    """Exported modules gather and add where torch sums bags: up to the order of eight terms."""
+    random = torch.Generator().manual_seed(0)
+    levels = [torch.randn(3, *shape, generator=random) for shape in ((8, 12), (4, 6), (2, 3), (1, 1))]
+    u, v = (20.0 * torch.randn(200, generator=random) for _ in range(2))
+    sigma = torch.exp2(6.0 * torch.rand(200, generator=random) - 5.0)
+    bags = read_pyramid(levels, u, v, sigma, 4)
+    monkeypatch.setattr(torch.compiler, "is_exporting", lambda: True)
+    torch.testing.assert_close(read_pyramid(levels, u, v, sigma, 4), bags, rtol=1e-5, atol=1e-5)

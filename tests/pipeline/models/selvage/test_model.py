@@ -1,0 +1,184 @@
+import numpy as np
+import pytest
+import torch
+
+from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.domain import Domain
+from pipeline.models.gauss_nodes.model import restore as restore_quadrature
+from pipeline.models.gauss_nodes.options import GaussNodesOptions
+from pipeline.models.method import Batch, Method
+from pipeline.models.registry import module_of
+from pipeline.models.selvage.model import Selvage, SelvageNetwork
+from pipeline.models.selvage.options import SelvageOptions
+from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+SMALL = SelvageOptions(width=16, measured_rows=64)
+
+
+@pytest.fixture(autouse=True)
+def _fixed_weights():
+    torch.manual_seed(0)
+
+
+@pytest.fixture(scope="module")
+def fabrics():
+    return [load_fabric("polyester_lining"), load_fabric("cotton_twill")]
+
+
+def batch_of(fabric, index, seed, rows, answers=None):
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
+    if answers is None:
+        answers = estimate(fabric, asked, TruthOptions(estimator="table"), 1).mean
+    columns = (*asked, answers, np.zeros(rows, np.float32))
+    return asked, Batch(torch.tensor([index]), *(torch.from_numpy(column)[None] for column in columns))
+
+
+def trained_a_little(fabrics, options=SMALL, steps=60):
+    """Return a network after some steps on one batch, with its losses."""
+    network = SelvageNetwork(options, fabrics)
+    _, batch = batch_of(fabrics[1], 1, 5, 256)
+    optimiser = torch.optim.AdamW(network.parameter_groups(1e-2))
+    losses = []
+    for step in range(steps):
+        loss = network.loss(batch, np.random.default_rng(step))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        losses.append(loss.item())
+    return network, losses
+
+
+@pytest.mark.parametrize(("width", "count"), [(16, 996), (32, 2500), (64, 7044)])
+def test_number_of_parameters(width, count):
+    assert SelvageNetwork(SelvageOptions(width=width)).architecture()["parameters"]["total"] == count
+
+
+def test_an_untrained_network_is_the_sums(fabrics):
+    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 64)
+    method = Selvage(SelvageNetwork(SMALL))
+    assert isinstance(method, Method)
+    np.testing.assert_allclose(method.predict(fabrics[0], asked), SoftNodes().predict(fabrics[0], asked), rtol=1e-6)
+
+
+def test_it_learns_and_training_sees_what_rendering_sees(fabrics):
+    """The loss falls by a fifth; against the network's own predictions it is 0."""
+    network, losses = trained_a_little(fabrics)
+    assert losses[-1] < 0.8 * losses[0]
+    method = Selvage(network)
+    asked, _ = batch_of(fabrics[1], 1, 9, 64)
+    answers = method.predict(fabrics[1], asked)
+    assert np.abs(answers - SoftNodes().predict(fabrics[1], asked)).max() > 1e-3
+    _, batch = batch_of(fabrics[1], 1, 9, 64, answers)
+    kept = SelvageNetwork(SMALL.model_copy(update={"exchange": False}), fabrics)
+    kept.load_state_dict(network.state_dict())
+    assert kept.loss(batch, np.random.default_rng(0)).item() < 1e-10
+
+
+def test_normalised_features_have_mean_0_and_deviation_1(fabrics):
+    network = SelvageNetwork(SelvageOptions(width=16), fabrics)
+    rows = []
+    for index, fabric in enumerate(fabrics):
+        asked = draw_queries(QueryOptions(), fabric.weave.repeat, 40 + index, 0, 2000)
+        rows.append(read_queries(tabulate(fabric), asked)[0])
+    features = np.concatenate(rows)
+    features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN])
+    normal = (features - network.mean.numpy()) * network.scale.numpy()
+    varied = features.std(axis=0) > 0.01
+    np.testing.assert_allclose(normal.mean(axis=0), 0.0, atol=0.1)
+    np.testing.assert_allclose(normal[:, varied].std(axis=0), 1.0, atol=0.3)  # hidden patches are rare
+
+
+def test_building_is_deterministic(fabrics):
+    first, second = (SelvageNetwork(SMALL, fabrics) for _ in range(2))
+    torch.testing.assert_close(first.mean, second.mean, rtol=0, atol=0)
+    torch.testing.assert_close(first.scale, second.scale, rtol=0, atol=0)
+
+
+def test_exchanged_batches_teach_exchanged_answers(fabrics):
+    """A batch and its exchange cost a network that knows nothing of the exchange the same, in both orders."""
+    network, _ = trained_a_little(fabrics, steps=5)
+    _, batch = batch_of(fabrics[1], 1, 3, 64)
+    seeds = [next(s for s in range(50) if np.random.default_rng(s).integers(2) == side) for side in (0, 1)]
+    straight, exchanged = (network.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
+    assert straight != exchanged
+    untrained = SelvageNetwork(SMALL, fabrics)
+    straight, exchanged = (untrained.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
+    assert straight == pytest.approx(exchanged, rel=1e-5)
+
+
+def test_a_trained_folder_comes_back(fabrics):
+    network, _ = trained_a_little(fabrics, steps=5)
+    module = module_of("selvage")
+    (method,) = module.restore(SMALL, [({}, network.state_dict())])
+    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 64)
+    np.testing.assert_array_equal(method.predict(fabrics[0], asked), Selvage(network).predict(fabrics[0], asked))
+    table = tabulate(fabrics[0]).nbytes
+    assert method.bytes_stored(fabrics[0]) == table + 4 * 996
+    assert module.build(SMALL, fabrics).mean.abs().max() > 0
+
+
+def test_extreme_queries_are_answered_with_finite_numbers(fabrics):
+    network, _ = trained_a_little(fabrics, steps=5)
+    angles, sizes = np.radians([0.0, 89.0, 89.9]), [1e-3, 0.25, 1e4]
+    i, o, sigma, centre = (
+        axis.ravel().astype(np.float32) for axis in np.meshgrid(angles, angles, sizes, [1e6 + 0.3, -1e6], indexing="ij")
+    )
+    wi = np.stack([0.6 * np.sin(i), 0.8 * np.sin(i), np.cos(i)], axis=1).astype(np.float32)
+    wo = np.stack([np.sin(o), 0 * o, np.cos(o)], axis=1).astype(np.float32)
+    answers = Selvage(network).predict(fabrics[1], Queries.round(centre, -centre, sigma, wi, wo))
+    assert np.isfinite(answers).all()
+    assert (answers >= 0).all()
+
+
+def test_it_refuses_what_it_was_not_taught(fabrics):
+    domain = Domain.of({}, fabrics)
+    method = Selvage(SelvageNetwork(SMALL), domain)
+    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 8)
+    for changed in (
+        asked._replace(wi=-asked.wi),
+        asked._replace(wo=-asked.wo),
+        asked._replace(curvature=np.full(8, 0.1, np.float32)),
+    ):
+        with pytest.raises(BadInput, match="selvage"):
+            method.predict(fabrics[0], changed)
+        # Without a domain it still knows no more than the sums do.
+        with pytest.raises(BadInput, match="selvage"):
+            Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
+
+
+def test_small_footprints_can_be_left_to_a_rule_without_a_seam(fabrics):
+    """Below the seam the rule's own answers, above it the network's, and no jump at either end."""
+    options = SMALL.model_copy(update={"narrow_nodes": 6, "seam": (0.2, 0.3)})
+    method, plain = Selvage(SelvageNetwork(options)), Selvage(SelvageNetwork(SMALL))
+    fabric = fabrics[0]
+    (rule,) = restore_quadrature(GaussNodesOptions(nodes=[6]), [])
+    asked = draw_queries(QueryOptions(max_angle=70.0), fabric.weave.repeat, 1, 0, 64)
+
+    def at(sigma, method):
+        size = np.full(64, sigma, np.float32)
+        return method.predict(fabric, asked._replace(sigma=size, sigma_minor=size))
+
+    np.testing.assert_allclose(at(0.1, method), at(0.1, rule), rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(at(0.5, method), at(0.5, plain), rtol=1e-5, atol=1e-7)
+    for edge, one in ((0.2, rule), (0.3, plain)):
+        np.testing.assert_allclose(at(edge, method), at(edge, one), rtol=2e-3, atol=1e-4)
+    assert method.bytes_stored(fabric) > plain.bytes_stored(fabric)
+
+
+def test_a_network_told_to_shine_is_bounded(fabrics):
+    """Factors of 2 everywhere: with the bound no component exceeds the sums without shadows; without it some do."""
+    fabric = fabrics[0]
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 200)
+    bounds = read_queries(tabulate(fabric), asked).bounds
+    for bound in (True, False):
+        network = SelvageNetwork(SMALL.model_copy(update={"bound": bound}))
+        torch.nn.init.constant_(network.last.bias, 30.0)
+        answers = Selvage(network).predict(fabric, asked)
+        assert (answers <= bounds).all() == bound

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.method import Method
+from pipeline.models.registry import load_methods
+from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.models.soft_nodes.options import SoftNodesOptions
+from pipeline.shards.queries import QueryOptions, draw_queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+
+def test_it_is_the_sums_in_chunks():
+    fabric = load_fabric("polyester_lining")
+    (method,) = load_methods(SoftNodesOptions())
+    assert isinstance(method, Method)
+    assert method.covers(fabric)
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 5000)
+    table = tabulate(fabric)
+    np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
+    assert method.bytes_stored(fabric) == table.nbytes
+
+
+@pytest.mark.parametrize(
+    ("options", "column"),
+    [
+        ({"behind": 1.0}, "wi"),
+        ({"curvature": (0.1, 0.2)}, "curvature"),
+    ],
+)
+def test_what_the_sums_do_not_know_is_refused(options, column):
+    fabric = load_fabric("polyester_lining")
+    asked = draw_queries(QueryOptions(**options), fabric.weave.repeat, 2, 0, 20)
+    with pytest.raises(BadInput, match=f"20 rows; first row 0: {column}"):
+        SoftNodes().predict(fabric, asked)
+
+
+def test_viewers_behind_are_refused():
+    fabric = load_fabric("polyester_lining")
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 20)
+    with pytest.raises(BadInput, match="wo"):
+        SoftNodes().predict(fabric, asked._replace(wo=-asked.wo))

@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+import torch
+
+from pipeline.models.unified_btf.angular_samples import AngularSamples
+from pipeline.models.unified_btf.options import UnifiedBtfOptions
+from pipeline.models.unified_btf.set_encoder import SetEncoder, angles_of, read_texels
+from pipeline.shards.queries import QueryOptions, draw_queries
+
+OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
+
+
+def made_up(count: int, texels: int = 6, seed: int = 0) -> AngularSamples:
+    """Return smooth, positive samples of texels that differ, without asking the truth."""
+    drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
+    phase = np.arange(4 * texels).reshape(texels, 4)
+    wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
+    values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
+    return AngularSamples((1, texels), drawn.wi, drawn.wo, values.astype(np.float16))
+
+
+def encoder() -> SetEncoder:
+    torch.manual_seed(0)
+    built = SetEncoder(OPTIONS)
+    built.scale.fill_(10.0)
+    return built
+
+
+def encoded(model: SetEncoder, samples: AngularSamples, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
+    _, angles, values = read_texels(samples, OPTIONS)
+    latents: torch.Tensor = model(angles[chosen], values[chosen].to(torch.float32))
+    return latents
+
+
+def test_angles_tell_light_from_viewer():
+    wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
+    torch.testing.assert_close(angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
+    torch.testing.assert_close(angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
+
+
+@torch.inference_mode()
+def test_order_of_the_samples_does_not_matter():
+    """Only the rounding of the sums may differ."""
+    samples, model = made_up(500), encoder()
+    shuffled = encoded(model, samples, np.random.default_rng(0).permutation(500))
+    torch.testing.assert_close(shuffled, encoded(model, samples), rtol=1e-4, atol=1e-6)
+
+
+@torch.inference_mode()
+def test_number_of_the_samples_does_not_matter():
+    """Every sample given twice says nothing new."""
+    samples, model = made_up(50), encoder()
+    torch.testing.assert_close(encoded(model, samples, np.tile(np.arange(50), 3)), encoded(model, samples))
+
+
+@torch.inference_mode()
+def test_latents_converge_as_the_samples_grow():
+    """The encoder averages, so 50 to 5,000 samples leave an error that falls as n^(-1/2).
+
+    Expected: slope -0.5 in the logarithms. 64 independent sets leave about 0.02 on it; 0.1 is five deviations.
+    """
+    model = encoder()
+    exact = encoded(model, made_up(200_000, seed=99))
+    counts, errors = (50, 500, 5000), []
+    for count in counts:
+        differences = [encoded(model, made_up(count, seed=seed)) - exact for seed in range(64)]
+        errors.append(float(torch.stack(differences).square().mean().sqrt()))
+    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-0.5, abs=0.1)
+    assert errors[-1] < 0.1 * float(exact.square().mean().sqrt())
+
+
+@torch.inference_mode()
+def test_averaged_latents_are_the_latent_of_the_averaged_texel():
+    """Exactly so where no ReLU of the latent is on its other side: all of the encoder behind it is linear in values."""
+    samples, model = made_up(200), encoder()
+    values = samples.values.astype(np.float32).mean(axis=1, keepdims=True)  # not rounded to half precision
+    together = AngularSamples((1, 1), samples.wi, samples.wo, values)
+    for offset, tolerance in ((10.0, 1e-5), (-10.0, 1e-5)):
+        model.join.bias.fill_(offset)
+        expected = encoded(model, together)[0]
+        torch.testing.assert_close(encoded(model, samples).mean(dim=0), expected, rtol=tolerance, atol=tolerance)
+        assert (expected > 0).all() == (offset > 0)

@@ -1,0 +1,135 @@
+"""The invariants hold on cloth, and each of them finds the physics that breaks it."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pipeline.truth.checks import invariants
+from pipeline.truth.checks.check_result import LEVEL, exact, quotient, worst
+from pipeline.truth.estimator import estimate
+from weaves.fabric import load_fabric, preset_names
+
+FABRIC = load_fabric("polyester_lining")
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Spend few points: a change of 30 % is found all the same."""
+    fixed = invariants._fixed
+    monkeypatch.setattr(invariants, "_fixed", lambda count, **choices: fixed(min(count, 512), **choices))
+    monkeypatch.setattr(invariants, "_LATTICE", 32.0)
+    monkeypatch.setattr(invariants, "_STEPS", 32)
+
+
+def broken(test, fabric=FABRIC):
+    return [item.name for item in test(fabric) if item.verdict == "broken"]
+
+
+@pytest.mark.parametrize("test", invariants.INVARIANTS, ids=lambda test: test.__name__)
+def test_a_preset_keeps_the_invariants_at_few_points(brief, test):
+    found = test(FABRIC)
+    assert found and not [item for item in found if item.verdict == "broken"]
+    assert len({item.name for item in found}) == len(found)
+
+
+def test_narrow_yarns_let_light_through_and_keep_the_invariants(brief):
+    yarns = {name: getattr(FABRIC, name).model_copy(update={"width": 0.5}) for name in ("warp", "weft")}
+    fabric = FABRIC.model_copy(update=yarns)
+    assert not [name for test in invariants.INVARIANTS for name in broken(test, fabric)]
+
+
+def _scaled(factor, part=slice(None)):
+    """Return a ground truth whose components of `part` are wrong by a factor, which may depend on the query."""
+
+    def wrong(fabric, queries, options, seed, start=0):
+        answers = estimate(fabric, queries, options, seed, start)
+        by = np.broadcast_to(factor(queries, options), len(queries.u)).astype(np.float32)[:, None]
+        mean, error = answers.mean.copy(), answers.standard_error.copy()
+        mean[:, part] *= by
+        error[:, part] *= np.abs(by)
+        return answers._replace(mean=mean, standard_error=error)
+
+    return wrong
+
+
+def _times(number, chosen=lambda queries, options: True):
+    return lambda queries, options: np.where(chosen(queries, options), number, 1.0)
+
+
+SPECULAR, DIFFUSE = slice(0, 2), slice(2, 4)
+
+
+@pytest.mark.parametrize(
+    ("test", "wrong", "found"),
+    [
+        (invariants.patch_reciprocity, _scaled(lambda q, o: q.wi[:, 2], SPECULAR), ["reciprocity", "other points"]),
+        (invariants.patch_reciprocity, _scaled(_times(1.1, lambda q, o: o.frame == "macro")), []),
+        (invariants.range_of_values, _scaled(_times(-1.0, lambda q, o: q.sigma > 1e3)), ["negative"]),
+        (invariants.range_of_values, _scaled(_times(np.nan, lambda q, o: q.wi[:, 2] < 0.02)), ["not finite"]),
+        (invariants.energy, _scaled(_times(1.6), DIFFUSE), ["reflected, k_d = 1"]),
+        (invariants.energy, _scaled(_times(2.0, lambda q, o: q.wi[:, 2] < 0), DIFFUSE), ["transmitted, k_dt = 1"]),
+        (invariants.energy, _scaled(_times(5.0), SPECULAR), ["scattered once"]),
+        (invariants.projected_area, _scaled(_times(1.3, lambda q, o: o.normaliser == "projected")), ["visible area"]),
+        (invariants.repeat_average, _scaled(_times(1.3, lambda q, o: o.footprint == "box")), ["box of one", "of 3"]),
+        (invariants.repeat_average, _scaled(_times(1.3, lambda q, o: q.sigma > 100)), ["of 1000 repeats"]),
+        (invariants.translation, _scaled(lambda q, o: 1.0 + 1e-5 * np.floor(q.u / 2)), ["one repeat", "1000"]),
+        (invariants.agreement, _scaled(_times(1.3, lambda q, o: o.estimator == "r2")), ["r2 / owen"]),
+    ],
+)
+def test_wrong_physics_is_found(brief, monkeypatch, test, wrong, found):
+    monkeypatch.setattr(invariants, "estimate", wrong)
+    names = broken(test)
+    assert bool(names) == bool(found), names
+    for words in found:
+        assert any(words in name for name in names), names
+
+
+def test_a_slab_that_is_not_reciprocal_is_found(monkeypatch):
+    whole = invariants.reflection
+    monkeypatch.setattr(invariants, "reflection", lambda *a: whole(*a) * (1.0 + 1e-15 * (a[3] > a[4])))
+    assert broken(invariants.point_reciprocity) == ["reciprocity of a point, reflection"]
+
+
+def test_colour_that_does_not_add_up_is_found(brief, monkeypatch):
+    whole = invariants._lattice
+    monkeypatch.setattr(invariants, "_lattice", lambda *a: whole(*a) * (1.0 + 1e-9))
+    assert broken(invariants.repeat_average) == ["coloured components / coloured whole − 1"]
+
+
+def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():
+    """Under Student's t with 15 degrees of freedom, 4,000 families of 24 numbers: Poisson with mean 4,000 LEVEL."""
+    families = 4000
+    numbers = np.random.default_rng(1).standard_t(15, (families, 24))
+    for relation in ("=", "<="):
+        count = sum(worst("t", row, 0.0, np.ones(24), 15, relation).verdict == "broken" for row in numbers)
+        assert count <= stats.poisson.isf(1e-3, families * LEVEL)
+        # And not much more rarely: numbers twice as far off are called broken many times.
+        wide = sum(worst("t", 2 * row, 0.0, np.ones(24), 15, relation).verdict == "broken" for row in numbers)
+        assert wide > 20
+
+
+def test_the_worst_is_returned_with_its_own_error():
+    item = worst("x", [1.0, 1.2, 0.7], 1.0, [0.1, 0.1, 0.5], 15)
+    assert (item.measured, item.standard_error, item.verdict) == (1.2, 0.1, "statistics")
+    assert item.sigmas == pytest.approx(2.0)
+    assert worst("x", [0.5, 1.0], 1.0, [0.01, 0.01], 15, "<=").verdict == "statistics"
+    assert worst("x", [0.5, 1.2], 1.0, [0.01, 0.01], 15, "<=").verdict == "broken"
+    assert worst("x", [1.0, math.nan], 1.0, [0.1, 0.1], 15).verdict == "broken"
+    assert worst("x", 1.0, 1.0, math.nan, 15).verdict == "broken"
+
+
+def test_numbers_without_error_are_exact_or_broken():
+    assert exact("x", 1e-7, 0.0, 1e-6).verdict == "exact"
+    assert exact("x", 2e-6, 0.0, 1e-6).verdict == "broken"
+    assert exact("x", -5.0, 0.0, 0.0, "<=").verdict == "exact"
+    assert exact("x", -5.0, 0.0, 0.0).verdict == "broken"
+    assert exact("x", math.nan, 0.0, 1.0).verdict == "broken"
+    np.testing.assert_array_equal(quotient([0.0, 1.0, 3.0], [0.0, 0.0, 2.0]), [1.0, np.inf, 1.5])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_keeps_the_invariants(name):
+    assert not [found for test in invariants.INVARIANTS for found in broken(test, load_fabric(name))]

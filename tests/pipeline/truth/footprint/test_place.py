@@ -1,0 +1,40 @@
+"""Footprints: the normal quantile, and wrapped kernels against their closed forms."""
+
+import numpy as np
+import pytest
+from scipy import special
+
+from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN, normal_quantile, place
+
+
+def test_normal_quantile_matches_scipy():
+    p = np.concatenate([np.logspace(-16, -1, 300), np.linspace(0.01, 0.99, 500), 1 - np.logspace(-10, -2, 100)])
+    ours = np.array([normal_quantile(x) for x in p])
+    np.testing.assert_allclose(ours, special.ndtri(p), rtol=2e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [GAUSSIAN, BOX])
+@pytest.mark.parametrize("sigma", [0.05, 0.4, 0.899, 0.901, 1.4, 2.9, 3.1, 40.0])
+def test_moments_of_the_wrapped_kernel(shape, sigma):
+    # The k-th circular moment of a wrapped kernel is that of the kernel itself: exp(-w^2 s^2 / 2), or a sinc.
+    repeat, centre, numbers = 3.0, 1.2, (np.arange(20_000) + 0.5) / 20_000
+    x, weight = np.array([place(shape, centre, sigma, repeat, n) for n in numbers]).T
+    assert ((x >= 0) & (x < repeat)).all()
+    for k in range(4):
+        w = 2 * np.pi * k / repeat
+        size = np.exp(-0.5 * (w * sigma) ** 2) if shape == GAUSSIAN else np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
+        expected = size * np.exp(1j * w * centre)
+        assert abs(np.mean(weight * np.exp(1j * w * x)) - expected) < 2e-4
+
+
+def test_a_box_of_whole_repeats_is_the_repeat_average():
+    for whole in (1, 2, 7):
+        sigma = 2.0 * whole / BOX_SIDE
+        weights = [place(BOX, 0.3, sigma, 2.0, (k + 0.5) / 64)[1] for k in range(64)]
+        np.testing.assert_allclose(weights, 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("centre", [-1e6 + 0.25, 1e6 + 0.25])
+def test_centres_far_away_are_folded(centre):
+    x, _ = place(GAUSSIAN, centre, 1e-4, 4.0, 0.5)
+    assert x == pytest.approx(0.25, abs=1e-9)

@@ -1,0 +1,88 @@
+"""The kernels' surface against the NumPy oracle, and its slopes against finite differences."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.truth.geometry.heightfield import GLOSS, TOP, UNDER, height_along, height_field, surface_at
+from pipeline.truth.options import Variation
+from weaves.draft import Matrix
+from weaves.fabric import load_fabric
+from weaves.surface import GAP
+from weaves.surface import surface_at as oracle
+
+
+def _with(fabric, **changes):
+    yarns = {name: getattr(fabric, name).model_copy(update=changes) for name in ("warp", "weft")}
+    return fabric.model_copy(update=yarns)
+
+
+FABRICS = {
+    "denim": load_fabric("denim"),
+    "narrow charmeuse": _with(load_fabric("silk_charmeuse"), width=0.7, twist=20.0),
+    "flattened basket": _with(load_fabric("basket"), relief=0.4, twist=-40.0, width=0.9),
+    "straight": _with(load_fabric("polyester_lining"), bend=0.0),
+    "steep narrow": _with(load_fabric("polyester_lining"), bend=70.0, width=0.8),
+}
+
+
+@pytest.mark.parametrize("name", FABRICS)
+def test_surface_matches_the_oracle(name):
+    fabric = FABRICS[name]
+    field = height_field(fabric)
+    ends, picks = fabric.weave.repeat
+    x, y = np.random.default_rng(4).random((2, 2000)) * np.array([[ends], [picks]])
+    expected = oracle(fabric, x, y)
+    found = np.array([surface_at(field, a, b, int(a), int(b), False) for a, b in zip(x, y, strict=True)])
+    np.testing.assert_array_equal(found[:, 0], expected.yarn)
+    solid = expected.yarn != GAP
+    np.testing.assert_array_equal(found[solid, 1] == UNDER, expected.under[solid])
+    np.testing.assert_allclose(found[solid, 2], expected.height[solid], atol=1e-12)
+    np.testing.assert_allclose(found[solid, 3:6], expected.normal[solid], atol=1e-11)
+    np.testing.assert_allclose(found[solid, 6:9], expected.tangent[solid], atol=1e-11)
+    assert field.crown.min() > 0
+    for height, a, b in zip(expected.height[solid], x[solid], y[solid], strict=True):
+        assert height <= field.crown[int(b), int(a)] + 1e-12
+
+
+@pytest.mark.parametrize("name", FABRICS)
+def test_slopes_are_those_of_the_height(name):
+    field = height_field(FABRICS[name])
+    generator, step = np.random.default_rng(5), 1e-6
+    for _ in range(300):
+        pick, end = (int(generator.integers(n)) for n in field.top.shape)
+        x, y, turn = end + generator.random(), pick + generator.random(), generator.random() * 6.28
+        dx, dy = np.cos(turn), np.sin(turn)
+        family, side, _, _, _, nz, *_ = surface_at(field, x, y, end, pick, False)
+        if family == GAP or nz < 0.1:
+            continue
+        _, slope = height_along(field, side, x, y, dx, dy, end, pick, end, pick)
+        ahead, _ = height_along(field, side, x + step * dx, y + step * dy, dx, dy, end, pick, end, pick)
+        behind, _ = height_along(field, side, x - step * dx, y - step * dy, dx, dy, end, pick, end, pick)
+        assert slope == pytest.approx((ahead - behind) / (2 * step), abs=2e-4)
+
+
+def test_the_place_in_the_endless_fabric_does_not_matter():
+    field = height_field(FABRICS["denim"])
+    near = height_along(field, TOP, 1.3, 2.6, 0.6, 0.8, 1, 2, 1, 2)
+    far = height_along(field, TOP, 1.3 - 8, 2.6 + 12, 0.6, 0.8, 1, 2, 1 - 8, 2 + 12)
+    np.testing.assert_allclose(near, far, atol=1e-12)
+
+
+def test_every_float_has_a_gloss_of_its_own_and_their_mean_is_one():
+    variation = Variation(spread=0.5, seed=3, repeats=8)
+    field = height_field(load_fabric("denim"), variation)
+    gloss = field.floats[:, :, TOP, GLOSS]
+    assert gloss.shape == (32, 32)
+    # Denim's warp floats over three picks: the cells of a float share one factor.
+    warp = gloss[field.top == 0]
+    assert len(np.unique(warp)) == 32 * 8
+    assert np.mean(np.unique(warp)) == pytest.approx(1.0, abs=4 * 0.55 / math.sqrt(256))
+    np.testing.assert_array_equal(gloss, height_field(load_fabric("denim"), variation).floats[:, :, TOP, GLOSS])
+
+
+def test_a_yarn_that_never_changes_side_has_one_gloss():
+    all_warp = load_fabric("denim").model_copy(update={"draft": Matrix(rows=("##", "##"))})
+    gloss = height_field(all_warp, Variation(spread=0.5, repeats=3)).floats[:, :, TOP, GLOSS]
+    assert all(len(np.unique(column)) == 1 for column in gloss.T) and len(np.unique(gloss)) == 6

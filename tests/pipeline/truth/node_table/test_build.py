@@ -1,0 +1,147 @@
+"""The table of nodes: symmetries, areas, horizons against exact visibility, and its answers against converged ones."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.cloth import model_of
+from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.heightfield import GAP, surface_at
+from pipeline.truth.geometry.horizon import horizon
+from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.node_table.build import FAMILY, tabulate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+CONVERGED = TruthOptions(
+    estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1 << 15, max_count=1 << 15
+)
+
+
+def _narrow(name, width):
+    fabric = load_fabric(name)
+    yarns = {key: getattr(fabric, key).model_copy(update={"width": width}) for key in ("warp", "weft")}
+    return fabric.model_copy(update=yarns)
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"),
+    [("polyester_lining", 2), ("cotton_twill", 4), ("satin_8", 8), ("silk_charmeuse", 5), ("basket", 8)],
+)
+def test_translations_leave_one_cell_of_each_orbit(name, cells):
+    model = model_of(load_fabric(name), TruthOptions())
+    table = tabulate(model.front, model.back, False, nodes=8, azimuths=4)
+    assert len(table.pieces) == cells
+    assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
+    copies = {tuple(cell) for piece in table.copies for cell in piece.tolist()}
+    assert len(copies) == model.front.top.size
+
+
+def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
+    model = model_of(_narrow("polyester_lining", 0.7), TruthOptions())
+    table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
+    areas = dict.fromkeys(range(3), 0.0)
+    for number, piece in enumerate(table.pieces):
+        stop = table.pieces[number + 1, 0] if number + 1 < len(table.pieces) else table.evenly.size
+        areas[int(piece[FAMILY])] += float(table.evenly[piece[0] : stop].sum())
+    assert areas[GAP] == pytest.approx(0.3**2, rel=1e-4)
+    assert areas[0] == pytest.approx(0.5 * (0.7 + 0.7 * 0.3), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "denim", "silk_shantung"])
+def test_horizons_part_what_is_visible_from_what_is_not(name):
+    """A direction a little above the horizon is visible, one a little below is not; .3 % may be borderline."""
+    field = model_of(load_fabric(name), TruthOptions()).front
+    picks, ends = field.top.shape
+    random = np.random.default_rng(3)
+    wrong = asked = 0
+    for x, y, turn in zip(random.random(400) * ends, random.random(400) * picks, random.random(400), strict=True):
+        _, side, z, nx, ny, nz, *_ = surface_at(field, x, y, int(x), int(y), False)
+        dx, dy = math.cos(2 * math.pi * turn), math.sin(2 * math.pi * turn)
+        slope = horizon(field, x, y, z, side, dx, dy)
+        for asked_slope, expected in ((slope * 1.004 + 2e-3, True), (slope * 0.996 - 2e-3, False)):
+            if asked_slope > max(0.0, -(nx * dx + ny * dy) / nz):
+                length = math.hypot(1.0, asked_slope)
+                towards = ray(dx / length, dy / length, asked_slope / length, 0.0)
+                wrong += visible(field, x, y, z, side, towards) != expected
+                asked += 1
+    assert asked > 300 and wrong / asked < 0.01
+
+
+@pytest.mark.parametrize(
+    ("fabric", "behind"),
+    [
+        (load_fabric("polyester_lining"), False),
+        (load_fabric("denim"), True),
+        (load_fabric("satin_8"), False),
+        (_narrow("cotton_twill", 0.8), False),
+        (_narrow("polyester_lining", 0.8), True),
+    ],
+    ids=["plain", "twill_behind", "satin", "narrow_twill", "narrow_plain_behind"],
+)
+@pytest.mark.parametrize("footprint", ["gaussian", "box"])
+def test_answers_match_converged_ones(fabric, behind, footprint):
+    """Mean signed error of each component below .3 %, within three standard errors of the mean over the queries.
+
+    The typical query is within .6 %; transparency likewise.
+    """
+    queries = draw_queries(QueryOptions(sigma=(0.4, 8.0), max_angle=80.0), fabric.weave.repeat, 21, 0, 80)
+    if behind:
+        queries = queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
+    exact = estimate(fabric, queries, CONVERGED.model_copy(update={"footprint": footprint}), 4)
+    answers = estimate(fabric, queries, TruthOptions(estimator="table", footprint=footprint), 4)
+    errors = (answers.mean.astype(np.float64) - exact.mean) / exact.mean.mean(axis=0)
+    bias, spread = errors.mean(axis=0), errors.std(axis=0, ddof=1) / math.sqrt(len(errors))
+    assert (np.abs(bias) < 0.003 + 3 * spread).all(), (bias, spread)
+    size = np.linalg.norm(exact.mean, axis=1)
+    assert np.median(np.linalg.norm(answers.mean - exact.mean, axis=1) / size) < (0.012 if behind else 0.006)
+    assert np.median(np.abs(answers.transparency - exact.transparency)) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["polyester_lining", "silk_charmeuse"])
+def test_auto_is_right_about_its_own_error(name):
+    """At most 2 % of 300 random queries beyond three stated errors: 99 % hold over many fabrics (the slow test)."""
+    fabric = load_fabric(name)
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 33, 0, 300)
+    exact = estimate(fabric, queries, CONVERGED, 4)
+    answers = estimate(fabric, queries, TruthOptions(relative_error=0.02), 5)
+    error, stated, reference = (
+        np.linalg.norm(v, axis=1) for v in (answers.mean - exact.mean, answers.standard_error, exact.standard_error)
+    )
+    assert (error > 3 * np.hypot(stated, reference) + 1e-6).mean() <= 0.02
+    size = np.linalg.norm(answers.mean, axis=1)
+    reached = stated <= np.maximum(0.02 * size, 1e-5) * (1 + 1e-6)
+    assert reached.mean() > 0.97
+
+
+def test_rows_do_not_depend_on_each_other():
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 60)
+    whole = estimate(fabric, queries, TruthOptions(), 7)
+    part = estimate(fabric, queries.take(slice(20, 40)), TruthOptions(), 7, start=20)
+    np.testing.assert_array_equal(part.mean, whole.mean[20:40])
+    np.testing.assert_array_equal(part.standard_error, whole.standard_error[20:40])
+
+
+def test_the_table_says_what_it_does_not_know():
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 4)
+    curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
+    with pytest.raises(BadInput, match=r"table \(row 2\).*take auto"):
+        estimate(fabric, curved, TruthOptions(estimator="table"), 0)
+    assert np.isfinite(estimate(fabric, curved, TruthOptions(), 0).mean).all()
+
+
+def test_a_viewer_behind_sees_the_back():
+    fabric = load_fabric("denim")
+    front = draw_queries(QueryOptions(sigma=(0.5, 4.0)), fabric.weave.repeat, 8, 0, 30)
+    flip = np.float32([1, 1, -1])
+    behind = Queries.round(front.u, front.v, front.sigma, front.wi * flip, front.wo * flip)
+    options = TruthOptions(estimator="table")
+    np.testing.assert_allclose(
+        estimate(fabric, behind, options, 0).mean, estimate(fabric.back(), front, options, 0).mean, rtol=1e-5, atol=1e-7
+    )

@@ -1,0 +1,57 @@
+import numpy as np
+import OpenEXR
+import pytest
+
+from reports.images.exr import read_exr, write_exr
+from weaves.errors import BadInput
+
+
+def test_round_trip_keeps_every_bit_of_a_view_that_is_not_contiguous(tmp_path):
+    """OpenEXR itself writes such arrays wrong without a word; a picture and its transpose, every second column."""
+    picture = np.random.default_rng(0).random((33, 50, 3)).astype(np.float32)
+    awkward = picture.transpose(1, 0, 2)[:, ::2]
+    assert not awkward[..., 0].flags.c_contiguous
+    write_exr(tmp_path / "a.exr", {name: awkward[..., i] for i, name in enumerate(("R", "G", "B"))})
+    assert (read_exr(tmp_path / "a.exr").stack("R", "G", "B") == awkward).all()
+
+
+def test_metadata_and_layers_come_back(tmp_path):
+    plane = np.float64([[1.5, -2.0], [np.float32(1e-30), 65504.0]])
+    write_exr(tmp_path / "a.exr", {"Y": plane, "error.Y": 0 * plane}, {"fabric": "denim", "frames": 8, "share": 0.5})
+    exr = read_exr(tmp_path / "a.exr")
+    assert set(exr.channels) == {"Y", "error.Y"}
+    assert exr.channels["Y"] == pytest.approx(plane)
+    assert exr.channels["Y"].dtype == np.float32
+    assert {name: exr.attributes[name] for name in ("fabric", "frames", "share")} == {
+        "fabric": "denim",
+        "frames": 8,
+        "share": 0.5,
+    }
+
+
+def test_compression_is_zip_and_the_bytes_repeat(tmp_path):
+    plane = np.zeros((64, 64))
+    for name in ("a.exr", "b.exr"):
+        write_exr(tmp_path / name, {"Y": plane}, {"fabric": "denim"})
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        assert file.header()["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+    assert (tmp_path / "a.exr").stat().st_size < plane.size
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "b.exr"]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a picture", "half"])
+def test_what_is_no_picture_is_bad_input(tmp_path, content):
+    path = tmp_path / "a.exr"
+    if content == "half":
+        write_exr(path, {"Y": np.random.default_rng(1).random((64, 64))})
+        content = path.read_bytes()[:4000]
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInput):
+        read_exr(path)
+
+
+def test_planes_must_agree(tmp_path):
+    with pytest.raises(ValueError, match="one size"):
+        write_exr(tmp_path / "a.exr", {"R": np.zeros((2, 3)), "G": np.zeros((3, 2))})

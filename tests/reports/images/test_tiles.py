@@ -1,0 +1,74 @@
+import io
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from reports.images import tiles
+from reports.images.exr import Exr
+from weaves.fabric import load_fabric
+
+
+def decoded(png):
+    return np.rint(255 * matplotlib.image.imread(io.BytesIO(png), format="png")).astype(int)
+
+
+def exr(rgb, alpha):
+    rgb = np.asarray(rgb, np.float32)
+    return Exr({**{c: rgb[..., i] for i, c in enumerate("RGB")}, "A": np.asarray(alpha, np.float32)}, {})
+
+
+def test_tone_mapping_is_exposure_and_the_srgb_curve():
+    """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
+    linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
+    shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
+    assert shown[0, :3].tolist() in ([127] * 3, [128] * 3)
+    assert shown[1].tolist() == [0, 0, 0, 255]
+    assert shown[2].tolist() == [255, 255, 255, 255]
+    assert shown[3].tolist() == [0, 0, 0, 0]
+
+
+def test_difference_is_blue_where_dark_and_red_where_bright():
+    truth = exr(np.full((1, 4, 3), 0.5), [[1, 1, 1, 0]])
+    shown = exr(np.array([[[0.5] * 3, [0.2] * 3, [0.9] * 3, [5.0] * 3]]), [[1, 1, 1, 0]])
+    same, dark, bright, outside = decoded(tiles.difference(shown, truth))[0, :: tiles.SCALE]
+    assert np.ptp(same[:3]) < 4
+    assert dark[2] > dark[0]
+    assert bright[0] > bright[2]
+    assert outside[3] == 0
+
+
+def test_drawdown_starts_at_the_bottom_left():
+    fabric = load_fabric("denim")
+    picture = decoded(tiles.drawdown(fabric))
+    middle = tiles.CELL_PIXELS // 2
+    cells = picture[middle :: tiles.CELL_PIXELS, middle :: tiles.CELL_PIXELS, 0][::-1] < 128
+    picks, ends = fabric.weave.warp_over.shape
+    assert (cells[:picks, :ends] == fabric.weave.warp_over).all()
+    assert (cells[picks : 2 * picks, :ends] == fabric.weave.warp_over).all()
+
+
+@pytest.mark.parametrize("draw", [tiles.height, tiles.normals])
+def test_maps_repeat_with_the_weave(draw):
+    fabric = load_fabric("denim")
+    picture = decoded(draw(fabric))
+    ends = fabric.weave.repeat[0] * tiles.CELL_PIXELS
+    side = tiles.CELLS * tiles.CELL_PIXELS
+    assert picture.shape[:2] == (side, side)
+    assert (picture[:, : side - ends] == picture[:, ends:]).all()
+    assert np.ptp(picture[..., :3]) > 50
+
+
+def test_normals_point_up_in_blue():
+    assert decoded(tiles.normals(load_fabric("basket")))[..., 2].min() >= 127
+
+
+def test_overview_is_a_sheet():
+    one = exr(np.full((4, 4, 3), 0.2), np.ones((4, 4)))
+    assert decoded(tiles.overview([one] * 3, columns=2)).shape == (8 * tiles.SCALE, 8 * tiles.SCALE, 4)
+
+
+def test_hex_colour_inverts_the_fabrics_own():
+    from weaves.colour import linear_rgb
+
+    assert tiles.hex_colour(linear_rgb("#3b5bdb")) == "#3b5bdb"

@@ -1,0 +1,55 @@
+import io
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from reports.images import tiles
+from reports.images.exr import read_exr, write_exr
+from reports.images.tiles import flip_tile, relative_tile
+from reports.measure.scene.differences import difference_maps, relative_differences
+from reports.measure.scene.image_error import image_errors
+
+MASK = np.zeros((24, 32), dtype=bool)
+MASK[2:22, 3:29] = True
+TRUTH = np.where(MASK[..., None], np.linspace(0.1, 0.5, 32)[:, None] * [1.0, 0.7, 0.4], np.nan)
+SIGN = np.where(np.arange(32) < 16, 1.3, 0.7)[None, :, None]
+
+
+@pytest.fixture
+def written(tmp_path):
+    errors = image_errors(SIGN * TRUTH, TRUTH, 0.01 * TRUTH, MASK)
+    write_exr(tmp_path / "differences.exr", difference_maps(SIGN * TRUTH, TRUTH, errors))
+    return errors, read_exr(tmp_path / "differences.exr")
+
+
+def test_maps_come_back_from_the_file(written):
+    errors, exr = written
+    assert (exr.channels["lit"] == MASK).all()
+    for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
+        assert exr.channels[name][MASK].mean() == pytest.approx(errors.perceived[name].value, rel=1e-5)
+
+
+def test_squares_of_the_relative_differences_average_to_the_relative_mse(written):
+    errors, exr = written
+    squares = exr.stack("relative.R", "relative.G", "relative.B")[MASK].astype(float) ** 2
+    assert squares.mean() == pytest.approx(errors.mse_relative.measured, rel=1e-5)
+
+
+def test_relative_differences_are_signed_shares():
+    maps = relative_differences(SIGN * TRUTH, TRUTH, MASK, epsilon=1e-12)
+    assert set(maps) == {f"relative.{name}" for name in "RGBY"}
+    for plane in maps.values():
+        assert plane[:, :16][MASK[:, :16]] == pytest.approx(0.3)
+        assert plane[:, 16:][MASK[:, 16:]] == pytest.approx(-0.3)
+        assert (plane[~MASK] == 0).all()
+
+
+def test_tiles_are_red_where_bright_and_clear_where_nothing_counts(written):
+    _, exr = written
+    for tile in (relative_tile(exr), flip_tile(exr), flip_tile(exr, "flip_hdr")):
+        rgba = matplotlib.image.imread(io.BytesIO(tile), format="png")[:: tiles.SCALE, :: tiles.SCALE]
+        assert ((rgba[..., 3] > 0) == MASK).all()
+    rgba = matplotlib.image.imread(io.BytesIO(relative_tile(exr)), format="png")[:: tiles.SCALE, :: tiles.SCALE]
+    assert (rgba[5:20, 5:14, 0] > rgba[5:20, 5:14, 2]).all()
+    assert (rgba[5:20, 18:27, 0] < rgba[5:20, 18:27, 2]).all()

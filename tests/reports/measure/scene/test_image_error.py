@@ -1,0 +1,236 @@
+import itertools
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from reports.error import squared_error
+from reports.measure.scene.image_error import PERCEIVED, image_errors, light_errors, noise_floor
+from reports.options import ImageOptions
+from reports.record import Record
+from weaves.colour import linear_rgb
+from weaves.errors import BadInput
+
+SIZE = 64
+Y, X = np.mgrid[:SIZE, :SIZE]
+ALL = np.ones((SIZE, SIZE), dtype=bool)
+DISC = np.hypot(Y - 32, X - 32) < 28
+CLOTH = (0.25 + 0.1 * np.sin(X / 2.5) * np.cos(Y / 4))[..., None] * [1.0, 0.8, 0.6]
+EXACT = np.zeros_like(CLOTH)
+HIGHER_IS_BETTER = ("psnr", "ssim")
+
+
+def flat(*rgb):
+    return np.full((SIZE, SIZE, 3), rgb)
+
+
+def values(picture, truth=CLOTH, standard_error=EXACT, mask=ALL, **options):
+    errors = image_errors(picture, truth, standard_error, mask, ImageOptions(**options))
+    perceived = {metric: measure.value for metric, measure in errors.perceived.items()}
+    return perceived | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
+
+
+def losses(picture, truth=CLOTH):
+    """Return every measure with the sign that makes smaller better."""
+    found = values(picture, truth)
+    return {metric: -value if metric in HIGHER_IS_BETTER else value for metric, value in found.items()}
+
+
+def assert_ordered(*pictures, truth=CLOTH):
+    """Every measure says that each picture is better than the next."""
+    found = [losses(picture, truth) for picture in pictures]
+    for better, worse in itertools.pairwise(found):
+        assert {metric for metric in better if not better[metric] < worse[metric]} == set()
+
+
+def test_equal_pictures_have_no_error():
+    found = values(CLOTH)
+    assert found == {
+        "mse": 0,
+        "mse_relative": 0,
+        "psnr": math.inf,
+        "ssim": pytest.approx(1, abs=1e-12),
+        "flip_ldr": 0,
+        "flip_hdr": 0,
+        "delta_e": 0,
+    }
+
+
+def test_psnr_of_a_constant_offset():
+    """Codes 102 and 128 of 255 differ by 26/255 everywhere; the exposure cancels what the values were divided by."""
+    low, high = (linear_rgb(code) for code in ("#666666", "#808080"))
+    found = values(flat(*low) / 1.6, flat(*high) / 1.6)
+    assert found["psnr"] == pytest.approx(-20 * math.log10(26 / 255), abs=1e-9)
+
+
+def test_ssim_of_constant_pictures():
+    """Without variance, SSIM = (2 a b + C) / (a^2 + b^2 + C), C = .01^2."""
+    a, b = 102 / 255, 128 / 255
+    found = values(flat(*linear_rgb("#666666")), flat(*linear_rgb("#808080")), exposure=1.0)
+    assert found["ssim"] == pytest.approx((2 * a * b + 1e-4) / (a**2 + b**2 + 1e-4), abs=1e-9)
+
+
+def test_flip_of_green_and_blue_is_one():
+    """FLIP scales colour differences so that the one between the display's green and blue is its largest, 1."""
+    assert values(flat(0.0, 1.0, 0.0), flat(0.0, 0.0, 1.0))["flip_ldr"] == pytest.approx(1, abs=1e-5)
+
+
+def test_delta_e_of_black_and_white_is_their_lightness():
+    """L* 0 and 100, mean 50: S_L = 1, so Delta E = 100."""
+    assert values(flat(1.0, 1.0, 1.0), flat(1e-9, 1e-9, 1e-9))["delta_e"] == pytest.approx(100, abs=1e-3)
+
+
+def test_relative_mse_of_a_factor():
+    """m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4)) averaged."""
+    truth = np.where(X[..., None] < 32, 1.0, 3.0) * np.ones(3)
+    expected = 0.01 * (1 / (1 + 0.02 * 4) + 9 / (9 + 0.02 * 4)) / 2
+    assert values(1.1 * truth, truth, relative_epsilon=0.02)["mse_relative"] == pytest.approx(expected)
+
+
+def test_measures_that_do_not_know_the_unit_of_light():
+    bright = values(4 * (CLOTH + 0.01), 4 * CLOTH)
+    found = values(CLOTH + 0.01)
+    assert bright["mse_relative"] == pytest.approx(found["mse_relative"])
+    assert bright["flip_hdr"] == pytest.approx(found["flip_hdr"], rel=1e-4)
+    assert bright["mse"] == pytest.approx(16 * found["mse"])
+    assert bright["delta_e"] != pytest.approx(found["delta_e"], rel=0.1)
+
+
+def test_every_measure_rises_with_noise():
+    noise = np.random.default_rng(1).standard_normal(CLOTH.shape)
+    assert_ordered(CLOTH, *(CLOTH + size * noise for size in (0.005, 0.02, 0.08)))
+
+
+def test_every_measure_rises_with_blur():
+    assert_ordered(CLOTH, *(ndimage.gaussian_filter(CLOTH, (size, size, 0)) for size in (0.5, 1.0, 2.0)))
+
+
+def test_aliasing_is_worse_than_filtering():
+    """Stripes of 1.1 pixels: the truth integrates each pixel, a filter half as wide again blurs, its centre aliases."""
+    offsets = np.linspace(-2, 2, 401)
+
+    def stripes(sigma):
+        weights = np.exp(-0.5 * (offsets / sigma) ** 2)
+        row = sum(
+            w * np.cos(2 * np.pi * (X[0] + o) / 1.1) for o, w in zip(offsets, weights / weights.sum(), strict=True)
+        )
+        return np.broadcast_to((0.25 + 0.2 * row)[None, :, None], CLOTH.shape)
+
+    truth = stripes(0.3)
+    assert_ordered(stripes(0.45), stripes(1e-3), truth=truth)
+
+
+@pytest.mark.parametrize(("draws", "channels"), [(1, "together"), (3, "independent")])
+def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores(draws, channels):
+    """A method equal to the field f, the truth f + s z: MSE and relative MSE vanish within 5 standard errors.
+
+    The other measures are of f against t; the floor is of t + s z' against t, z' independent: alike but for the
+    curvature of the measures, which an error of 4 % of the values leaves small; 10 % allowed.
+    """
+    size = 0.04 * CLOTH
+    options = ImageOptions(floor_channels=channels)
+    truth = CLOTH + size * np.random.default_rng(2).standard_normal((SIZE, SIZE, draws))
+    errors = image_errors(CLOTH, truth, size, DISC, options)
+    assert errors.mse.noise == pytest.approx((size[DISC] ** 2).mean())
+    for error in (errors.mse, errors.mse_relative):
+        assert abs(error.value) < 5 * error.standard_error
+        assert error.measured == pytest.approx(error.noise, rel=0.1)
+        assert error.low < error.value < error.high
+    for metric, measure in errors.perceived.items():
+        assert measure.value == pytest.approx(measure.floor, rel=0.1), metric
+    assert {m: e.floor for m, e in errors.perceived.items()} == noise_floor(truth, size, DISC, options)
+    assert noise_floor(CLOTH, EXACT, DISC)["ssim"] == pytest.approx(1)
+
+
+def test_a_given_floor_is_taken():
+    floor = dict.fromkeys(PERCEIVED, 0.5)
+    errors = image_errors(1.1 * CLOTH, CLOTH, EXACT, ALL, floor=floor)
+    assert {measure.floor for measure in errors.perceived.values()} == {0.5}
+
+
+@pytest.mark.parametrize("garbage", [np.nan, -3.0, 1e30])
+def test_what_is_outside_the_mask_does_not_matter(garbage):
+    outside = ~DISC[..., None]
+    clean = image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC)
+    found = image_errors(*(np.where(outside, garbage, a) for a in (1.1 * CLOTH, CLOTH, 0.01 * CLOTH)), DISC)
+    assert (found.mse, found.mse_relative, found.perceived) == (clean.mse, clean.mse_relative, clean.perceived)
+    assert all(measure.pixels == DISC.sum() for measure in found.perceived.values())
+
+
+def test_components_are_measured_one_at_a_time():
+    component, truth, size = 1.2 * CLOTH[..., :1], CLOTH[..., :1], 0.02 * CLOTH[..., :1]
+    mse, relative = light_errors(component, truth, size, DISC)
+    expected = squared_error(component[DISC], truth[DISC], size[DISC])
+    assert (mse.value, mse.measured, mse.noise) == (expected.value, expected.measured, expected.noise)
+    assert relative.measured == pytest.approx(0.04, rel=0.02)
+
+
+def test_a_record_for_every_number():
+    subject = Record(method="woven", fabric="denim", scene="sphere")
+    records = {r.metric: r for r in image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, ALL).records(subject)}
+    light = ["mse", "mse_measured", "truth_noise", "mse_relative", "mse_relative_floor"]
+    assert list(records) == [*light, *(name for metric, (floor, _) in PERCEIVED.items() for name in (metric, floor))]
+    assert all(r.method == "woven" and r.count == SIZE**2 for r in records.values())
+    for metric in ("mse", "mse_relative", *PERCEIVED):
+        assert records[metric].low < records[metric].value < records[metric].high
+    assert records["psnr"].unit == "dB"
+
+
+def test_infinite_numbers_have_no_record():
+    found = {r.metric for r in image_errors(CLOTH, CLOTH, EXACT, ALL).records(Record(method="woven"))}
+    assert not {"psnr", "psnr_floor"} & found
+    assert {"ssim", "ssim_floor"} <= found
+
+
+def broken(array, value):
+    array = np.array(array)
+    array[32, 32, 1] = value
+    return array
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"picture": CLOTH[:-1]}, r"size of the picture = \(63, 64, 3\)"),
+        ({"standard_error": CLOTH[..., :1]}, "size of the standard error"),
+        ({"mask": ALL[:, 1:]}, "size of the picture"),
+        ({"picture": broken(CLOTH, np.nan)}, "picture = 'not finite'"),
+        ({"truth": broken(CLOTH, np.inf)}, "truth = 'not finite'"),
+        ({"standard_error": broken(EXACT, np.nan)}, "standard error = 'not finite'"),
+        ({"standard_error": broken(EXACT, -1)}, "standard errors >= 0"),
+        ({"truth": EXACT}, "dark"),
+        ({"mask": ~ALL}, "lit pixels = 0"),
+        ({"mask": np.logical_and(X == 3, Y == 4)}, "lit pixels = 1"),
+        ({"options": ImageOptions(ssim_sigma=8)} | {"small": 32}, "needs 57 pixels"),
+        ({"channels": 2}, "3 channels"),
+    ],
+)
+def test_what_cannot_be_measured_is_bad_input(change, sentence):
+    given = {"picture": CLOTH, "truth": CLOTH, "standard_error": EXACT, "mask": ALL} | change
+    side, channels = given.pop("small", None), given.pop("channels", None)
+    pictures = ("picture", "truth", "standard_error")
+    given |= {name: given[name][:side, :side, :channels] for name in pictures if side or channels}
+    given |= {"mask": given["mask"][:side, :side]} if side else {}
+    with pytest.raises(BadInput, match=sentence) as raised:
+        image_errors(**given)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_nearly_dark_truth_does_not_end_the_process():
+    """FLIP leaves the process (exit code 255) if the reference is below 1e-8: it must never see one."""
+    code = (
+        "import numpy as np; from reports.measure.scene.image_error import image_errors as e;"
+        "t = np.full((32, 32, 3), 1e-9);"
+        "print(e(2 * t, t, 0 * t, np.ones((32, 32), bool)).perceived['flip_hdr'].value > 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
+
+
+def test_the_same_numbers_every_time():
+    first, second = (image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC) for _ in range(2))
+    assert first.perceived == second.perceived
+    assert all((first.maps[name] == second.maps[name]).all() for name in first.maps)

@@ -1,0 +1,164 @@
+"""Methods at their extremes: what is asked, closed forms of what is measured, and the model that comes along."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from pipeline.models.prefiltered.options import PrefilteredOptions
+from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.runtimes import runs
+from pipeline.models.soft_nodes.options import SoftNodesOptions
+from pipeline.models.woven.model import Woven, WovenNetwork
+from pipeline.models.woven.options import WovenOptions
+from pipeline.truth.estimator import estimate
+from pipeline.truth.query import faults
+from reports.measure.extremes import (
+    FAR,
+    FOOTPRINTS,
+    LUSTROUS,
+    TRUTH,
+    error_name,
+    extremes,
+    extremes_table,
+    lustrous,
+    measure_extremes,
+)
+from reports.options import EXTREME_PRECISIONS
+from reports.record import Record
+from reports.tables.cells import EXTREMES, extreme_rows
+from weaves.fabric import load_fabric
+
+LINING = load_fabric("polyester_lining")
+TWILL = load_fabric("denim")
+
+
+class Scaled:
+    """The truth times a factor, but for what `spoil` does to it."""
+
+    name = "scaled"
+
+    def __init__(self, factor=1.0, setting="", spoil=lambda answers, queries: answers):
+        self.factor, self.setting, self.spoil = factor, setting, spoil
+
+    def covers(self, fabric):
+        return fabric.name != TWILL.name
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        near = queries._replace(
+            **{
+                axis: np.mod(getattr(queries, axis), period)
+                for axis, period in zip("uv", fabric.weave.repeat, strict=True)
+            }
+        )
+        return self.spoil(self.factor * estimate(fabric, near, TRUTH, 0).mean, queries)
+
+
+def measured(*family):
+    return {(r.setting, r.metric): r for r in measure_extremes([family], [(LINING, "seen"), (TWILL, "unseen")])}
+
+
+@pytest.mark.parametrize("repeat", [(2, 2), (4, 4), (8, 5), (16, 16)])
+def test_far_places_are_the_same_places_to_the_last_bit(repeat):
+    asked = extremes(repeat)
+    assert not faults(asked.queries) and not faults(asked.far)
+    for near, far, period in ((asked.queries.u, asked.far.u, repeat[0]), (asked.queries.v, asked.far.v, repeat[1])):
+        np.testing.assert_array_equal(np.mod(far.astype(np.float64), period), near)
+        assert far.min() > 0.99 * FAR
+    area = asked.queries.sigma.astype(np.float64) ** 2 / math.prod(repeat)
+    np.testing.assert_allclose(np.sqrt(area), asked.size, rtol=1e-6)
+    assert {math.degrees(math.acos(z)) > 89.8 for z in asked.queries.wi[~asked.grazing, 2]} == {False}
+
+
+def test_closed_forms():
+    """The truth itself; 1.1 times the truth, 10 % wrong everywhere; and what that one is from the first."""
+    found = measured(Scaled(), Scaled(1.1, "brighter"))
+    assert found["", "extreme_error"].value == 0.0 and found["", "extreme_grazing"].value == 0.0
+    assert ("", "extreme_rounding") not in found
+    for metric in ("extreme_error", "extreme_grazing", "extreme_rounding"):
+        assert found["brighter", metric].value == pytest.approx(0.1, rel=1e-5)
+    assert [size for size, _ in found["brighter", "extreme_error"].curve] == list(FOOTPRINTS)
+    assert [error for _, error in found["brighter", "extreme_error"].curve] == pytest.approx([0.1] * 5, rel=1e-5)
+    for metric in ("extreme_far", "extreme_not_finite", "extreme_negative"):
+        assert found["", metric].value == 0.0
+    assert {record.fabric for record in found.values()} == {LINING.name}, "what is not covered is not asked"
+
+
+def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
+    def spoil(answers, queries):
+        tiny = queries.sigma < 1e-3
+        answers[tiny] = np.nan
+        answers[queries.sigma > 1e4, 2] = -1.0
+        answers[(queries.sigma > 100) & (queries.sigma < 1e3), 0] = np.inf
+        return answers
+
+    found = measured(Scaled(spoil=spoil))
+    # Near and far: 18 questions a footprint, each twice.
+    assert found["", "extreme_not_finite"].value == 2 * 2 * 18
+    assert found["", "extreme_negative"].value == 2 * 18
+    assert [size for size, _ in found["", "extreme_error"].curve] == [1e-2, 1.0, 1e4]
+    assert ("", "extreme_large") not in found, "no pair is finite"
+
+
+def test_places_and_sizes_that_change_the_answer_are_seen():
+    def drift(answers, queries):
+        return answers * (1.0 + 1e-7 * queries.u[:, None]).astype(np.float32)
+
+    def shrink(answers, queries):
+        return answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None].astype(np.float32)
+
+    assert measured(Scaled(spoil=drift))["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
+    found = measured(Scaled(spoil=shrink))
+    assert found["", "extreme_far"].value == 0.0
+    assert found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
+
+
+def test_the_table_keeps_the_worst_and_lustrous_cloth_apart():
+    shiny = lustrous(LINING)
+    assert (shiny.warp.roughness, shiny.weft.roughness) == (LUSTROUS, LUSTROUS)
+    subject = Record(method="m", setting="s")
+    curve = ((1e-4, 0.5), (1.0, 0.1))
+    records = [
+        subject.model_copy(update={"fabric": name}).of("extreme_error", value, 9, curve=points)
+        for name, value, points in (("a", 0.5, curve), ("b", 0.2, ((1.0, 0.2),)), (shiny.name, 0.9, curve))
+    ]
+    records += [subject.of("extreme_not_finite", 3.0, 90), subject.of("extreme_not_finite", 1.0, 90)]
+    (row,) = extremes_table([*records, subject.of("mse", 1.0, 9)]).to_dict("records")
+    assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
+    assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
+    assert (row["not_finite"], row["asked"], row["negative"]) == (4, 180, 0)
+    ((line,),) = [group["rows"] for group in extreme_rows(extremes_table(records))]
+    assert dict(zip(EXTREMES, line["cells"], strict=True))["NaN, ∞"] == "4 of 180 ✗"
+
+
+def methods():
+    torch.manual_seed(0)
+    woven = Woven(WovenNetwork(WovenOptions(map_texels=16)))
+    return [
+        *load_model(pretrained_folder("selvage")),
+        woven,
+        *load_methods(SoftNodesOptions()),
+        *load_methods(PrefilteredOptions()),
+    ]
+
+
+@pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)
+def test_no_method_answers_what_cannot_be_in_any_precision(cloth):
+    """Finite, never negative, a million yarns away exactly the same, and beyond a hundred repeats the average."""
+    records = measure_extremes([[one, *runs(one, EXTREME_PRECISIONS)] for one in methods()], [(cloth, "seen")])
+    table = extremes_table(records)
+    assert len(table) == 8
+    assert not table["not_finite"].any() and not table["negative"].any()
+    assert not table["far"].any()
+    # Encoded sizes end at one repeat, sums at the even average; half precision may round the other way.
+    assert (table["large"] < 1e-3).all()
+    half = table.set_index(["method", "setting"])["rounding"]
+    for name in ("selvage", "woven"):
+        assert half[name, "eager-fp16"] < half[name, "eager-bf16"] < 2e-2
+    own = table[table["method"] == "selvage"].iloc[0]
+    if cloth is LINING:
+        assert own[error_name(1e4)] < 0.05

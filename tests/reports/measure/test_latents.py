@@ -1,0 +1,133 @@
+"""Between fabrics and after edits: methods whose errors and times are known, and a tiny untrained network."""
+
+import time
+
+import numpy as np
+import pytest
+import torch
+
+from pipeline.models.woven.model import Woven, WovenNetwork
+from pipeline.models.woven.options import WovenOptions
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from reports.measure.latents import SHARES, Blends, Pair, between, measure_edits, measure_paths, pairs
+from reports.tables import cells
+from reports.tables.summary import path_table
+from weaves.fabric import Fabric, load_fabric
+
+TRUTH = TruthOptions(estimator="table")
+ASKED = QueryOptions(sigma=(0.3, 4.0))
+
+
+class Truth:
+    """Blends the truths of both ends; encoding anew asks the truth itself."""
+
+    name, setting = "truth_between", ""
+
+    def predict(self, fabric, queries, seed=0):
+        return estimate(fabric, queries, TRUTH, seed).mean
+
+    def predict_between(self, first, second, share, queries):
+        return (1 - share) * self.predict(first, queries) + share * self.predict(second, queries)
+
+
+class Slow:
+    """Takes 3 ms to prepare a fabric that differs in more than its colours, and counts."""
+
+    name, setting = "slow", ""
+
+    def __init__(self):
+        self.known = []
+
+    def prepare(self, fabric):
+        if fabric.optics() not in self.known:
+            self.known.append(fabric.optics())
+            time.sleep(3e-3)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    yarns, *_, draft = pairs()
+    return measure_paths(Truth(), [yarns, draft], ASKED, TRUTH, rows=128)
+
+
+def test_pairs_differ_in_one_thing_and_have_one_repeat():
+    chosen = pairs()
+    assert {pair.differs for pair in chosen} == {"yarns", "draft"}
+    for pair in chosen:
+        assert pair.first.weave.repeat == pair.second.weave.repeat
+        assert (pair.first.weave == pair.second.weave) == (pair.differs == "yarns")
+        same = (pair.first.warp, pair.first.weft) == (pair.second.warp, pair.second.weft)
+        assert same == (pair.differs == "draft")
+        assert Fabric.model_validate(between(pair, 0.5).model_dump())
+
+
+def test_between_are_the_numbers_in_between():
+    pair = pairs()[0]
+    assert between(pair, 0.0).optics() == pair.first.optics()
+    assert between(pair, 1.0).optics() == pair.second.optics()
+    quarter = between(pair, 0.25)
+    for name in ("bend", "twist", "roughness"):
+        ends = getattr(pair.first.warp, name), getattr(pair.second.warp, name)
+        assert getattr(quarter.warp, name) == pytest.approx(0.75 * ends[0] + 0.25 * ends[1])
+    assert quarter.warp.diffuse == pair.first.warp.diffuse
+
+
+def test_the_truth_has_no_error_where_it_is_the_truth(measured):
+    """Encoded anew the truth is exact everywhere; blended at both ends of yarns, and everywhere between drafts."""
+    curves = {(record.metric, record.note): record for record in measured}
+    assert len(curves) == len(measured) == 3
+    assert ("reencode_error", "draft of denim") not in curves
+    anew, blended = (curves[metric, "yarns of satin_8"].curve for metric in ("reencode_error", "path_error"))
+    assert [t for t, _ in anew] == list(SHARES)
+    assert all(error == 0 for _, error in anew)
+    assert blended[0][1] == blended[-1][1] == 0
+    assert all(error == 0 for _, error in curves["path_error", "draft of denim"].curve)
+
+
+def test_a_straight_line_misses_what_bends(measured):
+    """Answers are no linear function of roughness and bend: the blend of answers errs most in the middle."""
+    blended = next(record for record in measured if record.metric == "path_error")
+    errors = dict(blended.curve)
+    assert blended.value == errors[0.5] > 0.02
+    assert errors[0.5] == max(errors.values())
+
+
+def test_edits_of_a_yarn_are_waited_for_and_edits_of_a_colour_are_not():
+    method = Slow()
+    yarn, colour = measure_edits(method, load_fabric("denim"), repeats=5)
+    assert len(method.known) == 1 + 6  # the fabric, one edit to warm up, five timed ones: none twice
+    assert yarn.low <= yarn.value <= yarn.high
+    assert yarn.value >= 3.0 and yarn.unit == "ms" and yarn.count == 5
+    assert colour.value < yarn.value
+    assert (yarn.note, colour.note) == ("a yarn", "a colour")
+
+
+def test_a_network_is_measured_and_shown():
+    torch.manual_seed(0)
+    method = Woven(WovenNetwork(WovenOptions(map_texels=16, encoder_channels=4, hidden=16, latent=8)))
+    assert isinstance(method, Blends)
+    pair = pairs()[0]
+    records = measure_paths(method, [pair], ASKED, TRUTH, rows=64)
+    blended, anew = (np.array(record.curve)[:, 1] for record in records)
+    # Its ends are encoded either way.
+    np.testing.assert_allclose(blended[[0, -1]], anew[[0, -1]], rtol=1e-3)
+    assert (blended > 0).all()
+
+    table = path_table(records)
+    np.testing.assert_array_equal(table["error"], np.concatenate([blended, anew]))
+    rows = cells.path_rows(table)
+    assert [row[:3] for row in rows] == [
+        ["woven", "denim → yarns of satin 8", "latents blended"],
+        ["woven", "denim → yarns of satin 8", "encoded anew"],
+    ]
+    assert all(len(row) == 3 + len(SHARES) for row in rows)
+    edits = cells.edit_rows(measure_edits(method, pair.first, repeats=3))
+    assert [row[1] for row in edits] == ["a yarn", "a colour"]
+    assert cells.path_rows(path_table([])) == cells.edit_rows([]) == []
+
+
+def test_pairs_say_what_differs():
+    denim = load_fabric("denim")
+    assert Pair(denim, load_fabric("basket"), "draft").about == "draft of basket"

@@ -1,0 +1,141 @@
+"""The edge of a cloth cylinder: geometry against closed forms, comparisons that know their answer."""
+
+import numpy as np
+import pytest
+
+from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.opacity import opacity
+from pipeline.truth.options import TruthOptions
+from reports.measure.silhouette import (
+    edge_of,
+    edge_queries,
+    measure_silhouette,
+    read_edge,
+    render_edge,
+    silhouette,
+    silhouette_table,
+    true_edge,
+)
+from reports.options import EdgeOptions
+from weaves.fabric import load_fabric
+
+TINY = EdgeOptions(
+    radius=10.0, depth=0.15, pixel=0.025, rows=5, truth=TruthOptions(relative_error=0.1, min_count=64, max_count=64)
+)
+DENIM = load_fabric("denim")
+
+
+class Flat:
+    """What a method without curvature answers: always the same, and it remembers the questions."""
+
+    name, setting = "flat", ""
+
+    def __init__(self):
+        self.asked = []
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        self.asked.append(queries)
+        return np.full((len(queries.u), 4), 0.25, np.float32)
+
+    def bytes_stored(self, fabric):
+        return 0
+
+
+class Truth(Flat):
+    """The truth as a method."""
+
+    def predict(self, fabric, queries, seed=0):
+        return estimate(fabric, queries, TINY.truth, TINY.seed).mean
+
+    def missed(self, fabric, queries):
+        return 1 - opacity(fabric, queries, TINY.truth, TINY.seed)[0]
+
+
+def test_pixels_see_the_cylinder_as_the_camera_does():
+    queries = edge_queries(TINY, (4, 4))
+    assert len(queries.u) == 5 * 6
+    distance = 10.0 - 0.025 * (np.arange(6)[::-1] + 0.5)
+    np.testing.assert_allclose(queries.wo[:6, 2], np.sqrt(1 - (distance / 10) ** 2), rtol=1e-5)
+    np.testing.assert_allclose(queries.wo[:6, 0], -distance / 10, rtol=1e-6)
+    np.testing.assert_allclose(queries.curvature, 0.1, rtol=1e-6)
+    np.testing.assert_allclose(queries.u[:6], np.mod(10 * np.arcsin(distance / 10), 4), rtol=1e-5)
+    np.testing.assert_allclose(queries.v[::6], 0.025 * (np.arange(5) + 0.5), rtol=1e-5)
+    # The angle between light and camera is the same everywhere: 60 degrees, lifted by 20.
+    expected = np.cos(np.radians(60)) * np.cos(np.radians(20))
+    np.testing.assert_allclose((queries.wi * queries.wo).sum(axis=1), expected, atol=1e-6)
+    # Light from the edge's side: straight into the normal where the normal is turned to it.
+    assert (queries.wi[:, 2] > 0.7).all()
+
+
+def test_the_truth_finds_its_own_edge():
+    assert silhouette(Truth(), DENIM, TINY) == (0.0, 0.0, 0.0)
+
+
+def test_a_flat_method_covers_everything_and_is_asked_flat():
+    method, truth = Flat(), true_edge(DENIM, TINY)
+    found = silhouette(method, DENIM, TINY, truth)
+    assert 0.05 < truth.coverage.mean() < 0.95
+    assert found.displacement == pytest.approx(0.15 * (1 - truth.coverage.mean()))
+    assert found.coverage_rmse == pytest.approx(np.sqrt(((1 - truth.coverage) ** 2).mean()))
+    assert (method.asked[0].curvature == 0).all()
+
+
+def test_a_flat_method_is_black_where_the_light_is_behind():
+    lit_from_behind = TINY.model_copy(update={"light": (-120.0, 0.0)})
+    method = Flat()
+    edge = edge_of(method, DENIM, lit_from_behind)
+    assert len(method.asked[0].u) == 0
+    assert (edge.light == 0).all()
+    assert (edge_of(method, DENIM, TINY).light > 0).all()
+
+
+def test_opacity_falls_towards_the_outline_and_flatter_cylinders_hide_more():
+    """On a flatter one a ray that dips equally deep has to pass over more crests."""
+    means = []
+    for radius in (5.0, 20.0, 80.0):
+        options = TINY.model_copy(update={"radius": radius, "rows": 160})
+        coverage, _ = opacity(DENIM, edge_queries(options, DENIM.weave.repeat), options.truth, 0)
+        mean = coverage.reshape(160, -1).mean(axis=0)
+        assert (np.diff(mean) <= 0.02).all()
+        assert mean[0] > 0.9
+        assert mean[-1] < 0.5
+        means.append(mean)
+    assert (means[1] > means[0] - 0.02).all()
+    assert (means[2] > means[1] - 0.02).all()
+    assert means[2].mean() > means[0].mean() + 0.05
+
+
+def test_records_are_those_of_the_edge_that_was_rendered(tmp_path):
+    path = tmp_path / "edge.exr"
+    render_edge(DENIM, TINY, path)
+    truth = true_edge(DENIM, TINY)
+    np.testing.assert_allclose(read_edge(path).coverage, truth.coverage, atol=1e-7)
+    np.testing.assert_allclose(read_edge(path).light, truth.light, rtol=1e-6, atol=1e-9)
+    records = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
+    assert [record.metric for record in records] == [
+        "silhouette_coverage",
+        "silhouette_displacement",
+        "silhouette_light",
+    ]
+    np.testing.assert_allclose([r.value for r in records], silhouette(Flat(), DENIM, TINY, truth), rtol=1e-5)
+    assert {(r.method, r.fabric, r.role) for r in records} == {("flat", "denim", "seen")}
+
+
+def test_the_table_is_the_mean_over_fabrics(tmp_path):
+    path = tmp_path / "edge.exr"
+    render_edge(DENIM, TINY, path)
+    first = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
+    second = [
+        record.model_copy(update={"fabric": "basket", "value": 3 * record.value, "role": "unseen"}) for record in first
+    ]
+    (row,) = silhouette_table([*first, *second]).itertuples()
+    assert (row.method, row.setting, row.fabrics) == ("flat", "", 2)
+    expected = [2 * record.value for record in first]
+    assert [row.coverage, row.displacement, row.light] == pytest.approx(expected)
+    assert silhouette_table([]).empty

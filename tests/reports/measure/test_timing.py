@@ -1,0 +1,98 @@
+import threading
+
+import numpy as np
+import pytest
+
+from pipeline.truth.query import Queries
+from reports.measure.timing import Contender, affordable, set_threads, synchronise, thread_counts, time_side_by_side
+from reports.record import cores
+
+
+def questions(rows):
+    vectors = np.tile(np.float32([0, 0, 1]), (rows, 1))
+    scalars = np.zeros(rows, np.float32)
+    return [(None, Queries.round(scalars, scalars, scalars + 1, vectors, vectors))]
+
+
+class Clock:
+    """A clock that only the methods move."""
+
+    def __init__(self):
+        self.now = 0
+
+    def __call__(self):
+        return self.now
+
+
+def method(clock, calls, label, durations):
+    durations = iter(durations)
+
+    def predict(fabric, queries):
+        calls.append(label)
+        clock.now += next(durations)
+
+    return predict
+
+
+def test_methods_take_turns_after_the_warm_up():
+    clock, calls = Clock(), []
+    contenders = [
+        Contender(method(clock, calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), questions(10)),
+        Contender(method(clock, calls, "b", [10**9] * 4 + [500] * 22), questions(100) + questions(150)),
+    ]
+    a, b = time_side_by_side(contenders, repeats=11, warm_up=2, clock=clock)
+    assert calls == ["a", "b", "b"] * 13
+    # Calls of a take 1000, 1100, ... 2000 ns for 10 queries: median 1500, quartiles 1250 and 1750.
+    assert a.samples == pytest.approx(range(100, 210, 10))
+    assert a.quartiles == pytest.approx((125, 150, 175))
+    assert b.quartiles == pytest.approx((4, 4, 4))
+    assert (a.rows, b.rows, len(a.samples)) == (10, 250, 11)
+
+
+def test_on_several_threads_each_makes_the_call_at_the_same_time():
+    """A barrier of three lets nobody through unless three threads are in the call at once."""
+    barrier, names = threading.Barrier(3, timeout=5), set()
+
+    def predict(fabric, queries):
+        names.add(threading.current_thread().name)
+        barrier.wait()
+
+    (timing,) = time_side_by_side([Contender(predict, questions(10), threads=3)], repeats=2, warm_up=1)
+    assert timing.rows == 30
+    assert len(names) == 3
+
+
+@pytest.mark.parametrize(("cost", "rows"), [(1, 1000), (10_000, 1000), (40_000, 512), (300_000, 64), (10**9, 16)])
+def test_slow_methods_answer_fewer_queries(cost, rows):
+    """Of each of two fabrics .05 s allow 2500, 625, 83 and no queries at 10, 40, 300 µs and 1 s a query."""
+    clock = Clock()
+
+    def predict(fabric, queries):
+        clock.now += cost * len(queries.u)
+
+    chosen = affordable(Contender(predict, questions(1000) * 2), longest=0.05, clock=clock)
+    assert [len(queries.u) for _, queries in chosen.questions] == [rows, rows]
+
+
+def test_thread_counts_are_said_once():
+    assert thread_counts([0, 1]) == sorted({1, cores()})
+    assert thread_counts([4, 2, 4]) == [2, 4]
+
+
+def test_real_time_passes():
+    work = np.random.default_rng(0).random((60, 60))
+    slow = Contender(lambda fabric, queries: [work @ work for _ in range(20)], questions(1))
+    fast = Contender(lambda fabric, queries: None, questions(1))
+    timed = time_side_by_side([slow, fast], repeats=20)
+    assert timed[0].quartiles[1] > timed[1].quartiles[1] > 0
+
+
+def test_threads_are_set_where_the_libraries_are_loaded():
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    try:
+        set_threads(1)
+        assert torch.get_num_threads() == 1
+    finally:
+        torch.set_num_threads(before)
+    synchronise()

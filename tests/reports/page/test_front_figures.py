@@ -1,0 +1,100 @@
+import io
+import math
+
+import matplotlib.image
+import pandas as pd
+import pytest
+
+from reports.page import front_figures
+from reports.page.style import DARK, LIGHT, render
+from reports.tables import summary
+from reports.tables.tradeoff import tradeoff_table
+
+PLOTS = ["error_against_time", "aliasing_against_time", "error_against_bytes"]
+
+
+@pytest.fixture(scope="module")
+def table(made_up):
+    timing = summary.timing_table(made_up)
+    return tradeoff_table(summary.error_table(made_up), timing, summary.aliasing_table(made_up))
+
+
+@pytest.mark.parametrize("name", PLOTS)
+@pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
+def test_plots_have_a_clear_ground_and_ink_on_it(name, scheme, table):
+    picture = matplotlib.image.imread(io.BytesIO(render(getattr(front_figures, name), scheme, table)), format="png")
+    assert picture.shape[1] > 1500
+    assert picture[0, 0, 3] == 0
+    assert (picture[..., 3] == 1).mean() > 0.002
+
+
+def test_front_holds_what_nothing_beats_on_both(table):
+    """Made up: points of k cost 400 k and err 1/k, woven and NeuMIP lie at k = 9 like points: all are on the front
+    but NeuMIP, which costs more than woven at the same error."""
+    figure = front_figures.error_against_time(LIGHT, table)
+    line = figure.axes[0].lines[0]
+    assert sorted(line.get_xdata()) == list(line.get_xdata())
+    costs = table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
+    assert costs["neumip", ""] not in line.get_xdata()
+    assert costs["woven", ""] in line.get_xdata()
+    assert len(line.get_xdata()) == 6
+
+
+def test_the_knobs_of_a_method_are_one_curve_and_its_ends_are_numbered(table):
+    figure = front_figures.error_against_time(LIGHT, table)
+    curves = {len(line.get_xdata()) for line in figure.axes[0].lines[1:]}
+    assert curves == {1, 5}  # woven and NeuMIP; points of 1, 2, 4, 16, 64
+    assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["woven", "NeuMIP", "points", "the paper: 2.0× lower at 0.83× the time"]
+
+
+def test_flicker_is_drawn_as_its_distance_from_the_truths(table):
+    """Made up: points flicker by .3 / k at 400 k ns; woven, whose flicker is -.001, is on the front at k = 9's time."""
+    figure = front_figures.aliasing_against_time(LIGHT, table)
+    band = dict(zip(*(figure.axes[0].lines[0].get_xydata().T), strict=True))
+    costs = table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
+    assert band[costs["woven", ""]] == pytest.approx(1e-3)
+    assert band[costs["point_sampled", "k = 2"]] == pytest.approx(0.15)
+    # Beyond woven nothing flickers less: 64 points flicker by .3 / 64.
+    assert costs["point_sampled", "k = 64"] not in band and costs["neumip", ""] not in band
+    assert not any("paper" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_error_against_bytes_has_a_front_of_its_own(table):
+    """Made up: methods store 2,000 bytes and their index: woven the fewest; points err less than it from 16 on."""
+    figure = front_figures.error_against_bytes(LIGHT, table)
+    band = figure.axes[0].lines[0].get_xydata()
+    assert list(band[:, 0]) == [2000.0, 2005.0, 2006.0]  # woven, then 16 and 64 points
+
+
+def test_scenes_mark_their_fronts_and_the_papers_step():
+    table = pd.DataFrame(
+        [
+            ("attic", "point_sampled", "k = 2", 0.2, 0.4, -0.1, 10.0),
+            ("attic", "point_sampled", "k = 16", 0.02, 0.2, 0.01, 80.0),
+            ("attic", "woven", "", 0.03, 0.3, 0.0, 90.0),
+        ],
+        columns=["scene", "method", "setting", "mse", "flip_hdr", "flicker", "frame_time"],
+    )
+    figure = front_figures.scenes(LIGHT, table)
+    above, _, below = figure.axes
+    assert above.lines[0].get_xydata().tolist() == [[10.0, 0.2], [80.0, 0.02]]  # woven is beaten
+    # A flicker of 0 is the truth's and cannot be drawn; one below 0 is drawn by its size.
+    assert below.lines[0].get_xydata().tolist() == [[10.0, 0.1], [80.0, 0.01]]
+    (arrow,) = [text for text in above.texts if text.arrow_patch]
+    assert arrow.xy == pytest.approx((8.3, 0.2 / 4.1))
+    assert not below.texts
+    assert figure.legends[0].get_texts()[-1].get_text() == "the paper: 4.1× lower at 0.83× the time"
+
+
+def test_what_cannot_be_drawn_has_no_panel():
+    """One scene was not timed; in the other nothing flickers."""
+    table = pd.DataFrame(
+        [("attic", "woven", "", 0.2, 0.4, -0.1, math.nan), ("cellar", "woven", "", 0.2, 0.4, 0.0, 5.0)],
+        columns=["scene", "method", "setting", "mse", "flip_hdr", "flicker", "frame_time"],
+    )
+    figure = front_figures.scenes(LIGHT, table)
+    assert [axes.get_title() for axes in figure.axes] == ["cellar", ""]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["MSE", "HDR-FLIP"]
+    assert render(front_figures.scenes, LIGHT, table)

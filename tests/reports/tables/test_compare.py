@@ -1,0 +1,131 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reports.record import Provenance, Record, this_machine
+from reports.tables.compare import LEVEL, compare, holm, refuse_other_machine
+from weaves.errors import BadInput
+
+REPEATS, NOISE = 25, 0.02
+
+
+def time_of(method, samples, **about):
+    subject = Record(method=method, threads=1, **about)
+    return subject.of("time", float(np.median(samples)), len(samples), unit="ns/query", samples=tuple(samples))
+
+
+def readings(random, median=1000.0, methods=20):
+    """Times of some methods, each with a noise of 2 % and now and then a call that something else held up."""
+    times = median * (1 + NOISE * random.standard_normal((methods, REPEATS)))
+    times *= np.where(random.random(times.shape) < 0.04, 3.0, 1.0)
+    return [time_of(f"m{index}", row.tolist()) for index, row in enumerate(times)]
+
+
+def error_of(method, value, standard_error, fabric="denim", scene="queries"):
+    subject = Record(method=method, fabric=fabric, scene=scene)
+    return subject.of("mse", value, 400, standard_error=standard_error)
+
+
+def verdicts(a, b):
+    found = compare(a, b)
+    return [one.verdict for one in (*found.times, *found.errors)]
+
+
+def test_a_shift_of_5_percent_is_marked_and_only_where_it_is():
+    """25 readings with 2 % noise: the shift is 2.5 sigmas, U lies 5.6 sigmas off, and is missed once in 500 times."""
+    random = np.random.default_rng(1)
+    a, b = readings(random), readings(random)
+    slower, faster = readings(random, 1050.0), readings(random, 950.0)
+    found = verdicts(a, [slower[0], faster[1], *b[2:]])
+    assert found == ["slower", "faster", *["no difference shown"] * 18]
+
+
+def test_nothing_is_marked_where_nothing_differs():
+    """Of 200 comparisons of 20 equal methods at most 5 % mark any: 19 or more do with a chance below 1 %."""
+    random = np.random.default_rng(2)
+    marked = sum(set(verdicts(readings(random), readings(random))) != {"no difference shown"} for _ in range(200))
+    assert LEVEL == 0.05
+    assert marked < 19
+
+
+def test_errors_are_held_against_their_standard_errors():
+    """Gaps of 2.2, 2.2, 4.5 and -4.5 standard errors of the difference; 2.2 would be shown alone, and not in pairs."""
+    a = [error_of(name, value, 0.3) for name, value in (("m", 1.0), ("n", 1.0), ("worse", 1.0), ("better", 3.0))]
+    b = [error_of(name, value, 0.4) for name, value in (("m", 2.1), ("n", 2.1), ("worse", 3.25), ("better", 0.75))]
+    assert verdicts(a, b) == ["no difference shown"] * 2 + ["higher", "lower"]
+    assert verdicts(a[:1], b[:1]) == ["higher"]
+    assert compare(a[:1], b[:1]).errors[0].p == pytest.approx(0.0278, abs=1e-4)  # 2 (1 - Phi(2.2))
+    assert compare(a[2:3], b[2:3]).errors[0].ratio == 3.25
+    assert verdicts(a, a) == ["no difference shown"] * 4
+
+
+def test_what_lacks_samples_or_standard_errors_is_not_tested():
+    with_samples = time_of("m", [1.0, 2.0, 3.0])
+    without = with_samples.model_copy(update={"samples": ()})
+    exact = error_of("m", 1.0, None)
+    found = compare([with_samples, exact], [without, error_of("m", 9.0, 0.1)])
+    assert [one.verdict for one in (*found.times, *found.errors)] == ["not tested"] * 2
+    # What is not tested does not make the others stricter.
+    more = compare([without, error_of("m", 1.0, 0.1)], [without, error_of("m", 2.0, 0.1)])
+    assert more.errors[0].p == compare([error_of("m", 1.0, 0.1)], [error_of("m", 2.0, 0.1)]).errors[0].p
+
+
+def test_like_is_compared_with_like():
+    """Threads, settings, fabrics and edits are kept apart; pictures and other metrics are left out."""
+    fast, slow = [1.0 + 0.01 * i for i in range(9)], [2.0 + 0.01 * i for i in range(9)]
+    one, two = time_of("m", fast), time_of("m", slow).model_copy(update={"threads": 2})
+    edits = [
+        Record(method="m", note=note).of("encode_time", 1.0, 9, unit="ms", samples=tuple(times))
+        for note, times in (("a yarn", slow), ("a colour", fast))
+    ]
+    other = [error_of("m", 1.0, 0.1, scene="sphere"), Record(method="m").of("bytes_stored", 7.0, 1)]
+    a = [one, two, *edits, *other, error_of("m", 1.0, 0.1, "denim"), error_of("gone", 1.0, 0.1)]
+    found = compare(a, [*reversed(a[:-1]), error_of("m", 5.0, 0.1, "basket"), time_of("new", fast)])
+    assert len(found.times) == 4 and len(found.errors) == 1
+    assert all(row.a == row.b and row.verdict == "no difference shown" for row in (*found.times, *found.errors))
+    assert (found.only_a, found.only_b) == (1, 2)
+
+
+def test_nothing_in_common_is_bad_input():
+    with pytest.raises(BadInput, match="share no measurement"):
+        compare([error_of("m", 1.0, 0.1)], [error_of("n", 1.0, 0.1)])
+
+
+def test_what_else_differs_is_said():
+    a = time_of("m", [1.0, 2.0], note="512 queries a fabric", provenance=Provenance(dataset="a"))
+    b = time_of("m", [1.0, 2.0], note="1024 queries a fabric", provenance=Provenance(dataset="b", version=1))
+    assert compare([a], [a]).unlike == []
+    assert [sentence.split()[-1] for sentence in compare([a], [b]).unlike] == ["sets", "benchmark", "m"]
+
+
+@pytest.mark.parametrize("change", [{"cpu": "another"}, {"cores": 99}, {"threads": 7}])
+def test_another_machine_is_refused_unless_asked_for(change):
+    here = this_machine(1)
+    there = here.model_copy(update=change)
+    ((name, value),) = change.items()
+    with pytest.raises(BadInput, match="--other-machine") as caught:
+        refuse_other_machine(here, there)
+    assert f"{name} of B = {value!r}" in str(caught.value)
+    (sentence,) = refuse_other_machine(here, there, allow=True)
+    assert str(value) in sentence
+    later = here.model_copy(update={"date": "2000-01-01T00:00:00+00:00", "packages": {}})
+    assert refuse_other_machine(here, later) == []
+
+
+def test_holm_on_its_textbook_example():
+    """Four p-values .01, .04, .03, .005 at their ranks: .005 x 4, .01 x 3, .03 x 2, and .04 no less than that."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([]) == []
+
+
+@given(st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12))
+def test_corrected_p_values_keep_the_order_and_are_no_smaller(p_values):
+    """Between the uncorrected ones and Bonferroni's, in the same order; what is not tested takes no part."""
+    corrected = holm(p_values)
+    tested = [(p, c) for p, c in zip(p_values, corrected, strict=True) if not math.isnan(p)]
+    assert [math.isnan(p) for p in p_values] == [math.isnan(c) for c in corrected]
+    assert all(p <= c <= min(1.0, len(tested) * p) for p, c in tested)
+    assert [c for _, c in sorted(tested)] == sorted(c for _, c in tested)

@@ -1,0 +1,56 @@
+import math
+
+import pytest
+
+from reports.tables.numbers import (
+    beyond_noise,
+    fixed,
+    percent,
+    plain,
+    scientific,
+    scientific_interval,
+    signed,
+    significant,
+    size,
+    times,
+)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (scientific(2.62e-3), "2.62e−3"),
+        (scientific(None), "–"),
+        (scientific(math.nan), "–"),
+        (scientific_interval(8.76e-2, 0.158), "(0.88 … 1.58)e−1"),
+        (scientific_interval(-2e-3, 1e-4), "(−2.00 … 0.10)e−3"),
+        (scientific_interval(0.0, 0.0), "(0.00 … 0.00)e0"),
+        (beyond_noise(-1e-9, scientific), "in the noise"),
+        (beyond_noise(0.02, percent), "2.0 %"),
+        (beyond_noise(math.nan, percent), "–"),
+        (signed(1.0), "+1.00e0"),
+        (signed(-0.02), "−2.00e−2"),
+        (times(4.12), "4.1×"),
+        (times(0.0834), "0.083×"),
+        (times(1234.0), "1,234×"),
+        (percent(0.0151, 2), "1.51 %"),
+        (fixed(0.1234), ".123"),
+        (fixed(1.5), "1.500"),
+        (size(512), "512 B"),
+        (size(346_896), "346.9 kB"),
+        (size(16_300_000), "16.30 MB"),
+        (plain("twill_4_4"), "twill 4/4"),
+        (plain("wool_gabardine"), "wool gabardine"),
+        (plain("satin_8"), "satin 8"),
+    ],
+)
+def test_numbers_are_worded(found, expected):
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1696.4, "1,696"), (12.34, "12.3"), (0.0456, ".0456"), (999.6, "1,000"), (0.0, "0"), (-2.0, "-2.00")],
+)
+def test_three_digits_are_significant(value, text):
+    assert significant(value) == text

@@ -1,0 +1,150 @@
+import math
+
+import pytest
+
+from reports.record import Record
+from reports.tables.cells import timing_columns, timing_rows
+from reports.tables.summary import (
+    aliasing_table,
+    error_table,
+    fabric_table,
+    picture_table,
+    rows,
+    spectra,
+    summary_table,
+    timing_table,
+)
+
+
+def error(method, setting, fabric, role, mse, noise=0.0, spread=0.0):
+    subject = Record(method=method, setting=setting, fabric=fabric, role=role, scene="queries")
+    return [
+        subject.of("mse", mse, 100, standard_error=spread),
+        subject.of("mse_measured", mse + noise, 100),
+        subject.of("truth_noise", noise, 100),
+        subject.of("colour_rrmse", math.sqrt(abs(mse)), 100),
+    ]
+
+
+RECORDS = [
+    *error("woven", "", "denim", "seen", 1.0, noise=0.25, spread=0.03),
+    *error("woven", "", "basket", "seen", 3.0, noise=0.75, spread=0.04),
+    *error("woven", "", "twill_4_4", "unseen", 2.0),
+    *error("neumip", "", "denim", "seen", 2.0),
+    *error("point_sampled", "k = 1", "denim", "seen", 12.0),
+    *error("point_sampled", "k = 2", "denim", "seen", 6.0),
+    *error("point_sampled", "k = 2", "basket", "seen", 10.0),
+    *error("point_sampled", "k = 2", "twill_4_4", "unseen", 5.0),
+    Record(method="woven", fabric="denim", role="seen", scene="sphere", metric="mse", value=0.5),
+    Record(method="woven", fabric="denim", role="seen", scene="plane", metric="mse", value=0.7),
+    Record(method="woven", fabric="denim", role="seen", scene="plane", metric="flicker", value=0.1),
+    Record(method="woven", fabric="basket", role="seen", scene="plane", metric="flicker", value=0.3),
+    Record(method="woven", fabric="denim", role="seen", scene="plane", metric="excess_energy", value=-0.1),
+    Record(method="woven", fabric="basket", role="seen", scene="plane", metric="excess_energy", value=-0.3),
+    Record(method="woven", metric="time", value=400.0, low=390.0, high=420.0, unit="ns/query", count=25),
+    Record(method="point_sampled", setting="k = 2", metric="time", value=500.0, low=490.0, high=520.0, count=25),
+    Record(method="truth", metric="time", value=50_000.0, low=49_000.0, high=52_000.0, count=25),
+    Record(method="woven", metric="bytes_stored", value=350_000.0, unit="B"),
+]
+
+
+def row(table, **keys):
+    (found,) = [r for r in rows(table) if all(getattr(r, key) == value for key, value in keys.items())]
+    return found
+
+
+def test_errors_are_means_over_fabrics():
+    woven = row(error_table(RECORDS), method="woven", role="seen")
+    assert (woven.fabrics, woven.queries) == (2, 200)
+    assert woven.mse == pytest.approx(2.0)
+    assert woven.standard_error == pytest.approx(0.05 / 2)  # sqrt(.03^2 + .04^2) / 2
+    assert (woven.low, woven.high) == pytest.approx((2 - 1.96 * 0.025, 2 + 1.96 * 0.025))
+    assert woven.noise_share == pytest.approx(0.5 / 2.5)
+    assert woven.ratio == pytest.approx(8.0 / 2.0)
+    assert woven.ratio_low < 4 < woven.ratio_high
+
+
+def test_a_ratio_compares_the_fabrics_that_both_cover():
+    """NeuMIP answers for denim alone: there 2 points have 6, not the 8 of both fabrics."""
+    table = error_table(RECORDS)
+    assert row(table, method="neumip").ratio == pytest.approx(3.0)
+    assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
+
+
+def test_without_the_baseline_there_is_no_ratio():
+    alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
+    assert math.isnan(row(error_table(alone), method="woven", role="seen").ratio)
+
+
+def test_an_error_below_the_noise_has_no_ratio():
+    table = error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
+    assert math.isnan(row(table, method="m").ratio)
+
+
+def test_order_is_that_of_the_records():
+    assert [(r.method, r.setting) for r in rows(error_table(RECORDS)) if r.role == "seen"] == [
+        ("woven", ""),
+        ("neumip", ""),
+        ("point_sampled", "k = 1"),
+        ("point_sampled", "k = 2"),
+    ]
+
+
+def test_fabrics_and_pictures():
+    by_fabric = fabric_table(RECORDS)
+    assert by_fabric["fabric"].tolist() == ["denim", "basket", "twill_4_4"]
+    assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0]
+    assert math.isnan(by_fabric["neumip"][1])
+    pictures = picture_table(RECORDS)
+    assert pictures[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
+
+
+def test_aliasing_and_timing():
+    alias = row(aliasing_table(RECORDS), method="woven")
+    assert (alias.fabrics, alias.flicker, alias.excess_energy) == pytest.approx((2, 0.2, -0.2))
+    timing = timing_table(RECORDS)
+    woven, truth = row(timing, method="woven"), row(timing, method="truth")
+    assert (woven.median_ns, woven.time_ratio, woven.bytes_stored) == pytest.approx((400, 0.8, 350_000))
+    assert truth.time_ratio == pytest.approx(100)
+    assert math.isnan(truth.bytes_stored)
+    # 400 ns a query are .83 s a frame of 1920 by 1080.
+    assert woven.frame_ms == pytest.approx(829.44)
+    assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
+
+
+def test_times_on_one_thread_and_on_most_stand_in_one_row():
+    subject = Record(method="woven")
+    records = [
+        subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
+        for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
+    ]
+    records += [subject.of("prepare_time", 12.5, 9, unit="ms"), subject.of("peak_memory", 3e7, 3, unit="B")]
+    table = timing_table(records)
+    (found,) = rows(table)
+    assert (found.threads, found.median_ns, found.most_threads, found.most_threads_ns) == (1, 400, 4, 120)
+    assert found.most_threads_frame_ms == pytest.approx(0.3 * found.frame_ms)
+    (group,) = timing_rows(table)
+    shown = dict(zip(timing_columns(table), group["rows"][0]["cells"], strict=True))
+    assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
+    assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
+    assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
+
+
+def test_spectra_are_averaged():
+    curves = [((0.1, 1.0), (0.2, 2.0)), ((0.1, 3.0), (0.2, 4.0))]
+    records = [Record(method="m", metric="spectrum", fabric=f"f{i}", curve=curve) for i, curve in enumerate(curves)]
+    assert spectra(records) == {("m", ""): [(0.1, 2.0), (0.2, 3.0)]}
+
+
+def test_summary_is_one_row_a_method():
+    table = summary_table(RECORDS)
+    assert list(table.index) == [("woven", ""), ("neumip", ""), ("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
+    assert table.loc[("woven", ""), "× lower, seen"] == pytest.approx(4.0)
+    assert table.loc[("woven", ""), "× time"] == pytest.approx(0.8)
+    assert math.isnan(table.loc[("neumip", ""), "MSE unseen"])
+
+
+def test_nothing_measured_gives_empty_tables():
+    for table in (error_table, fabric_table, picture_table, aliasing_table, timing_table, summary_table):
+        assert table([]).empty
+    assert spectra([]) == {}

@@ -1,0 +1,52 @@
+"""Measured accuracies are what their definitions say, and Records bring them back."""
+
+import numpy as np
+import pytest
+
+from reports.record import Record, read_records, this_machine, write_records
+from reports.truth.accuracy import COUNTS, SETTINGS, Accuracy, from_records, measure, to_records
+
+
+@pytest.fixture(scope="module")
+def found():
+    return list(measure(rows=40, fabrics=["polyester_lining"], reference=1 << 13))
+
+
+def named(found, setting):
+    return next(row for row in found if row.setting == setting)
+
+
+def test_every_setting_is_measured_on_the_same_queries(found):
+    assert [row.setting for row in found] == list(SETTINGS)
+    assert {(row.fabric, row.count) for row in found} == {("polyester_lining", 40)}
+    assert all(row.rate > 0 and row.points >= 32 for row in found)
+
+
+def test_plain_monte_carlo_saves_nothing_against_itself(found):
+    """The fit goes through the geometric mean of its own errors: so does the mean of what it saves, exactly."""
+    saved = [named(found, f"mc, {count} points").saved for count in COUNTS]
+    assert np.exp(np.mean(np.log(saved))) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_saved_points_follow_from_the_errors(found):
+    """Twice the points and half the error: twice as many saved."""
+    one = named(found, "mc, 64 points")
+    c2 = one.saved * one.points * one.true_error**2
+    for row in found:
+        assert row.saved * row.points * row.true_error**2 == pytest.approx(c2, rel=1e-9)
+
+
+def test_more_points_are_more_accurate(found):
+    """Sixteen times the points of 40 queries: the median error of `mc` falls 4 times, give or take a factor of 2."""
+    few, many = (named(found, f"mc, {count} points") for count in (64, 1024))
+    assert 2 < few.true_error / many.true_error < 8
+    assert named(found, "owen, 1024 points").saved > 1.5
+    assert named(found, "auto at 1 %").true_error < 0.01
+
+
+def test_records_bring_accuracies_back(found, tmp_path):
+    path = tmp_path / "truth.json"
+    write_records(path, [Record(method="truth").of("time", 1.0, 1), *to_records(found)], this_machine(1))
+    again = from_records(read_records([path]))
+    assert again == found
+    assert isinstance(again[0], Accuracy)

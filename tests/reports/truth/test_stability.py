@@ -1,0 +1,148 @@
+"""Every expression holds over its corners, and a form that loses digits there does not pass for one that keeps them."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from jobs.cli import main
+from jobs.recipe.load import recipe_names
+from jobs.verbs.bench import BENCHES, STABILITY
+from pipeline.compiled import float32 as single
+from reports.record import Record, read_records, this_machine, write_records
+from reports.truth import formulas, stability, stability_cloth, stability_point
+from reports.truth.corners import draw, kernel_sigma, kernel_slab, textbook_slab
+from reports.truth.finding import Finding, failures, from_records, judge, to_records
+
+QUICK = {**stability_point.PARTS, **stability_cloth.PARTS}
+QUICK.pop("footprints")
+
+
+@pytest.mark.parametrize("part", QUICK)
+def test_corners_hold(part):
+    findings = QUICK[part]()
+    assert findings
+    assert [(f.expression, f.corner, f.fault, f.at) for f in failures(findings)] == []
+
+
+def test_answers_far_away_are_those_at_home():
+    findings = stability_cloth.footprints()
+    assert {finding.count for finding in findings} == {120}
+    assert [(f.corner, f.fault, f.at) for f in failures(findings)] == []
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "naive", "caught"),
+    [
+        (
+            stability_point.flakes,
+            "sigma",
+            formulas.textbook_sigma,
+            {"α = 0.01, near the axis", "α = 0.1, near the axis"},
+        ),
+        (stability_point.flakes, "density", formulas.matrix_density, {"α = 0.01", "α = 0.1"}),
+        (
+            stability_cloth.bends,
+            "torus_height",
+            formulas.textbook_torus_height,
+            {f"u_max = {bend:g}°" for bend in stability_cloth.BENDS},
+        ),
+    ],
+)
+def test_a_textbook_form_is_caught(monkeypatch, part, name, naive, caught):
+    """As single precision would be if someone 'simplified' it: exactly the corners where it loses digits fail."""
+    monkeypatch.setattr(formulas, name, naive)
+    assert {finding.corner for finding in failures(part()) if finding.arithmetic == "float32"} == caught
+
+
+def test_a_textbook_exponential_is_caught(monkeypatch):
+    monkeypatch.setattr(single, "absorbed", lambda x: np.float32(1) - np.exp(-x))
+    one, other = stability_point.exponentials()
+    assert (one.holds, other.holds) == (False, True)
+    assert one.worst > 0.9
+    # Its quotient over a difference of Lambda goes with it, but for equal ones, where the limit is a case of its own.
+    assert not any(finding.holds for finding in stability_point.through()[1:3])
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_fifty_digits_agree_with_double_precision_by_the_textbook(behind):
+    """Away from the corners the textbook's double precision is good to 1e-12, and so are the 50 digits."""
+    corners = draw(40, 0.5, (30.0, 60.0), (20.0, 45.0), (0.5, 2.0), behind)
+    with mpmath.workdps(formulas.DIGITS):
+        exact = textbook_slab(corners.cast(formulas.exact), behind).astype(np.float64)
+    assert kernel_slab(corners, behind) == pytest.approx(exact, rel=1e-12)
+    assert textbook_slab(corners, behind) == pytest.approx(exact, rel=1e-12)
+
+
+def test_formulas_on_arrays_are_those_of_the_kernels():
+    corners = draw(200, 0.1, (0.0, 60.0, 89.9), (30.0, 80.0), (2.0,))
+    ours = formulas.sigma(corners.wo, corners.t, corners.alpha)
+    assert ours == pytest.approx(kernel_sigma(corners.wo, corners.t, corners.alpha), rel=1e-15)
+
+
+def test_fifty_digits_are_kept():
+    with mpmath.workdps(formulas.DIGITS):
+        third = formulas.exact([1.0]) / formulas.exact([3.0])
+        assert abs(third[0] - mpmath.mpf(1) / 3) < mpmath.mpf(10) ** -49
+
+
+def found(value, reference, **more) -> Finding:
+    return judge("x", "corner", "float32", {"x": np.arange(len(value))}, value, reference, 1e-6, **more)
+
+
+def test_judgement():
+    good = found([1.0, 2.0], [1.0, 2.000002])
+    assert good.holds
+    assert good.worst == pytest.approx(1e-6, rel=1e-3)
+    assert good.at == "x 1"
+    wrong = found([1.0, 2.0, 3.0], [1.0, 2.00001, 3.0])
+    assert (wrong.holds, wrong.at) == (False, "x 1")
+    assert "beyond the limit 2.0e-06" in wrong.fault
+
+
+@pytest.mark.parametrize(("value", "fault"), [(math.nan, "NaN"), (math.inf, "NaN"), (-1e-12, "negative")])
+def test_impossible_values_fail_however_small_their_error(value, fault):
+    finding = found([1.0, 1.0, value], [1.0, 1.0, 1e-12], floor=1.0)
+    assert not finding.holds
+    assert finding.at == "x 2"
+    assert f"1 of 3 values are {fault}" in finding.fault
+
+
+def test_normals_may_point_down_and_count_as_vectors():
+    finding = found([[0.0, -1.0, 1e-9]], [[0.0, -1.0, 0.0]], signed=True)
+    assert finding.holds
+    assert finding.worst == pytest.approx(1e-9)
+
+
+def test_the_textbooks_lost_values_are_counted_apart():
+    finding = found([1.0, 1.0], [1.0, 1.0], naive=[math.nan, 1.5])
+    assert (finding.naive, finding.naive_not_finite) == (0.5, 1)
+    assert finding.holds
+
+
+def test_records_hold_the_findings(tmp_path):
+    findings = [
+        found([1.0, 2.0], [1.0, 2.000002], naive=[math.nan, 1.5]),
+        judge("y", "a | b", "float64", {"y": [3.0]}, [-1.0], [1.0], 1e-9),
+    ]
+    path = tmp_path / "stability.json"
+    write_records(path, [Record(method="woven").of("time", 1.0, 1), *to_records(findings)], this_machine(1))
+    again = from_records(read_records([path]))
+    assert again[0] == findings[0]
+    assert [f.fault for f in again] == [f.fault for f in findings]
+    assert again[1].corner == "a | b"
+
+
+def test_no_recipe_bears_the_name_of_a_measurement():
+    assert not set(BENCHES) & set(recipe_names())
+
+
+@pytest.mark.parametrize(("value", "code"), [(1.0, 0), (1.1, 1)])
+def test_the_verb_writes_records_and_fails_if_an_expression_does(monkeypatch, tmp_path, capsys, value, code):
+    monkeypatch.setattr(stability, "stability", lambda progress: [found([value], [1.0])])
+    assert main(["bench", "stability", "--out", str(tmp_path)]) == code
+    shown = capsys.readouterr()
+    assert ("limit" if code else "ok") in shown.out
+    assert ("x in float32, corner: worst error 1.0e-01" in shown.err) == bool(code)
+    assert from_records(read_records([tmp_path / STABILITY]))[0].worst == pytest.approx(value - 1)
