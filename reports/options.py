@@ -1,8 +1,4 @@
-"""What a benchmark measures and how finely; nothing heavy is imported here.
-
-`VERSION` is raised by hand whenever a measurement's numbers change for the same inputs; it enters the fingerprint of
-every benchmark task and every Record.
-"""
+"""What a benchmark measures and how finely; nothing heavy is imported here."""
 
 from __future__ import annotations
 
@@ -14,9 +10,6 @@ from pipeline.models.options import RoundFootprint
 from pipeline.scenes.options import SceneOptions, View, ViewOptions
 from pipeline.truth.options import TruthOptions
 
-VERSION: Final = 3
-"""Version of the measurements' numbers."""
-
 LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
     ("denim", "satin_8", "yarns"),
     ("silk_charmeuse", "wool_gabardine", "yarns"),
@@ -27,14 +20,6 @@ LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
 
 Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
-
-
-SCENE_BENCH_VERSION: Final = 2
-"""Version of what is measured and written on scenes (`reports.measure.scene`), beside `VERSION`;
-their tasks have no number of it before 1."""
-
-EXTREMES_VERSION: Final = 1
-"""Version of the numbers of `reports.measure.extremes`, which have tasks of their own."""
 
 RuntimeName = Literal["eager-bf16", "eager-fp16", "compile", "compile-bf16", "onnx", "onnx-int8"]
 """Ways to run a trained method, `pipeline.models.runtimes` says which."""

@@ -19,9 +19,9 @@ from typing import Final, Literal
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from pipeline import versions
 from pipeline.atomic import atomic_write
 from reports.error import Error
-from reports.options import VERSION
 from weaves.errors import BadInput
 
 PACKAGES: Final = (
@@ -145,8 +145,8 @@ class Provenance(BaseModel):
     """Fingerprint of the data set."""
     model: str = ""
     """Fingerprint of the trained model; empty where nothing is trained."""
-    version: int = VERSION
-    """VERSION of the benchmark stage."""
+    version: int = versions.BENCH
+    """Version of the measurements (`pipeline.versions.BENCH`)."""
 
 
 class Record(BaseModel):

@@ -15,12 +15,11 @@ from jobs.plan.dataset import SECONDS_A_POINT, Shard, fingerprint_of, folder_of,
 from jobs.plan.scenes import scene_tasks
 from jobs.plan.task import Task, identity
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import PHYSICS
-from pipeline.shards.version import VERSION as TRUTH_VERSION
 from pipeline.truth.options import TruthOptions
-from reports.options import EXTREMES_VERSION, LATENT_PAIRS, BenchOptions
-from reports.options import VERSION as BENCH_VERSION
+from reports.options import LATENT_PAIRS, BenchOptions
 from weaves.fabric import Fabric, load_fabric
 
 _TIMED = {"timing_rows", "timing_repeats", "warm_up", "threads"}  # options of the timing alone
@@ -93,7 +92,7 @@ def bench_tasks(recipe: Recipe, parts: Sequence[Shard], trained: Mapping[str, Ma
 def _subject(recipe: Recipe, fabric: Fabric, role: str, parts: Sequence[Shard]) -> Subject:
     """Return a fabric with the tasks of its truth."""
     bench, look = recipe.bench, _look(fabric)
-    common: dict[str, Any] = {"versions": [TRUTH_VERSION, BENCH_VERSION], "fabric": look, "seed": bench.seed}
+    common: dict[str, Any] = {"versions": [versions.TRUTH, versions.BENCH], "fabric": look, "seed": bench.seed}
     view = bench.view.model_dump(mode="json")
 
     def task(kind: str, spec: Mapping[str, Any], pixels: int, truth: TruthOptions) -> Task:
@@ -205,7 +204,7 @@ def _latents_task(recipe: Recipe, model: ModelRecipe, training: Task) -> Task:
     spec = {
         "measure": "latents",
         "presets": {name: load_fabric(name).optics() for name in names},
-        "versions": [TRUTH_VERSION, BENCH_VERSION, options.version],
+        "versions": [versions.TRUTH, versions.BENCH, options.version],
         "options": options.model_dump(mode="json"),
         "models": [training.id],
         "queries": dataset.queries.model_dump(mode="json"),
@@ -243,7 +242,7 @@ def _extremes_tasks(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, 
     needed = [trainings[key] for key in ("", *(fabric.name for fabric, _ in fabrics)) if key in trainings]
     spec = {
         "measure": "extremes",
-        "versions": [TRUTH_VERSION, EXTREMES_VERSION, options.version],
+        "versions": [versions.TRUTH, versions.EXTREMES, options.version],
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in needed],
         "fabrics": [[fabric.name, fabric.optics(), role] for fabric, role in fabrics],
@@ -277,7 +276,7 @@ def _timing_task(
     test = tuple(key for subject in subjects for key in subject.test)
     spec = {
         "measure": "timing",
-        "version": BENCH_VERSION,
+        "version": versions.BENCH,
         "dataset": fingerprint_of(parts),
         "options": bench.model_dump(mode="json", include={"rows", "bounds", "runtimes", "seed", *_TIMED}),
         "models": [[model.options.version, model.options.model_dump(mode="json")] for model in recipe.models],
@@ -324,7 +323,7 @@ def _look(fabric: Fabric) -> dict[str, Any]:
 def _asked(subject: Subject, parts: Sequence[Shard], bench: BenchOptions) -> dict[str, Any]:
     """Return what a measurement of a fabric depends on that measures what `bench` asks."""
     return {
-        "version": BENCH_VERSION,
+        "version": versions.BENCH,
         "dataset": fingerprint_of(parts),
         "bench": bench.model_dump(mode="json", exclude={*_TIMED, "edge", "scenes"}),
         "fabric": _look(subject.fabric),

@@ -17,9 +17,8 @@ from jobs.plan.measurements import bench_tasks
 from jobs.plan.scenes import fabrics_of
 from jobs.plan.task import Task, identity
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
 from pipeline.fingerprint import fingerprint
-from pipeline.training.options import VERSION as TRAINING_VERSION
-from reports.options import VERSION as BENCH_VERSION
 
 
 def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> list[Task]:
@@ -91,7 +90,7 @@ def _report_task(
         "page",
         f"page of {recipe.name}",
         {
-            "version": BENCH_VERSION,
+            "version": versions.BENCH,
             "recipe": recipe.name,
             "about": recipe.about,
             "measured": [task.id for task in benches],
@@ -174,7 +173,7 @@ def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Se
     read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split != "test"]
     needs = tuple(part.task.id for part in read)
     spec: dict[str, Any] = {
-        "versions": [options.version, TRAINING_VERSION],
+        "versions": [options.version, versions.TRAINING],
         "options": options.model_dump(mode="json"),
         "training": training.model_dump(mode="json", exclude={"device", "checkpoint_every"}),
         "fabrics": fabrics,

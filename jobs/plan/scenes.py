@@ -9,13 +9,10 @@ from typing import Any
 from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
 from jobs.plan.task import Task, identity
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
 from pipeline.fingerprint import file_sha256
 from pipeline.scenes.catalogue import load_scene
-from pipeline.scenes.options import VERSION as SCENE_VERSION
 from pipeline.scenes.sources import files, worn
-from pipeline.shards.version import VERSION as TRUTH_VERSION
-from reports.options import SCENE_BENCH_VERSION
-from reports.options import VERSION as BENCH_VERSION
 from weaves.fabric import load_fabric
 
 _LIGHTS = 5.0  # questions a pixel, roughly
@@ -45,7 +42,7 @@ def _frames_task(recipe: Recipe, name: str) -> Task:
     source = [file_sha256(path) for path in files(scene)] or name
     fabrics = worn(scene)
     spec = {
-        "versions": [TRUTH_VERSION, BENCH_VERSION, SCENE_VERSION, SCENE_BENCH_VERSION],
+        "versions": [versions.TRUTH, versions.BENCH, versions.SCENES, versions.SCENE_BENCH],
         "source": source,
         "scene": scene.model_dump(mode="json", exclude={"source"}),
         "fabrics": {key: load_fabric(fabric).model_dump(mode="json") for key, fabric in fabrics.items()},
@@ -70,7 +67,7 @@ def _method_task(recipe: Recipe, name: str, frames: Task, model: ModelRecipe, tr
     """Return the measurements of one setting of a model on a scene."""
     options, bench, scene = model.options, recipe.bench, load_scene(name).name
     spec = {
-        "measure": [BENCH_VERSION, SCENE_BENCH_VERSION, options.version],
+        "measure": [versions.BENCH, versions.SCENE_BENCH, versions.FALLBACK, options.version],
         "frames": frames.id,
         "options": options.model_dump(mode="json"),
         "models": [training.id for training in trainings],
@@ -108,7 +105,7 @@ def _timing_task(
     bench, scene = recipe.bench, load_scene(name).name
     spec = {
         "measure": "time of a frame, cloth by cloth",
-        "version": BENCH_VERSION,
+        "version": [versions.BENCH, versions.FALLBACK],
         "frames": frames.id,
         "options": bench.model_dump(mode="json", include={"timing_repeats", "warm_up"}),
         "scenes": bench.scenes.model_dump(mode="json", include={"seed", "footprint"}),

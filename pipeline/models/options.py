@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline import versions
+
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
 """A name that can stand in a file name and in a task id."""
 
@@ -41,8 +43,6 @@ class Options(BaseModel):
         def name(self) -> str:
             """Name in tables and files."""
 
-    version: ClassVar[int] = 1
-    """Raised by hand when a model's numbers change; part of the fingerprint of what is trained or measured."""
     learns: ClassVar[bool] = True
     """Whether there is anything to train."""
     of_one_material: ClassVar[bool] = False
@@ -54,6 +54,11 @@ class Options(BaseModel):
     default ones."""
     seconds: ClassVar[tuple[float, float]] = (2e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
+
+    @property
+    def version(self) -> int:
+        """Version of the model's numbers (`pipeline.versions`)."""
+        return versions.MODELS.get(self.model, 1)
 
     @property
     def departures(self) -> tuple[str, ...]:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
-
-VERSION: Final = 1
-"""Raised by hand when the shipped scenes, or what is asked about any scene, change."""
 
 View = Literal["sphere", "plane"]
 """The views of one fabric: cloth on a sphere, and on a plane running to the horizon."""

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from pipeline import versions
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.version import VERSION
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
@@ -79,7 +79,13 @@ class BtfTask(BaseModel):
     def identity(self) -> dict[str, Any]:
         """Return what the numbers depend on, colours and versions included, sources left out."""
         specification = self.model_dump(mode="json", exclude={"fabric"})
-        return {"kind": "btf", "version": VERSION, "name": self.fabric.name, **_look(self.fabric), **specification}
+        return {
+            "kind": "btf",
+            "version": versions.TRUTH,
+            "name": self.fabric.name,
+            **_look(self.fabric),
+            **specification,
+        }
 
 
 def generate_btf(task: BtfTask, path: Path, progress: Callable[[float], None] = lambda fraction: None) -> None:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipeline import versions
 from pipeline.atomic import atomic_path
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.questions import (
@@ -37,7 +38,6 @@ from pipeline.shards.questions import (
     refuse_bad,
 )
 from pipeline.shards.schema import SCHEMA_VERSION
-from pipeline.shards.version import VERSION
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries, faults
@@ -270,7 +270,7 @@ def _about(
     fabric: Fabric, path: Path, schema: pa.Schema, options: TruthOptions, seed: int, other: Answerer | None
 ) -> dict[str, Any]:
     """Return what makes a result understood when it is read alone."""
-    truth = {"version": VERSION, "truth": options.model_dump(mode="json"), "seed": seed}
+    truth = {"version": versions.TRUTH, "truth": options.model_dump(mode="json"), "seed": seed}
     return {
         "schema_version": SCHEMA_VERSION,
         "fabric": fabric.model_dump(mode="json"),

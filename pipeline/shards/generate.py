@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline import versions
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
@@ -39,10 +40,8 @@ class ShardTask(BaseModel):
 
     def identity(self) -> dict[str, Any]:
         """Return what the numbers depend on, without names, sources and colours; versions included."""
-        from pipeline.shards.version import VERSION
-
         specification = self.model_dump(mode="json", exclude={"fabric"})
-        return {"version": VERSION, "optics": self.fabric.optics(), "name": self.fabric.name, **specification}
+        return {"version": versions.TRUTH, "optics": self.fabric.optics(), "name": self.fabric.name, **specification}
 
 
 def generate_shard(task: ShardTask, path: Path, progress: Callable[[float], None] = lambda fraction: None) -> None:

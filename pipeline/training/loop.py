@@ -20,6 +20,7 @@ import safetensors.torch
 import torch
 from torch import nn
 
+from pipeline import versions
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
 from pipeline.models.catalogue import ModelOptions
@@ -28,7 +29,7 @@ from pipeline.models.registry import CARD, WEIGHTS, module_of
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows
-from pipeline.training.options import VERSION, TrainingOptions
+from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut
 from weaves.errors import BadInput, nearest
 
@@ -187,7 +188,7 @@ def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: 
         "model": options.model,
         "name": options.name,
         "domain": Domain.of(manifest.about, members).model_dump(mode="json"),
-        "version": {"model": options.version, "training": VERSION},
+        "version": {"model": options.version, "training": versions.TRAINING},
         "options": options.model_dump(mode="json"),
         "training": training.model_dump(mode="json", exclude={"device", "checkpoint_every"}),
         "dataset": {"name": manifest.name, "fingerprint": manifest.fingerprint},

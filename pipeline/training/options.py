@@ -52,7 +52,3 @@ class TrainingOptions(BaseModel):
     """Looks at held-out queries along the curve."""
     validation_rows: int = Field(default=16_384, ge=1)
     """Most held-out queries used for the figures on the model card."""
-
-
-VERSION = 2
-"""Raised by hand when the loop's numbers change; part of the fingerprint of every trained model."""

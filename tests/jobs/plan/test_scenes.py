@@ -1,15 +1,35 @@
 """The tasks on scenes: what is made anew when what is measured on them changes."""
 
-from jobs.plan import scenes
+import pytest
+
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
+from pipeline import versions
+
+
+def changed_by(version, path, monkeypatch):
+    """Return the titles of the tasks whose identity changes when a version is raised."""
+    before = plan(load_recipe(path))
+    monkeypatch.setattr(versions, version, getattr(versions, version) + 1)
+    after = plan(load_recipe(path))
+    return [one.title for one, two in zip(before, after, strict=True) if one.id != two.id]
 
 
 def test_what_is_measured_on_scenes_has_a_version_of_its_own(files, monkeypatch):
     path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
-    before = plan(load_recipe(path))
-    monkeypatch.setattr(scenes, "SCENE_BENCH_VERSION", scenes.SCENE_BENCH_VERSION + 1)
-    after = plan(load_recipe(path))
-    changed = [one.title for one, two in zip(before, after, strict=True) if one.id != two.id]
+    changed = changed_by("SCENE_BENCH", path, monkeypatch)
     assert "truth of the scene sphere" in changed and "point_sampled k = 1 on the scene sphere" in changed
     assert all("scene" in title or "frame of sphere" in title or title.startswith("page") for title in changed)
+
+
+def test_answers_of_the_fallback_have_a_version_of_their_own(files, monkeypatch):
+    path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
+    changed = changed_by("FALLBACK", path, monkeypatch)
+    assert "point_sampled k = 1 on the scene sphere" in changed and "time of a frame of sphere" in changed
+    assert "truth of the scene sphere" not in changed
+
+
+@pytest.mark.parametrize("version", [name for name in vars(versions) if name.isupper() and name != "MODELS"])
+def test_every_version_changes_some_identity(files, monkeypatch, version):
+    path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
+    assert changed_by(version, path, monkeypatch)

@@ -1,0 +1,33 @@
+"""Versions of all numbers. Whoever changes numbers for the same input raises the version that covers them.
+
+Versions are part of the identity of every task whose result depends on them; the git revision is not. They stand apart
+from the code that they cover so that a plan needs no compiler.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+TRUTH: Final = 3
+"""Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
+
+TRAINING: Final = 2
+"""The training loop."""
+
+MODELS: Final[dict[str, int]] = {}
+"""A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
+
+FALLBACK: Final = 1
+"""Answers to queries outside a method's domain (`pipeline.models.fallback`, `fallback_table`)."""
+
+SCENES: Final = 1
+"""The shipped scenes, and the queries of any scene."""
+
+BENCH: Final = 3
+"""Measurements of methods and of the truth; also written into every Record."""
+
+SCENE_BENCH: Final = 2
+"""Measurements in scenes and the files they write (`reports.measure.scene`)."""
+
+EXTREMES: Final = 1
+"""Measurements at extremes (`reports.measure.extremes`)."""
