@@ -9,6 +9,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from weaves.renamed import replacement
+
 
 class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
     """Input that cannot be used; exit code 2.
@@ -43,15 +45,27 @@ class WorkFailed(RuntimeError):  # noqa: N818 - the name reads as the sentence d
     exit_code = 1
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Say which known word was probably meant.
+def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
+    """Return the known name that was probably meant, as the end of a sentence.
+
+    Parameters
+    ----------
+    word : str
+        What was found.
+    known : iterable of str
+        What would have been accepted.
+    kind : str
+        Kind of the name in `weaves.renamed`; empty if names of this kind never changed.
 
     Returns
     -------
     str
-        ``"did you mean 'x'? known: a, b, x"``, without the question when nothing is near.
+        ``"did you mean 'x'? known: a, b, x"``, without the question when nothing is near; for a name of an earlier
+        version ``"'old' is now 'x'"``.
     """
     names = sorted(known)
+    if new := replacement(kind, word):
+        return new
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     question = f"did you mean {close[0]!r}? " if close else ""
     return f"{question}known: {', '.join(names)}"

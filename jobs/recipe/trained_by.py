@@ -88,7 +88,7 @@ def _taken(
     name = entry.get("name", entry.get("model"))
     if not isinstance(name, str) or name not in known:
         called = "name" if "name" in entry else "model"
-        allowed = f"must be a model of the recipe {teacher.name}; {nearest_name(str(name), list(known))}"
+        allowed = f"must be a model of the recipe {teacher.name}; {nearest_name(str(name), list(known), 'model')}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
     model, options = known[name], known[name].options
     if entry.get("model", options.model) != options.model:

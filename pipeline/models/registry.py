@@ -1,7 +1,7 @@
-"""The models by name: each is the file of that name, imported when it is asked for.
+"""Models by name and from folders; a model's file is imported when it is needed.
 
-A model's file offers ``restore(options, trained) -> list of Method`` and, if it learns, ``build(options, fabrics) ->
-Network``, where `trained` pairs each model card with its weights.
+The file ``pipeline/models/NAME/model.py`` offers ``restore(options, trained) -> list of Method`` and, if it learns,
+``build(options, fabrics) -> Network``, where `trained` pairs each model card with its weights.
 """
 
 from __future__ import annotations
@@ -14,13 +14,21 @@ from types import ModuleType
 from typing import Any
 
 import safetensors.torch
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel
 from safetensors import SafetensorError
 from torch import Tensor
 
 from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.method import Method
 from weaves.errors import BadInput, nearest
+from weaves.validation import validated
+
+
+class _Card(BaseModel):
+    """The part of a model card that names the model."""
+
+    options: ModelOptions
+
 
 WEIGHTS, CARD = "model.safetensors", "card.json"
 
@@ -28,7 +36,7 @@ WEIGHTS, CARD = "model.safetensors", "card.json"
 def module_of(model: str) -> ModuleType:
     """Import the file of a model; BadInput, with the nearest name, if there is none."""
     if model not in CLASSES:
-        raise BadInput("models", "model", model, nearest(model, CLASSES))
+        raise BadInput("models", "model", model, nearest(model, CLASSES, "model"))
     return import_module(f"pipeline.models.{model}.model")
 
 
@@ -78,11 +86,7 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
 def load_model(folder: Path) -> list[Method]:
     """Return the methods of one trained folder, options read from its card."""
     card = _read_card(folder)
-    try:
-        options: Any = TypeAdapter(ModelOptions).validate_python(card.get("options"))
-    except ValidationError as error:
-        raise BadInput(str(folder / CARD), "options", card.get("options"), "not the options of a model") from error
-    return load_methods(options, [folder])
+    return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])
 
 
 def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:
