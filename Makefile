@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/installed
 
-.PHONY: report run list plan generate check train bench status savings test test-slow lint clean
+.PHONY: report run list plan generate check train bench status savings readme results test test-slow lint clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -27,6 +27,15 @@ savings: $(READY)
 	@$(BIN)/twillight run out/recipes/require-table.toml
 	@$(BIN)/twillight run out/recipes/require-roll.toml
 	@$(BIN)/twillight savings $(RECIPE) sphere table roll
+
+# The table of README.md, from the page that `make report` writes.
+readme: $(READY)
+	@$(BIN)/twillight results quick --readme README.md
+
+# reports/RESULTS.md, from the page of `standard`: `make report RECIPE=standard` first.
+results: RECIPE = standard
+results: $(READY)
+	@$(BIN)/twillight results $(RECIPE) --file reports/RESULTS.md
 
 test: lint
 	$(BIN)/python -m pytest -m "not slow"

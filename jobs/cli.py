@@ -285,6 +285,20 @@ def savings(
     saved(scenes, out, recipe)
 
 
+@app.command(sort_key=15)
+def results(
+    recipe: RecipeName,
+    *,
+    file: Annotated[Path | None, Parameter(help="Markdown file to write; results.md beside the page.")] = None,
+    readme: Annotated[Path | None, Parameter(help="Markdown file whose generated table is written anew.")] = None,
+    out: Out = OUT,
+) -> None:
+    """Write the tables of a recipe's page as Markdown."""
+    from jobs.verbs.results import results as written
+
+    written(recipe, out, file, readme)
+
+
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     tokens = sys.argv[1:] if tokens is None else tokens

@@ -1,0 +1,44 @@
+"""Numbers of a page as Markdown: the table of README.md, and reports/RESULTS.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from jobs.recipe.load import load_recipe
+from jobs.verbs.compare import records_file
+from pipeline.atomic import atomic_write
+from weaves.errors import BadInput
+
+
+def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> None:
+    """Write all tables of a recipe's page to `file`, or six rows of them into the block of `readme`.
+
+    Raises
+    ------
+    BadInput
+        If the recipe has no page in `out`, its Records lack what is needed, or `readme` has no such block.
+    """
+    from reports.record import read_machine, read_records
+    from reports.tables.markdown import block, with_block
+    from reports.tables.readme import BLOCK, readme_block
+    from reports.tables.results import results_page
+
+    name = load_recipe(recipe).name
+    source = records_file(out, name)
+    records, machine = read_records([source]), read_machine(source)
+    if readme is not None:
+        if not readme.is_file():
+            raise BadInput(str(readme), "", "does not exist", "a Markdown file with a generated block is needed")
+        text = readme.read_text(encoding="utf-8")
+        old = block(text, BLOCK, str(readme))
+        fresh = with_block(text, BLOCK, readme_block(records, machine, old, str(source)), str(readme))
+        said = "unchanged" if fresh == text else "written"
+        if fresh != text:
+            atomic_write(readme, fresh.encode())
+        Console().print(f"{readme}: table of {name} {said}", soft_wrap=True, highlight=False)
+    if readme is None or file is not None:
+        file = file or source.with_name("results.md")
+        atomic_write(file, results_page(records, machine, str(source)).encode())
+        Console().print(f"{file}: written", soft_wrap=True, highlight=False)

@@ -1,0 +1,197 @@
+"""Every table of a recipe's page as one Markdown file: reports/RESULTS.md, from the Records of the page alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import pandas as pd
+
+from reports.record import TRUTH, Machine, Record
+from reports.tables import cells, scene_cells, summary, truth_cells
+from reports.tables.equal_time import equal_time_table, size_table
+from reports.tables.markdown import markdown_table
+from reports.tables.numbers import (
+    NONE,
+    display,
+    interval,
+    missing,
+    percent,
+    plain,
+    scientific,
+    significant,
+    size,
+    times,
+)
+from reports.tables.readme import three_decimals
+from reports.tables.wording import equal_time_sentences, headline
+from reports.truth import accuracy, bias, effort, sampling
+from weaves.errors import BadInput
+
+
+def results_page(records: Sequence[Record], machine: Machine, where: str) -> str:
+    """Return the whole file.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Of one page.
+    machine : Machine
+        Where its times were taken.
+    where : str
+        File of the Records, for the error.
+
+    Raises
+    ------
+    BadInput
+        If no Record names its recipe.
+    """
+    named = [record.provenance for record in records if record.provenance.recipe]
+    if not named:
+        raise BadInput(where, "", "names no recipe", "Records of a whole page are needed")
+    packages = ", ".join(f"{name} {found}" for name, found in machine.packages.items())
+    head = [
+        f"Recipe `{named[0].recipe}`, fingerprint `{named[0].recipe_fingerprint[:16]}`",
+        f"Twillight {version('twillight')}, benchmark version {named[0].version}",
+        f"Machine: {machine.cpu}, {machine.cores} cores, {machine.system}",
+        f"Python {machine.python}, {packages}",
+        f"Measured on {machine.date[:10]}",
+    ]
+    about = (
+        f"Written by `make results RECIPE={named[0].recipe}` from the Records of the page; do not edit. The page "
+        "defines every column and shows the pictures. What was tried and not kept is in [LOG.md](LOG.md)."
+    )
+    meta = "\n".join(f"- {line}" for line in head)
+    parts = [f"# Results of the recipe `{named[0].recipe}`", about, meta, *_of_methods(records), *_of_scenes(records)]
+    return "\n\n".join([*parts, *_of_the_truth(records)]) + "\n"
+
+
+def _of_methods(records: Sequence[Record]) -> Iterator[str]:
+    """Yield the sections on held-out queries: error, aliasing, time, energy, equal time."""
+    errors, timing = summary.error_table(records), summary.timing_table(records)
+    if len(errors):
+        yield "## Error on held-out queries"
+        yield (
+            "MSE: mean squared error in the colours of each fabric, mean over fabrics, noise of the truth subtracted. "
+            "× lower: MSE of two random points over that of the method, with its 95 % interval. Colour: relative RMSE "
+            "of one colour for all fabrics."
+        )
+        for role in dict.fromkeys(errors["role"]):
+            part = errors[errors["role"] == role]
+            count = f"{part['fabrics'].max()} fabrics" if part["fabrics"].max() > 1 else "one fabric"
+            yield f"### {str(role).capitalize()}: {count}, {part['queries'].max():,} queries"
+            lines = [(_name(row), *_error_cells(row)) for row in summary.rows(part)]
+            yield markdown_table(("method", "MSE", "× lower", "95 %", "colour"), lines)
+        said = [headline(*key, errors, timing, paper=key[0] == "woven") for key in _methods(errors)]
+        yield "\n".join(f"- {sentence}" for sentence in said if sentence)
+    aliasing = summary.aliasing_table(records)
+    if len(aliasing):
+        yield "## Aliasing on a receding plane"
+        yield (
+            "Flicker: variance over time beyond that of the truth, over its squared mean. Excess energy: power above "
+            "half the Nyquist frequency beyond that of the truth, over its squared mean."
+        )
+        lines = [
+            (_name(row), row.role, three_decimals(row.flicker), three_decimals(row.excess_energy))
+            for row in summary.rows(aliasing)
+        ]
+        yield markdown_table(("method", "fabrics", "flicker", "excess energy"), lines)
+    if len(timing):
+        yield "## Time and memory"
+        yield "Median time of one query on one thread, with its quartiles; × time: over that of two random points."
+        lines = [(_name(row), *_time_cells(row)) for row in summary.rows(timing)]
+        yield markdown_table(("method", "ns a query", "quartiles", "× time", "bytes stored"), lines)
+    energy = cells.energy_rows(summary.energy_table(records), errors, timing)
+    if energy:
+        yield "## Energy: largest directional albedo over all fabrics"
+        yield _grouped(cells.ENERGY, energy)
+    yield from _at_equal_time(records)
+
+
+def _at_equal_time(records: Sequence[Record]) -> Iterator[str]:
+    """Yield the section that compares methods with rivals that have a parameter, at the same time."""
+    table = equal_time_table(size_table(records))
+    if table.empty:
+        return
+    yield "## At equal time"
+    yield (
+        "A method with one setting beside a method with a parameter, at the time of the former, by the size of the "
+        "footprint in yarn spacings: error of the method · error of the rival over it. Below 1× the rival errs less."
+    )
+    yield "\n".join(f"- {sentence}" for sentence in equal_time_sentences(table))
+    for measure, found in cells.equal_time_rows(table).items():
+        yield f"### {measure.capitalize()}"
+        lines = [(row["label"], row["rival"], *(cell["text"] for cell in row["cells"])) for row in found["rows"]]
+        yield markdown_table(("method", "rival", *found["sizes"]), lines)
+
+
+def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
+    """Yield one table a scene."""
+    table = summary.scene_table(records)
+    if table.empty:
+        return
+    columns = [column.title for column in scene_cells.scene_columns(table)]
+    yield "## Scenes"
+    yield "The last row is what the noise of the truth alone scores."
+    for scene, found in scene_cells.scene_rows(table).items():
+        yield f"### {plain(scene).capitalize()}"
+        lines = [(row["label"], *_texts(row["cells"])) for group in found["groups"] for row in group["rows"]]
+        yield markdown_table(("method", *columns), [*lines, ("noise of the truth", *found["noise"])])
+
+
+def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
+    """Yield what `bench truth` and `bench sampler` measured, if they were run."""
+    rates, accuracies = truth_cells.rate_rows(records), accuracy.from_records(records)
+    biases, efforts, samplers = bias.from_records(records), effort.from_records(records), sampling.from_records(records)
+    if rates or accuracies or biases or efforts:
+        yield "## The ground truth (`twillight bench truth`)"
+    if rates:
+        yield "### Speed"
+        yield markdown_table(("what", "fabric", "rate", "note"), rates)
+    for fabric, lines in truth_cells.accuracy_rows(accuracies).items():
+        yield f"### Accuracy on {plain(fabric)}"
+        yield markdown_table(("estimator", *truth_cells.ACCURACY), lines)
+    if biases:
+        yield "### Bias of tabulated answers: mean of each component against sampling"
+        yield markdown_table(("fabric", *truth_cells.BIAS), truth_cells.bias_rows(biases))
+    if efforts:
+        yield "### Where the time of `auto` goes"
+        yield markdown_table(("fabric", *truth_cells.EFFORT), truth_cells.effort_rows(efforts))
+    if samplers:
+        yield "## Sampling directions (`twillight bench sampler`)"
+        yield "How many times less variance than a cosine has, and the time of one direction."
+        yield markdown_table(("fabric", *truth_cells.SAMPLERS), truth_cells.sampler_rows(samplers))
+
+
+def _methods(errors: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return every method without a setting: neither a number of points nor another way to run a network."""
+    keys = list(dict.fromkeys(zip(errors["method"], errors["setting"], strict=True)))
+    return [key for key in keys if not key[1]]
+
+
+def _name(row: Any) -> str:
+    return "the truth" if row.method == TRUTH else display(row.method, row.setting)
+
+
+def _error_cells(row: Any) -> tuple[str, ...]:
+    if (row.method, row.setting) == summary.BASELINE:
+        return scientific(row.mse), "1", NONE, percent(row.colour_rrmse)
+    return scientific(row.mse), times(row.ratio), interval(row.ratio_low, row.ratio_high), percent(row.colour_rrmse)
+
+
+def _time_cells(row: Any) -> tuple[str, ...]:
+    quartiles = f"{row.first_quartile_ns:,.0f} … {row.third_quartile_ns:,.0f}"
+    stored = NONE if row.method == TRUTH or missing(row.bytes_stored) else size(row.bytes_stored)
+    return significant(row.median_ns), quartiles, times(row.time_ratio), stored
+
+
+def _grouped(columns: Sequence[str], groups: Sequence[Any]) -> str:
+    """Return a table from the page's groups of rows."""
+    lines = [(row["label"], *_texts(row["cells"])) for group in groups for row in group["rows"]]
+    return markdown_table(("method", *columns), lines)
+
+
+def _texts(found: Sequence[Any]) -> list[str]:
+    """Return cells as text: on the page some are marked."""
+    return [cell if isinstance(cell, str) else str(cell["text"]) for cell in found]

@@ -1,0 +1,33 @@
+import pytest
+
+from reports.record import Machine, Provenance, Record
+from reports.tables.results import results_page
+from weaves.errors import BadInput
+
+MACHINE = Machine(
+    cpu="Test CPU", cores=2, threads=2, system="Linux", python="3.11", packages={"numpy": "2.0"}, date="2026-01-01T12"
+)
+
+
+def test_the_file_says_where_its_numbers_come_from(made_up):
+    named = Provenance(recipe="standard", recipe_fingerprint="0123456789abcdef" * 4)
+    rate = Record(method="truth").of("rate", 4.5e8, 1, unit="points/s").model_copy(update={"setting": "everything"})
+    page = results_page([r.model_copy(update={"provenance": named}) for r in [*made_up, rate]], MACHINE, "file")
+    head = page.partition("## ")[0]
+    for said in ("`standard`", "`0123456789abcdef`", "Test CPU, 2 cores", "numpy 2.0", "Measured on 2026-01-01"):
+        assert said in head
+    assert "| points, k = 16 | 9.38e−5 | 8× |" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "| everything | – | 4.5e+08 points/s |  |" in page
+    assert "## Scenes" not in page, "what was not measured has no section"
+
+
+def test_every_line_of_a_table_has_as_many_cells(made_up):
+    named = Provenance(recipe="standard")
+    page = results_page([r.model_copy(update={"provenance": named}) for r in made_up], MACHINE, "file")
+    for table in page.split("\n\n"):
+        assert len({line.count("|") for line in table.splitlines() if line.startswith("|")}) <= 1, table
+
+
+def test_records_of_no_recipe_are_refused(made_up):
+    with pytest.raises(BadInput, match="names no recipe"):
+        results_page(made_up, MACHINE, "file")
