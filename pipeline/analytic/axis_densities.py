@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import inlined_fast_kernel
 from pipeline.compiled.float32 import remaining
-from pipeline.truth.node_table.build import Single
 
 NARROW: Final = 0.25
 """Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""

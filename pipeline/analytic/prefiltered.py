@@ -21,9 +21,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import kernel
 from pipeline.compiled.float32 import absorbed
-from pipeline.truth.node_table.build import Single
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.surface import surface_at

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from pipeline.analytic.gauss_rules import Double
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
-from pipeline.truth.node_table.build import Single
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _RAMP, _RAMP_SLOPE = (

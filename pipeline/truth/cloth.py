@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.truth.footprint.place import BOX, GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField, height_field
 from pipeline.truth.options import TruthOptions, Variation
@@ -21,7 +22,7 @@ AREA: Final = 5
 SUMS: Final = 6
 """Columns of every array of sums."""
 
-Raw = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]
+Raw = tuple[Float64, Float64, Index]
 """Means and standard errors (N, 5) of the components and the transparency, and points used (N,)."""
 
 FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
@@ -55,16 +56,16 @@ class Model(NamedTuple):
 class Columns(NamedTuple):
     """N queries in float64 with unit directions, the viewer in front; the fields of `Queries`."""
 
-    u: npt.NDArray[np.float64]
-    v: npt.NDArray[np.float64]
-    sigma: npt.NDArray[np.float64]
-    wi: npt.NDArray[np.float64]
-    wo: npt.NDArray[np.float64]
-    sigma_minor: npt.NDArray[np.float64]
-    angle: npt.NDArray[np.float64]
-    curvature: npt.NDArray[np.float64]
+    u: Float64
+    v: Float64
+    sigma: Float64
+    wi: Float64
+    wo: Float64
+    sigma_minor: Float64
+    angle: Float64
+    curvature: Float64
 
-    def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_]) -> Columns:
+    def take(self, index: npt.NDArray[np.integer] | Mask) -> Columns:
         """Return the queries at `index`."""
         return Columns(*(np.ascontiguousarray(column[index]) for column in self))
 

@@ -12,8 +12,8 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Index
 from pipeline.truth import monte_carlo
 from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
 from pipeline.truth.node_table.cascade import auto_rows, elliptic_rows, table_rows
@@ -23,9 +23,7 @@ from pipeline.truth.query import Answers, Queries, validate
 from weaves.fabric import Fabric
 
 
-def _sampled(
-    method: int, model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
-) -> Raw:
+def _sampled(method: int, model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     return monte_carlo.sample_rows(
         model,
         columns,
@@ -39,7 +37,7 @@ def _sampled(
     )
 
 
-Estimator = Callable[[Model, Columns, npt.NDArray[np.int64], TruthOptions, int], Raw]
+Estimator = Callable[[Model, Columns, Index, TruthOptions, int], Raw]
 
 ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "mc": partial(_sampled, monte_carlo.INDEPENDENT),

@@ -12,8 +12,8 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, Columns, Model
 from pipeline.truth.footprint.place import place_pair
@@ -49,9 +49,7 @@ def place_point(columns: Columns, row: int, model: Model, first: float, second: 
 
 
 @inlined_kernel
-def add_point(
-    model: Model, x: float, y: float, weight: float, query: Scene, sums: npt.NDArray[np.float64], r: int
-) -> None:
+def add_point(model: Model, x: float, y: float, weight: float, query: Scene, sums: Float64, r: int) -> None:
     """Add the weighted share of a point to row r of the sums, (rows, SUMS)."""
     family, area, specular, diffuse, through = point_share(model.front, model.back, x, y, query, model.choices)
     if family != GAP:
@@ -69,7 +67,7 @@ def query_scene(columns: Columns, row: int) -> Scene:
 
 
 @kernel
-def ratios(sums: npt.NDArray[np.float64], mean: npt.NDArray[np.float64], error: npt.NDArray[np.float64]) -> int:
+def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
     """Write the ratios and their standard errors from the replicates' sums, (REPLICATES, SUMS); count who saw any."""
     area, seen = 0.0, 0
     for r in range(REPLICATES):
@@ -97,14 +95,14 @@ def ratios(sums: npt.NDArray[np.float64], mean: npt.NDArray[np.float64], error: 
 def sample_rows(
     model: Model,
     columns: Columns,
-    index: npt.NDArray[np.int64],
+    index: Index,
     method: int,
     relative_error: float,
     absolute_error: float,
     min_count: int,
     max_count: int,
     seed: np.uint64,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+) -> tuple[Float64, Float64, Index]:
     """Answer every row: means and standard errors (N, 5), and points used.
 
     Parameters

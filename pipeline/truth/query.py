@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Mask
 from weaves.errors import BadInput
 
 _UNIT_TOLERANCE = 1e-4
@@ -36,34 +37,34 @@ class Queries(NamedTuple):
         of the cylinder that the cloth is wrapped around.
     """
 
-    u: npt.NDArray[np.float32]
-    v: npt.NDArray[np.float32]
-    sigma: npt.NDArray[np.float32]
-    wi: npt.NDArray[np.float32]
-    wo: npt.NDArray[np.float32]
-    sigma_minor: npt.NDArray[np.float32]
-    angle: npt.NDArray[np.float32]
-    curvature: npt.NDArray[np.float32]
+    u: Float32
+    v: Float32
+    sigma: Float32
+    wi: Float32
+    wo: Float32
+    sigma_minor: Float32
+    angle: Float32
+    curvature: Float32
 
     @classmethod
     def round(
         cls,
-        u: npt.NDArray[np.float32],
-        v: npt.NDArray[np.float32],
-        sigma: npt.NDArray[np.float32],
-        wi: npt.NDArray[np.float32],
-        wo: npt.NDArray[np.float32],
+        u: Float32,
+        v: Float32,
+        sigma: Float32,
+        wi: Float32,
+        wo: Float32,
     ) -> Queries:
         """Return queries about round footprints of a flat cloth."""
         flat = np.zeros_like(sigma)
         return cls(u, v, sigma, wi, wo, sigma, flat, flat)
 
     @property
-    def behind(self) -> npt.NDArray[np.bool_]:
+    def behind(self) -> Mask:
         """Which queries have light or viewer behind the cloth, (N,)."""
         return np.asarray((self.wi[:, 2] < 0.0) | (self.wo[:, 2] < 0.0))
 
-    def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Queries:
+    def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
         """Return the queries at `index`."""
         return Queries(*(column[index] for column in self))
 
@@ -81,20 +82,18 @@ class Answers(NamedTuple):
         Share of light from straight behind that reaches the viewer unscattered, through gaps and yarns.
     """
 
-    mean: npt.NDArray[np.float32]
-    standard_error: npt.NDArray[np.float32]
+    mean: Float32
+    standard_error: Float32
     count: npt.NDArray[np.int32]  # type: ignore[assignment]  # the field's word, though tuples have a count too
-    transparency: npt.NDArray[np.float32]
-    transparency_standard_error: npt.NDArray[np.float32]
+    transparency: Float32
+    transparency_standard_error: Float32
 
     @classmethod
-    def opaque(
-        cls, mean: npt.NDArray[np.float32], standard_error: npt.NDArray[np.float32], count: npt.NDArray[np.int32]
-    ) -> Answers:
+    def opaque(cls, mean: Float32, standard_error: Float32, count: npt.NDArray[np.int32]) -> Answers:
         """Return answers of a cloth that lets nothing straight through."""
         return cls(mean, standard_error, count, np.zeros(len(mean), np.float32), np.zeros(len(mean), np.float32))
 
-    def take(self, index: npt.NDArray[np.integer] | npt.NDArray[np.bool_] | slice) -> Answers:
+    def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Answers:
         """Return the answers at `index`."""
         return Answers(*(column[index] for column in self))  # type: ignore[arg-type]
 
@@ -110,7 +109,7 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
     """Return what is wrong with the queries that have no answer: row -> (column, value, what is allowed)."""
     found: dict[int, tuple[str, object, str]] = {}
 
-    def note(rows: Any, name: str, column: npt.NDArray[np.float32], allowed: str) -> None:
+    def note(rows: Any, name: str, column: Float32, allowed: str) -> None:
         for row in np.flatnonzero(rows).tolist():
             found.setdefault(row, (name, column[row].tolist(), allowed))
 

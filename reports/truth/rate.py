@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import Columns, Model
 from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
 from pipeline.truth.node_table.answer import bounded_slope
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, Single, Table
+from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, Table
 from pipeline.truth.node_table.kernels import reflected, weigh
 
 OPERATIONS = {"specular": (74, 2, 1), "everything": (112, 2, 1)}
@@ -68,7 +69,7 @@ def evaluate_points(model: Model, table: Table, columns: Columns, visibility: bo
 
 
 @fast_kernel
-def multiply_adds(values: Single, rounds: int) -> np.float32:
+def multiply_adds(values: Float32, rounds: int) -> np.float32:
     """Run chains of multiply-adds over an array: what arithmetic alone can do on this core."""
     total = np.float32(0.0)
     for _ in range(rounds):

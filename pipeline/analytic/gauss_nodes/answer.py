@@ -52,12 +52,12 @@ from pipeline.analytic.horizon_points.shading import (
     shade_all,
 )  # fmt: skip
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import model_of
 from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
 from pipeline.truth.footprint.place import EVENLY
 from pipeline.truth.geometry.azimuths import azimuth_rows
-from pipeline.truth.node_table.build import Single
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import HIDDEN_SHARE, Queries
 from weaves.fabric import Fabric

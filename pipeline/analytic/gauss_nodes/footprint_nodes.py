@@ -10,10 +10,10 @@ import numpy as np
 from pipeline.analytic.gauss_nodes.nodes import GaussNodes
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
 from pipeline.analytic.horizon_points.shading import STEP_V, STEP_Y, WEIGHT, X, Y
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import GAP, WARP, WEFT
-from pipeline.truth.node_table.build import Single
 
 REACH: Final = 3.0
 """Standard deviations at which a footprint is cut."""

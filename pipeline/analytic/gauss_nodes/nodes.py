@@ -25,9 +25,11 @@ from pipeline.analytic.horizon_points.shading import (
     Y,
 )  # fmt: skip
 from pipeline.analytic.soft_horizons import over_boxes
+from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Index
 from pipeline.truth.geometry.heightfield import GAP, WEFT, HeightField
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
-from pipeline.truth.node_table.build import Index, Single, orbits
+from pipeline.truth.geometry.symmetry import orbits
 
 _LEAST: Final = 0.02  # least deviation of a horizon, in sines: what a map of nearest nodes does not know
 
@@ -71,7 +73,7 @@ class GaussNodes(NamedTuple):
 def gauss_nodes(field: HeightField, table: HorizonMap, across: int, along: int) -> GaussNodes:
     """Place `across` x `along` nodes on every piece of every different cell."""
     picks, ends = field.top.shape
-    found = [(orbit, piece) for orbit in orbits(field.top) for piece in cell_pieces(field, *orbit[0])]
+    found = [(orbit, piece) for orbit in orbits(field) for piece in cell_pieces(field, *orbit[0])]
     axes = [_axes(piece, across, along) for _, piece in found]
     rules = list({id(rule): rule for pair in axes for rule in pair}.values())
     number = {id(rule): index for index, rule in enumerate(rules)}

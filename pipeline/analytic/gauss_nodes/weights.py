@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.gauss_nodes.nodes import COPIES, COPY, COUNT_X, COUNT_Y, FIRST, RULE_X, RULE_Y
+from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Index
 from pipeline.compiled.decorators import fast_kernel
-from pipeline.truth.node_table.build import Index, Single
 
 
 @fast_kernel

@@ -15,12 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import grid_middles
+from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float64 as Double
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import GAP, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
-from pipeline.truth.node_table.build import Double, Single, orbits
+from pipeline.truth.geometry.symmetry import orbits
 
 SLOTS: Final = 4
 """Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
@@ -85,7 +87,7 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     ys: list[Double] = []
     gaps: list[bool] = []
     size = azimuths * grid * grid
-    for orbit in orbits(field.top):
+    for orbit in orbits(field):
         pick, end = orbit[0]
         # One horizon will do for all gaps of a cell: the first one's, so that it comes last here.
         for slot, piece in {slot_of(piece): piece for piece in reversed(cell_pieces(field, pick, end))}.items():

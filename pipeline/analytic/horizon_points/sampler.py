@@ -34,12 +34,12 @@ from pipeline.analytic.horizon_points.shading import (
     query_rows,
     shade_all,
 )  # fmt: skip
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import model_of
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.footprint.place import EVENLY
 from pipeline.truth.footprint.sequences import derive
-from pipeline.truth.node_table.build import Single
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric

@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
 from pipeline.analytic.soft_horizons import above, ramp
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.compiled.float32 import absorbed
 from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
-from pipeline.truth.node_table.build import Single
 
 LANES: Final = 2048
 """Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""

@@ -27,10 +27,10 @@ from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, LANES, X_HIGH, X_L
 from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_gaps, shade_placed
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_axis
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
-from pipeline.truth.node_table.build import Single
 
 LONG: Final = 0.75
 """Largest deviation along the wider axis for which a footprint narrow along the other places its own nodes: these are

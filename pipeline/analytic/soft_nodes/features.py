@@ -40,10 +40,10 @@ from pipeline.analytic.soft_nodes.shade import (
     SPECULAR,
     SPECULAR_DOUBT,
 )
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
-from pipeline.truth.node_table.build import Single
 from pipeline.truth.query import Queries
 
 FEATURES: Final = 40

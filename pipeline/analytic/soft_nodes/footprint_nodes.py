@@ -15,10 +15,10 @@ import numpy.typing as npt
 from pipeline.analytic.soft_horizons import above, ramp
 from pipeline.analytic.soft_nodes.nodes import BOUND, CURVE, LANES, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import WARP
-from pipeline.truth.node_table.build import Single
 
 LINE_ROWS: Final = 7
 """Rows of the scratch of `place_nodes`."""

@@ -22,11 +22,13 @@ from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
 from pipeline.analytic.soft_nodes.kinds import COLUMNS, Kind, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import tabulate_waves
+from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Index
 from pipeline.truth.cloth import model_of
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
-from pipeline.truth.node_table.build import Index, Single, longest_period, orbits
+from pipeline.truth.geometry.symmetry import longest_period, orbits
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
@@ -128,7 +130,7 @@ def tabulate(fabric: Fabric) -> Table:
     picks, ends = front.top.shape
 
     # The pieces of all cells; those that a translation of the cloth carries into one another share a grid.
-    first_of = {cell: orbit[0] for orbit in orbits(front.top) for cell in orbit}
+    first_of = {cell: orbit[0] for orbit in orbits(front) for cell in orbit}
     blocks: dict[tuple[tuple[int, int], int], int] = {}
     samples: list[tuple[int, int, Piece]] = []
     placed, piece_starts = [], [0]
@@ -179,7 +181,7 @@ def tabulate(fabric: Fabric) -> Table:
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         float_length=_float_lengths(front),
-        uniform=_EVEN * longest_period(front.top),
+        uniform=_EVEN * longest_period(front),
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
         nodes=np.ascontiguousarray(lanes_of(nodes).transpose(1, 0, 2)),

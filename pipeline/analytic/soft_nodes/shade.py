@@ -19,10 +19,10 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
 from pipeline.analytic.soft_nodes.nodes import LANES, LEVELS
+from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.compiled.float32 import absorbed
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
-from pipeline.truth.node_table.build import Single
 
 SUMS: Final = 10
 """Sums of a family."""

@@ -15,10 +15,11 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.kinds import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import KIND_FAMILY, LANES, LINES, RULE_ACROSS, RULE_ALONG, START
 from pipeline.analytic.soft_nodes.waves import HIGHEST, faintest
+from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Index
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import WEFT
-from pipeline.truth.node_table.build import Index, Single
 
 REACH: Final = 2.6
 """Deviations after which a footprint is cut off: 1 % of it."""

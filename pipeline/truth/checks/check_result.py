@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-Floats = npt.NDArray[np.float64]
+from pipeline.compiled.arrays import Float64
 
 LEVEL: Final = 1e-4
 """Probability that an invariant that holds is called broken."""
@@ -91,12 +91,12 @@ def worst(
     return Invariant(name, float(values[row]), expected, float(spread[row]), relation, verdict, note)
 
 
-def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Floats:
+def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Float64:
     """Return first / second, and 1 where they are equal, so that nothing over nothing is no difference."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.equal(first, second), 1.0, np.divide(first, second, dtype=np.float64))
 
 
-def largest(values: Floats) -> float:
+def largest(values: Float64) -> float:
     """Return the greatest modulus; NaN if there is one."""
     return float(np.abs(values).max())

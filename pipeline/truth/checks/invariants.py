@@ -13,10 +13,10 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.checks.check_result import ROUNDING, Floats, Invariant, exact, largest, quotient, worst
+from pipeline.truth.checks.check_result import ROUNDING, Invariant, exact, largest, quotient, worst
 from pipeline.truth.cloth import AREA, SUMS, Columns, Model, columns_of, model_of
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
@@ -61,11 +61,11 @@ def point_reciprocity(fabric: Fabric) -> list[Invariant]:
 
 def _scattered(
     slab: Callable[..., float],
-    i: Floats,
-    o: Floats,
+    i: Float64,
+    o: Float64,
     cos_i: float,
     cos_o: float,
-    t: Floats,
+    t: Float64,
     alpha: float,
     thickness: float,
 ) -> float:
@@ -86,7 +86,7 @@ def patch_reciprocity(fabric: Fabric) -> list[Invariant]:
     there = _queries(fabric, _directions(rng, rows, 75.0), _directions(rng, rows, 75.0), 1.0, rng)
     back = there._replace(wi=there.wo, wo=there.wi)
 
-    def value(queries: Queries, seed: int, **choices: str) -> tuple[Floats, Floats]:
+    def value(queries: Queries, seed: int, **choices: str) -> tuple[Float64, Float64]:
         answers = estimate(fabric, queries, _fixed(16_384, **choices), seed)
         cosine = np.abs(queries.wo[:, 2].astype(np.float64))
         return answers.mean[:, :2].sum(axis=1) * cosine, np.hypot(*answers.standard_error[:, :2].T) * cosine
@@ -243,7 +243,14 @@ def repeat_average(fabric: Fabric) -> list[Invariant]:
 
 @kernel
 def _lattice(
-    model: Model, columns: Columns, row: int, side: int, shifts: Floats, colours: Floats, mean: Floats, error: Floats
+    model: Model,
+    columns: Columns,
+    row: int,
+    side: int,
+    shifts: Float64,
+    colours: Float64,
+    mean: Float64,
+    error: Float64,
 ) -> float:
     """Average a query over the repeat by shifted square lattices; write the components, return the coloured whole."""
     picks, ends = model.front.top.shape
@@ -325,25 +332,25 @@ def _repeat_sigma(fabric: Fabric) -> float:
     return _WIDE * max(fabric.weave.repeat)
 
 
-def _turned(degrees: Floats, azimuth: Floats) -> Floats:
+def _turned(degrees: Float64, azimuth: Float64) -> Float64:
     """Return unit vectors (N, 3) at angles from the normal, degrees, and azimuths, radians."""
     theta = np.radians(degrees)
     return np.stack([np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth), np.cos(theta)], axis=-1)
 
 
-def _directions(rng: np.random.Generator, rows: int, largest: float) -> Floats:
+def _directions(rng: np.random.Generator, rows: int, largest: float) -> Float64:
     """Return random unit vectors (rows, 3) within `largest` degrees of the normal, even in solid angle."""
     cosine = rng.uniform(math.cos(math.radians(largest)), 1.0, rows)
     return _turned(np.degrees(np.arccos(cosine)), rng.uniform(0.0, 2.0 * math.pi, rows))
 
 
-def _queries(fabric: Fabric, wi: Floats, wo: Floats, size: float | Floats, rng: np.random.Generator) -> Queries:
+def _queries(fabric: Fabric, wi: Float64, wo: Float64, size: float | Float64, rng: np.random.Generator) -> Queries:
     """Return round flat queries at random places of the repeat."""
     u, v = (rng.random(len(wi)) * n for n in fabric.weave.repeat)
     columns = u, v, np.broadcast_to(size, u.shape), wi, wo
     return Queries.round(*(np.array(column, np.float32) for column in columns))
 
 
-def _coarse(places: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _coarse(places: Float32) -> Float32:
     """Round down to 1/256, which leaves single precision room for a thousand repeats."""
     return np.asarray(np.floor(places * 256.0) / 256.0, np.float32)

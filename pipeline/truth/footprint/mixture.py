@@ -19,12 +19,10 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.query import Queries
-
-Singles = npt.NDArray[np.float32]
 
 
 class Line(NamedTuple):
@@ -68,7 +66,7 @@ _NOTHING: Final = np.float32(0.0)
 _WIDEST: Final = np.float32(1e4)  # yarn spacings: even along that axis, and places on the line still have digits
 
 
-def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Singles, Singles, Singles]:
+def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Float32, Float32, Float32]:
     """Return the deviations of N footprints along x and y and the correlation of both, each float32 (N,).
 
     Axes count as 1e4 yarn spacings at most. Correlations are 0 or such as a `COARSE_LINE` resolves: an ellipse thinner
@@ -91,9 +89,7 @@ def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Singles,
 
 
 @kernel
-def axes(
-    major: npt.NDArray[np.float64], minor: npt.NDArray[np.float64], angle: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
+def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""
     found = np.empty((3, len(major)))
     for row in range(len(major)):
@@ -123,7 +119,7 @@ def narrow_axis(deviation_x: float, deviation_y: float, correlation: float) -> f
 
 
 @kernel
-def line_points(correlation: float, line: Line, places: Singles, shares: Singles) -> int:
+def line_points(correlation: float, line: Line, places: Float32, shares: Float32) -> int:
     """Write the points of a line, in its deviations, and their shares, which add up to 1; return how many."""
     r = abs(correlation)
     if r == 0.0:

@@ -13,11 +13,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
-from pipeline.compiled.decorators import fast_kernel, inlined_kernel, kernel
-from pipeline.compiled.float32 import remaining
+from pipeline.compiled.decorators import inlined_kernel
+from pipeline.compiled.normal import normal_quantile
 
 GAUSSIAN, BOX = 0, 1
 
@@ -29,53 +26,6 @@ EVENLY: Final = 0.6
 2 exp(-2 pi^2 .36)."""
 
 BOX_SIDE = math.sqrt(12.0)  # side of the square whose standard deviation is 1
-
-# Acklam's rational approximation of the normal quantile [Acklam2003Quantile].
-_A = (
-    -39.69683028665376,
-    220.9460984245205,
-    -275.9285104469687,
-    138.3577518672690,
-    -30.66479806614716,
-    2.506628277459239,
-)
-_B = (-54.47609879822406, 161.5858368580409, -155.6989798598866, 66.80131188771972, -13.28068155288572)
-_C = (
-    -0.007784894002430293,
-    -0.3223964580411365,
-    -2.400758277161838,
-    -2.549732539343734,
-    4.374664141464968,
-    2.938163982698783,
-)
-_D = (0.007784695709041462, 0.3224671290700398, 2.445134137142996, 3.754408661907416)
-_TAIL = 0.02425
-
-
-@inlined_kernel
-def _rational(t: float) -> float:
-    return (((((_C[0] * t + _C[1]) * t + _C[2]) * t + _C[3]) * t + _C[4]) * t + _C[5]) / (
-        (((_D[0] * t + _D[1]) * t + _D[2]) * t + _D[3]) * t + 1.0
-    )
-
-
-@inlined_kernel
-def normal_quantile(p: float) -> float:
-    """Return the x at which the standard normal distribution reaches p, 0 < p < 1, to 1.2e-9 relative.
-
-    A footprint's centre is known to float32, so the last digits of Acklam's form are not refined further.
-    """
-    if p < _TAIL:
-        return _rational(math.sqrt(-2.0 * math.log(p)))
-    if p > 1.0 - _TAIL:
-        return -_rational(math.sqrt(-2.0 * math.log1p(-p)))
-    q = p - 0.5
-    r = q * q
-    return (
-        (((((_A[0] * r + _A[1]) * r + _A[2]) * r + _A[3]) * r + _A[4]) * r + _A[5])
-        * q
-        / (((((_B[0] * r + _B[1]) * r + _B[2]) * r + _B[3]) * r + _B[4]) * r + 1.0)
-    )
 
 
 @inlined_kernel
@@ -165,95 +115,3 @@ def place_pair(
         a, b = BOX_SIDE * sigma * (first - 0.5), BOX_SIDE * sigma_minor * (second - 0.5)
     cosine, sine = math.cos(angle), math.sin(angle)
     return _wrap(u + a * cosine - b * sine, ends), _wrap(v + a * sine + b * cosine, picks), 1.0
-
-
-_SPREAD_OUT = 0.8  # in repeats: an axis of a Gaussian this wide covers the repeat evenly, to 6e-6
-_REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
-
-
-@kernel
-def interval_masses(
-    shape: int,
-    centre: float,
-    sigma: float,
-    repeat: float,
-    edges: npt.NDArray[np.float32],
-    cell: float,
-    masses: npt.NDArray[np.float32],
-) -> bool:
-    """Write the share of a footprint's axis in each interval between neighbouring edges; say whether any has one.
-
-    Parameters
-    ----------
-    shape, centre, sigma, repeat
-        As in `place`.
-    edges : float32 (n + 1,)
-        Rising positions in their cell, in [0, 1].
-    cell : float
-        Where the cell begins.
-    masses : float32 (n,)
-        Written; over a whole repeat they sum to 1.
-    """
-    count = len(masses)
-    if shape == GAUSSIAN and sigma >= _SPREAD_OUT * repeat:
-        even = np.float32(1.0 / repeat)
-        for k in range(count):
-            masses[k] = (edges[k + 1] - edges[k]) * even
-        return True
-    side = BOX_SIDE * sigma
-    whole, even = 0.0, np.float32(0.0)
-    if shape == BOX:
-        # So many whole repeats everywhere, and the rest around the centre, or opposite it.
-        whole = math.floor(side / repeat)
-        even = np.float32(whole / side)
-        if whole % 2.0 == 1.0:
-            centre += 0.5 * repeat
-    reach = _REACH * sigma if shape == GAUSSIAN else 0.5 * (side - whole * repeat)
-    for k in range(count):
-        masses[k] = even * (edges[k + 1] - edges[k])
-    first = math.ceil((cell - centre - reach) / repeat)
-    last = math.floor((cell + 1.0 - centre + reach) / repeat)
-    for image in range(first, last + 1):
-        middle = np.float32(centre + image * repeat - cell)
-        if shape == GAUSSIAN:
-            _add_gaussian(edges, middle, np.float32(1.0 / sigma), masses)
-        else:
-            _add_box(edges, middle, np.float32(reach), np.float32(1.0 / side), masses)
-    return last >= first or whole > 0.0
-
-
-_NORMAL = tuple(np.float32(c) for c in (0.2316419, 0.319381530, -0.356563782, 1.781477937, -1.821255978, 1.330274429))
-_ROOT = np.float32(1.0 / math.sqrt(2.0 * math.pi))
-
-
-@fast_kernel
-def normal_distribution(x: np.float32) -> np.float32:
-    """Return the mass of the standard normal distribution below x, to 2e-7 [Abramowitz1964Handbook, 26.2.17]."""
-    size = abs(x)
-    t = np.float32(1.0) / (np.float32(1.0) + _NORMAL[0] * size)
-    series = t * (_NORMAL[1] + t * (_NORMAL[2] + t * (_NORMAL[3] + t * (_NORMAL[4] + t * _NORMAL[5]))))
-    tail = _ROOT * remaining(np.float32(0.5) * size * size) * series
-    return tail if x < np.float32(0.0) else np.float32(1.0) - tail
-
-
-@fast_kernel
-def _add_gaussian(
-    edges: npt.NDArray[np.float32], middle: np.float32, inverse: np.float32, masses: npt.NDArray[np.float32]
-) -> None:
-    for k in range(len(masses)):
-        below = normal_distribution((edges[k] - middle) * inverse)
-        masses[k] += normal_distribution((edges[k + 1] - middle) * inverse) - below
-
-
-@fast_kernel
-def _add_box(
-    edges: npt.NDArray[np.float32],
-    middle: np.float32,
-    reach: np.float32,
-    inverse: np.float32,
-    masses: npt.NDArray[np.float32],
-) -> None:
-    for k in range(len(masses)):
-        low = min(max(edges[k] - middle, -reach), reach)
-        high = min(max(edges[k + 1] - middle, -reach), reach)
-        masses[k] += (high - low) * inverse

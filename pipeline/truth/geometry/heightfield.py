@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.gloss import gloss
 from pipeline.truth.options import Variation
@@ -51,11 +52,11 @@ class HeightField(NamedTuple):
     """
 
     top: npt.NDArray[np.int8]
-    floats: npt.NDArray[np.float64]
-    crown: npt.NDArray[np.float64]
+    floats: Float64
+    crown: Float64
     highest: float
     lowest: float
-    yarn: npt.NDArray[np.float64]
+    yarn: Float64
     thickness: float
 
 

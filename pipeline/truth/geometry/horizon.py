@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import (
     AXIS_DROP,
@@ -210,11 +210,11 @@ def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: flo
 @kernel
 def horizons(
     field: HeightField,
-    x: npt.NDArray[np.float64],
-    y: npt.NDArray[np.float64],
+    x: Float64,
+    y: Float64,
     azimuths: int,
     own_plane: bool,
-) -> npt.NDArray[np.float32]:
+) -> Float32:
     """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
 
     Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. Shape (azimuths, points).
@@ -236,11 +236,11 @@ def horizons(
 def horizon_sines(
     front: HeightField,
     back: HeightField,
-    x: npt.NDArray[np.float64],
-    y: npt.NDArray[np.float64],
-    gap: npt.NDArray[np.bool_],
+    x: Float64,
+    y: Float64,
+    gap: Mask,
     azimuths: int,
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
 
     Who looks through a gap sees it if nothing on the other side of the cloth, `back` seen from -wo, hides it either:

@@ -17,6 +17,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import Columns, Model, columns_of, model_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
@@ -124,12 +125,12 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
 def _opacity_rows(
     model: Model,
     columns: Columns,
-    index: npt.NDArray[np.int64],
+    index: Index,
     tolerance: float,
     min_count: int,
     max_count: int,
     seed: np.uint64,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+) -> tuple[Float64, Float64]:
     """Return opacities and their standard errors (N,): ratios of replicates' sums, doubled up to the tolerance."""
     rows = len(index)
     means, errors = np.zeros(rows), np.zeros(rows)
@@ -176,7 +177,7 @@ def _opacity_rows(
 
 def opacity(
     fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+) -> tuple[Float32, Float32]:
     """Return the share of a footprint's camera rays that hit any yarn before they leave the boundary.
 
     Parameters
@@ -223,11 +224,11 @@ def opacity(
 @kernel
 def _grazing_rows(
     field: HeightField,
-    u: npt.NDArray[np.float64],
-    v: npt.NDArray[np.float64],
-    azimuth: npt.NDArray[np.float64],
-    curvature: npt.NDArray[np.float64],
-) -> npt.NDArray[np.float64]:
+    u: Float64,
+    v: Float64,
+    azimuth: Float64,
+    curvature: Float64,
+) -> Float64:
     picks, ends = field.top.shape
     cosines = np.zeros(len(u))
     for row in range(len(u)):
@@ -248,7 +249,7 @@ def _grazing_rows(
 
 def grazing_cosine(
     fabric: Fabric, u: npt.ArrayLike, v: npt.ArrayLike, azimuth: npt.ArrayLike, curvature: npt.ArrayLike
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     """Return the cosine of the viewer's angle to the normal at which a ray just touches the cloth.
 
     At one point of a cloth without gaps, opacity is a step in the cosine: 0 below this one, 1 above. It is never

@@ -12,8 +12,8 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import Columns, Model
 from pipeline.truth.footprint.mixture import Line
@@ -45,12 +45,12 @@ def sum_rows(
     model: Model,
     table: Table,
     columns: Columns,
-    index: npt.NDArray[np.int64],
+    index: Index,
     relative_error: float,
     absolute_error: float,
     seed: np.uint64,
     line: Line,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+) -> tuple[Float64, Float64, Index]:
     """Answer every row: means and standard errors (N, 5), and nodes visited; ellipses at an angle by a `line`.
 
     Footprints are Gaussian or lie along the axes, the cloth is flat, cosines go to the ply normal, points hide one

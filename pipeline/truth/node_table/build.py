@@ -9,12 +9,11 @@ Where a highlight is narrower than a node, finer nodes resolve it.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
@@ -32,6 +31,7 @@ from pipeline.truth.geometry.heightfield import (
 )
 from pipeline.truth.geometry.horizon import horizons
 from pipeline.truth.geometry.pieces import cell_pieces
+from pipeline.truth.geometry.symmetry import longest_period, orbits
 
 NODES: Final = 32
 """Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
@@ -48,10 +48,6 @@ _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right 
 _FINEST = 16
 _SIDE = 0.25  # share of a node by which the last one along a yarn is cut in two
 _FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
-
-Single = npt.NDArray[np.float32]
-Double = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 # Columns of `Table.pieces`.
 START, COLUMNS, ROWS, KIND_X, KIND_Y, FAMILY, FINE_START, FINE = range(8)
@@ -88,12 +84,12 @@ class Table(NamedTuple):
     repeat: Index
     pieces: Index
     copies: Index
-    edges: Single
-    evenly: Single
-    normal: Single
-    fine: Single
-    slope: Single
-    slope_behind: Single
+    edges: Float32
+    evenly: Float32
+    normal: Float32
+    fine: Float32
+    slope: Float32
+    slope_behind: Float32
     uniform: float
 
 
@@ -120,7 +116,7 @@ def tabulate(
         Resolution; 0 nodes: as many as the number of different cells asks for.
     """
     picks, ends = front.top.shape
-    alike = orbits(front.top)
+    alike = orbits(front)
     nodes = nodes or _resolution(len(alike), coarse)
     kinds: list[tuple[float, ...]] = []
     rows, copies, grids = [], [], []
@@ -160,7 +156,7 @@ def tabulate(
         fine=_surface(front, fine_x, fine_y),
         slope=slope,
         slope_behind=slope_behind,
-        uniform=_FADED * longest_period(front.top),
+        uniform=_FADED * longest_period(front),
     )
 
 
@@ -169,45 +165,6 @@ def _resolution(cells: int, coarse: bool) -> int:
     if coarse:
         return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
     return max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / cells))))
-
-
-def different_cells(field: HeightField) -> int:
-    """Return how many cells of the repeat no translation of the cloth onto itself carries into one another."""
-    return field.top.size // len(_translations(field.top.shape, field.top.tobytes()))
-
-
-@lru_cache(maxsize=256)
-def _translations(shape: tuple[int, int], top: bytes) -> tuple[tuple[int, int], ...]:
-    """List the shifts by picks and ends that carry the cloth onto itself; `top` holds `HeightField.top`."""
-    cloth = np.frombuffer(top, np.int8).reshape(shape)
-    return tuple(shift for shift in np.ndindex(shape) if np.array_equal(np.roll(cloth, shift, (0, 1)), cloth))
-
-
-def orbits(top: npt.NDArray[np.int8]) -> list[list[tuple[int, int]]]:
-    """Group the cells (pick, end) that translations of the cloth onto itself carry into one another."""
-    picks, ends = top.shape
-    steps = _translations(top.shape, top.tobytes())
-    left = dict.fromkeys(np.ndindex(picks, ends))
-    found = []
-    while left:
-        pick, end = next(iter(left))
-        found.append([((pick + p) % picks, (end + e) % ends) for p, e in steps])
-        for cell in found[-1]:
-            del left[cell]
-    return found
-
-
-def longest_period(top: npt.NDArray[np.int8]) -> float:
-    """Return the wavelength of the slowest wave that the translations of a cloth onto itself leave."""
-    picks, ends = top.shape
-    steps = _translations(top.shape, top.tobytes())
-    shortest = min(
-        math.hypot(m / ends, n / picks)
-        for m in range(ends + 1)
-        for n in range(-picks, picks + 1)
-        if (m or n) and all((m * e * picks + n * p * ends) % (ends * picks) == 0 for p, e in steps)
-    )
-    return 1.0 / shortest
 
 
 def _pieces(
@@ -261,10 +218,10 @@ def _positions(
     x_edges: tuple[float, ...],
     y_edges: tuple[float, ...],
     finer: tuple[int, int],
-) -> tuple[Double, Double, Double, Double]:
+) -> tuple[Float64, Float64, Float64, Float64]:
     """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
 
-    def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Double:
+    def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Float64:
         # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
         places = np.array(edges)
         borders = np.arcsin(np.clip((places - 0.5) / radius, -1.0, 1.0)) if bent else places
@@ -285,7 +242,7 @@ def _positions(
 
 
 @kernel
-def _surface(field: HeightField, x: Double, y: Double) -> Single:
+def _surface(field: HeightField, x: Float64, y: Float64) -> Float32:
     """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
     found = np.zeros((7, len(x)), np.float32)
     for k in range(len(x)):

@@ -13,14 +13,15 @@ from threading import Lock
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Index, Mask
 from pipeline.truth.cloth import Columns, Model, Raw
 from pipeline.truth.footprint.mixture import FINE_LINE, axes
 from pipeline.truth.footprint.place import GAUSSIAN
+from pipeline.truth.geometry.symmetry import different_cells
 from pipeline.truth.monte_carlo import OWEN, sample_rows
 from pipeline.truth.node_table.answer import sum_rows
-from pipeline.truth.node_table.build import NODES, WIDE, Table, different_cells, tabulate
+from pipeline.truth.node_table.build import NODES, WIDE, Table, tabulate
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
 
@@ -31,23 +32,21 @@ _STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
 """Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
 
 
-def auto_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+def auto_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer each query by the first that states the error asked for: a coarse table, a fine one, sampling."""
     return _first_good(tabulated(model, columns) & _axial(model, columns), model, columns, index, options, seed)
 
 
-def elliptic_rows(
-    model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
-) -> Raw:
+def elliptic_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer as `auto_rows` does, footprints at an angle by the tables too."""
     return _first_good(tabulated(model, columns), model, columns, index, options, seed)
 
 
 def _first_good(
-    known: npt.NDArray[np.bool_],
+    known: Mask,
     model: Model,
     columns: Columns,
-    index: npt.NDArray[np.int64],
+    index: Index,
     options: TruthOptions,
     seed: int,
 ) -> Raw:
@@ -87,7 +86,7 @@ def _first_good(
     return means, errors, counts
 
 
-def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int) -> Raw:
+def table_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever they state."""
     known, wide = tabulated(model, columns), _wide(columns)
     if not known.all():
@@ -108,12 +107,12 @@ def table_rows(model: Model, columns: Columns, index: npt.NDArray[np.int64], opt
     return means, errors, counts
 
 
-def _wide(columns: Columns) -> npt.NDArray[np.bool_]:
+def _wide(columns: Columns) -> Mask:
     """Say for which queries the coarse table is good enough to be asked."""
     return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
 
 
-def tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+def tabulated(model: Model, columns: Columns) -> Mask:
     """Say which queries the table knows of, (N,)."""
     choices = model.choices
     other = choices.macro or choices.linear or not choices.shadows or model.varied
@@ -127,7 +126,7 @@ def tabulated(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
     return np.asarray(known)
 
 
-def _axial(model: Model, columns: Columns) -> npt.NDArray[np.bool_]:
+def _axial(model: Model, columns: Columns) -> Mask:
     """Say which footprints are round or lie along the axes."""
     along = columns.angle == 0.0
     if model.shape == GAUSSIAN:

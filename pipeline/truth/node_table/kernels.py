@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import absorbed, remaining
-from pipeline.truth.node_table.build import Single
 
 SMOOTH: Final = np.float32(0.0005)
 """Squared error of a node's share by what curves within it, relative to its square."""
@@ -29,11 +29,11 @@ _GRAZING = np.float32(1e-6)
 
 @fast_kernel
 def weigh(
-    nx: Single,
-    ny: Single,
-    nz: Single,
-    inverse: Single,
-    weight: Single,
+    nx: Float32,
+    ny: Float32,
+    nz: Float32,
+    inverse: Float32,
+    weight: Float32,
     ix: np.float32,
     iy: np.float32,
     iz: np.float32,
@@ -41,19 +41,19 @@ def weigh(
     oy: np.float32,
     oz: np.float32,
     slope_i: np.float32,
-    low_i: Single,
-    high_i: Single,
+    low_i: Float32,
+    high_i: Float32,
     turn_i: np.float32,
     slope_o: np.float32,
-    low_o: Single,
-    high_o: Single,
+    low_o: Float32,
+    high_o: Float32,
     turn_o: np.float32,
     blend: np.float32,
-    lit: Single,
-    areas: Single,
-    diffuses: Single,
-    margins: Single,
-    lit_margins: Single,
+    lit: Float32,
+    areas: Float32,
+    diffuses: Float32,
+    margins: Float32,
+    lit_margins: Float32,
 ) -> tuple[np.float32, np.float32]:
     """Write each node's weight if it is seen and lit, and its shares of area and diffuse; return the sums of both.
 
@@ -78,7 +78,7 @@ def weigh(
 
 @fast_kernel
 def borders(
-    first: Single, second: Single, margins: Single, columns: int
+    first: Float32, second: Float32, margins: Float32, columns: int
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Return what the borders of shadows, found between nodes, add to the sums of two shares, and their squared errors.
 
@@ -133,13 +133,13 @@ def _crossing(
 
 @fast_kernel
 def reflected(
-    nx: Single,
-    ny: Single,
-    nz: Single,
-    inverse: Single,
-    tx: Single,
-    ty: Single,
-    tz: Single,
+    nx: Float32,
+    ny: Float32,
+    nz: Float32,
+    inverse: Float32,
+    tx: Float32,
+    ty: Float32,
+    tz: Float32,
     ix: np.float32,
     iy: np.float32,
     iz: np.float32,
@@ -150,8 +150,8 @@ def reflected(
     thickness: np.float32,
     size: np.float32,
     scale: np.float32,
-    lit: Single,
-    speculars: Single,
+    lit: Float32,
+    speculars: Float32,
 ) -> np.float32:
     """Add each node's share of the reflected specular component to `speculars`; return the sum.
 
@@ -183,13 +183,13 @@ def reflected(
 
 @fast_kernel
 def transmitted(
-    nx: Single,
-    ny: Single,
-    nz: Single,
-    inverse: Single,
-    tx: Single,
-    ty: Single,
-    tz: Single,
+    nx: Float32,
+    ny: Float32,
+    nz: Float32,
+    inverse: Float32,
+    tx: Float32,
+    ty: Float32,
+    tz: Float32,
     ix: np.float32,
     iy: np.float32,
     iz: np.float32,
@@ -200,8 +200,8 @@ def transmitted(
     thickness: np.float32,
     size: np.float32,
     scale: np.float32,
-    lit: Single,
-    speculars: Single,
+    lit: Float32,
+    speculars: Float32,
 ) -> np.float32:
     """Do the same for light from behind, of which (ix, iy, iz) is the opposite, -wi."""
     total = _0
@@ -227,18 +227,18 @@ def transmitted(
 
 @fast_kernel
 def crossing(
-    nx: Single,
-    ny: Single,
-    nz: Single,
-    tx: Single,
-    ty: Single,
-    tz: Single,
+    nx: Float32,
+    ny: Float32,
+    nz: Float32,
+    tx: Float32,
+    ty: Float32,
+    tz: Float32,
     ox: np.float32,
     oy: np.float32,
     oz: np.float32,
     square: np.float32,
     thickness: np.float32,
-    areas: Single,
+    areas: Float32,
 ) -> np.float32:
     """Return the sum of what crosses the layer unscattered, exp(-T Lambda), from each node's share of the area."""
     total = _0

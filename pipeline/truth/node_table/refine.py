@@ -9,14 +9,14 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import AREA, SUMS, Model
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.monte_carlo import add_point
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, KIND_X, KIND_Y, ROWS, START, Single, Table
+from pipeline.truth.node_table.build import COLUMNS, FAMILY, KIND_X, KIND_Y, ROWS, START, Table
 from pipeline.truth.node_table.kernels import SMOOTH
 from pipeline.truth.scattering.point import Scene
 
@@ -33,15 +33,15 @@ def refine(
     query: Scene,
     key: np.uint64,
     side: int,
-    shares: Single,
-    areas: Single,
-    diffuses: Single,
-    speculars: Single,
-    margins: Single,
-    lit_margins: Single,
+    shares: Float32,
+    areas: Float32,
+    diffuses: Float32,
+    speculars: Float32,
+    margins: Float32,
+    lit_margins: Float32,
     below: float,
-    mean: npt.NDArray[np.float64],
-    error: npt.NDArray[np.float64],
+    mean: Float64,
+    error: Float64,
 ) -> int:
     """Sample the nodes on borders with exact visibility in place of the table's share of them; return the points.
 
@@ -107,7 +107,7 @@ def refine(
 
 
 @kernel
-def _on_border(margins: Single, k: int, columns: int, first: int, last: int) -> bool:
+def _on_border(margins: Float32, k: int, columns: int, first: int, last: int) -> bool:
     """Say whether a neighbour of node k is on the other side of a border."""
     here = margins[k] > 0.0
     column = (k - first) % columns
@@ -121,7 +121,7 @@ def _on_border(margins: Single, k: int, columns: int, first: int, last: int) -> 
 
 
 @kernel
-def _tilt(shares: Single, k: int, step: int, edges: Single, place: int, count: int) -> float:
+def _tilt(shares: Float32, k: int, step: int, edges: Float32, place: int, count: int) -> float:
     """Return the relative change of the footprint's density across node k, from its neighbours along one axis."""
     if place == 0 or place == count - 1:
         return 0.0

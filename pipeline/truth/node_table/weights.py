@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Mask
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import Columns
+from pipeline.truth.footprint.masses import interval_masses
 from pipeline.truth.footprint.mixture import Line, along_axes, line_points
-from pipeline.truth.footprint.place import interval_masses
-from pipeline.truth.node_table.build import COLUMNS, KIND_X, KIND_Y, ROWS, START, Single, Table
+from pipeline.truth.node_table.build import COLUMNS, KIND_X, KIND_Y, ROWS, START, Table
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
 
@@ -22,11 +22,11 @@ def fill_weights(
     shape: int,
     columns: Columns,
     row: int,
-    scratch: Single,
-    touched: npt.NDArray[np.bool_],
+    scratch: Float32,
+    touched: Mask,
     line: Line,
-    points: Single,
-    weight: Single,
+    points: Float32,
+    weight: Float32,
 ) -> None:
     """Write the share of a footprint that falls on each node and its copies; one at an angle by a `line` (oblique).
 
@@ -58,9 +58,9 @@ def _add(
     sigma_x: float,
     sigma_y: float,
     share: np.float32,
-    scratch: Single,
-    touched: npt.NDArray[np.bool_],
-    weight: Single,
+    scratch: Float32,
+    touched: Mask,
+    weight: Float32,
 ) -> None:
     """Add `share` of a footprint along the axes."""
     kinds, ends, picks = len(table.edges), table.repeat[0], table.repeat[1]
@@ -85,7 +85,7 @@ def _add(
 
 
 @fast_kernel
-def _add_product(along_x: Single, along_y: Single, share: np.float32, weight: Single) -> None:
+def _add_product(along_x: Float32, along_y: Float32, share: np.float32, weight: Float32) -> None:
     """Add `share` of the products of the shares along x and along y to the nodes of a grid."""
     across = len(along_x)
     for j in range(len(along_y)):
@@ -96,7 +96,7 @@ def _add_product(along_x: Single, along_y: Single, share: np.float32, weight: Si
 
 
 @fast_kernel
-def any_weight(share: Single) -> bool:
+def any_weight(share: Float32) -> bool:
     """Say whether any of the shares is above 0."""
     total = _0
     for k in range(len(share)):

@@ -19,11 +19,12 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import AREA, SUMS, Columns, Model, Raw
 from pipeline.truth.footprint.place import GAUSSIAN
+from pipeline.truth.geometry.symmetry import first_cells
 from pipeline.truth.monte_carlo import OWEN, query_scene, sample_rows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.parts import (
@@ -34,13 +35,10 @@ from pipeline.truth.quadrature.parts import (
     TURN,
     Axis,
     cut_parts,
-    one_of_each,
     rectangles,
 )
 from pipeline.truth.quadrature.rules import LEVELS, integrate
 from pipeline.truth.query import HIDDEN_SHARE
-
-Floats = npt.NDArray[np.float64]
 
 SAFETY: Final = 1.5
 """Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""
@@ -59,6 +57,7 @@ _WORST: Final = 0.0625  # parts with this share of the worst one's squared error
 def integrate_rows(
     model: Model,
     columns: Columns,
+    different: Mask,
     relative_error: float,
     absolute_error: float,
     min_count: int,
@@ -73,6 +72,8 @@ def integrate_rows(
     ----------
     model, columns : Model, Columns
         The cloth and the queries.
+    different : Mask (picks, ends)
+        The cells that stand for all under a footprint that covers the repeat evenly: the first of each orbit.
     relative_error, absolute_error, min_count, max_count
         As in `TruthOptions`.
     split : int
@@ -85,8 +86,7 @@ def integrate_rows(
     counts = np.zeros(rows, np.int64)
     picks, ends = model.front.top.shape
     everything = rectangles(model.front, np.ones((picks, ends), np.bool_))
-    some = one_of_each(model.front, model.back)
-    kinds, share = rectangles(model.front, some), picks * ends / some.sum()
+    kinds, share = rectangles(model.front, different), picks * ends / different.sum()
     x_pieces, y_pieces = np.zeros((32, 3)), np.zeros((32, 3))
     grid, states = np.zeros((64, 64, SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
@@ -163,14 +163,14 @@ def integrate_rows(
 @kernel
 def _judge(
     cosine: float,
-    parts: Floats,
-    levels: npt.NDArray[np.int64],
-    sums: Floats,
-    changes: Floats,
-    earlier: Floats,
-    mean: Floats,
-    error: Floats,
-    badness: Floats,
+    parts: Float64,
+    levels: Index,
+    sums: Float64,
+    changes: Float64,
+    earlier: Float64,
+    mean: Float64,
+    error: Float64,
+    badness: Float64,
 ) -> tuple[float, float]:
     """Write means, errors and each part's squared error; return the worst, and the squared size of the means.
 
@@ -209,9 +209,7 @@ def _judge(
     return worst, size
 
 
-def quadrature_rows(
-    model: Model, columns: Columns, index: npt.NDArray[np.int64], options: TruthOptions, seed: int
-) -> Raw:
+def quadrature_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every row: means and error bounds (N, 5), and points used.
 
     Rotated footprints are no product in x and y; they are sampled as `owen` does, and only they depend on `seed`.
@@ -233,7 +231,9 @@ def quadrature_rows(
     means, errors, counts = np.zeros((rows, AREA)), np.zeros((rows, AREA)), np.zeros(rows, np.int64)
     limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
     if aligned.any():
-        found = integrate_rows(model, columns.take(aligned), *limits, _SPLIT, _FIRST, LEVELS - 1)
+        found = integrate_rows(
+            model, columns.take(aligned), first_cells(model.front), *limits, _SPLIT, _FIRST, LEVELS - 1
+        )
         means[aligned], errors[aligned], counts[aligned] = found
     if not aligned.all():
         rotated = ~aligned

@@ -2,8 +2,7 @@
 
 Floats on top, strips of the yarn beneath where the one on top is narrow, and gaps cover one repeat once. Footprints are
 folded: a position stands for all its images. A kernel that is narrow against a rectangle cuts it further, so that a
-rule of few nodes resolves it. Fabrics whose repeat holds the same cells several times (the cells of a satin are all
-alike) are reduced to one of each kind for footprints that cover the repeat evenly.
+rule of few nodes resolves it.
 """
 
 from __future__ import annotations
@@ -12,8 +11,8 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN
 from pipeline.truth.geometry.heightfield import (
@@ -31,11 +30,8 @@ from pipeline.truth.geometry.heightfield import (
     HeightField,
 )
 
-Floats = npt.NDArray[np.float64]
-
 _REACH: Final = 5.5
 _RESOLVED: Final = 3.0  # widest part in standard deviations: 8 nodes give its mass to 1e-7
-_LARGEST: Final = 1024  # cells of a repeat that is searched for translations
 
 # Columns of a part: limits across (the angle v; at gaps x) and along, whose yarn, its middle and half width, the box's
 # weight, the larger of the angles that the surface turns by across and along, over the roughness, and its share of the
@@ -54,36 +50,7 @@ class Axis(NamedTuple):
 
 
 @kernel
-def one_of_each(front: HeightField, back: HeightField) -> npt.NDArray[np.bool_]:
-    """Return for each cell, (picks, ends), whether no earlier one has the same endless cloth around it."""
-    picks, ends = front.top.shape
-    first = np.ones((picks, ends), np.bool_)
-    if picks * ends > _LARGEST:
-        return first
-    for dy in range(picks):
-        for dx in range(ends):
-            same = dx + dy > 0
-            for cell in range(picks * ends):
-                if not same:
-                    break
-                pick, end = cell // ends, cell % ends
-                row, column = (pick + dy) % picks, (end + dx) % ends
-                same = front.top[pick, end] == front.top[row, column]
-                for side in range(2):
-                    for k in range(front.floats.shape[3]):
-                        same = same and front.floats[pick, end, side, k] == front.floats[row, column, side, k]
-                        same = same and back.floats[pick, end, side, k] == back.floats[row, column, side, k]
-            if same:
-                for pick in range(picks):
-                    for end in range(ends):
-                        row, column = (pick + dy) % picks, (end + dx) % ends
-                        if row * ends + column > pick * ends + end:
-                            first[row, column] = False
-    return first
-
-
-@kernel
-def rectangles(field: HeightField, wanted_cells: npt.NDArray[np.bool_]) -> Floats:
+def rectangles(field: HeightField, wanted_cells: Mask) -> Float64:
     """Return the rectangles on which the fabric is smooth, (P, 6), that begin in the cells wanted.
 
     Columns: x from, x to, y from, y to, WARP, WEFT or GAP, and the yarn's turn for each unit along it, in radians.
@@ -159,7 +126,7 @@ def _mass(axis: Axis, low: float, high: float) -> float:
 
 
 @kernel
-def _cut(axis: Axis, low: float, high: float, pieces: Floats) -> int:
+def _cut(axis: Axis, low: float, high: float, pieces: Float64) -> int:
     """Write the pieces of [low, high] that the footprint reaches, (from, to, weight); return their number."""
     count = 0
     if axis.shape == GAUSSIAN:
@@ -205,7 +172,7 @@ def _cut(axis: Axis, low: float, high: float, pieces: Floats) -> int:
 
 @kernel
 def cut_parts(
-    rectangle: Floats, yarn: Floats, x_axis: Axis, y_axis: Axis, x_pieces: Floats, y_pieces: Floats, parts: Floats
+    rectangle: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, x_pieces: Float64, y_pieces: Float64, parts: Float64
 ) -> int:
     """Write the parts of a rectangle that the footprint reaches if `parts` has rows; return their number."""
     across_x = rectangle[4] != WEFT

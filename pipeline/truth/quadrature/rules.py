@@ -12,15 +12,13 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import AREA, SUMS, Model
 from pipeline.truth.geometry.heightfield import GAP, WEFT
 from pipeline.truth.quadrature.parts import A0, A1, B0, B1, BOX_WEIGHT, HALF, KIND, MIDDLE, Axis, density
 from pipeline.truth.scattering.point import Scene, point_share
-
-Floats = npt.NDArray[np.float64]
 
 _BISECTIONS: Final = 8
 LEVELS: Final = 6
@@ -32,7 +30,7 @@ _WEIGHTS: Final = np.concatenate([weights for _, weights in _RULES])
 
 
 @kernel
-def _weight_across(part: Floats, axis: Axis, a: float) -> float:
+def _weight_across(part: Float64, axis: Axis, a: float) -> float:
     """Return kernel times length for each unit of the coordinate across."""
     if part[KIND] == GAP:
         return density(axis, a)
@@ -41,7 +39,7 @@ def _weight_across(part: Floats, axis: Axis, a: float) -> float:
 
 
 @kernel
-def _shares(model: Model, query: Scene, part: Floats, a: float, b: float, shares: Floats) -> int:
+def _shares(model: Model, query: Scene, part: Float64, a: float, b: float, shares: Float64) -> int:
     """Write what a point of a part adds to the sums; return which of viewer, light and back it sees, as bits."""
     picks, ends = model.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
@@ -66,14 +64,14 @@ def _shares(model: Model, query: Scene, part: Floats, a: float, b: float, shares
 def integrate(
     model: Model,
     query: Scene,
-    part: Floats,
+    part: Float64,
     x_axis: Axis,
     y_axis: Axis,
     level: int,
     split: int,
-    grid: Floats,
-    states: npt.NDArray[np.int64],
-    sums: Floats,
+    grid: Float64,
+    states: Index,
+    sums: Float64,
 ) -> int:
     """Write the sums over a part with 2^(level + 1) nodes an axis; return the points used."""
     n, rule = 2 << level, (2 << level) - 2

@@ -10,9 +10,10 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import columns_of, model_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX_SIDE
+from pipeline.truth.geometry.symmetry import first_cells
 from pipeline.truth.options import TruthOptions, Variation
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
-from pipeline.truth.quadrature.parts import one_of_each, rectangles
+from pipeline.truth.quadrature.parts import rectangles
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
@@ -62,15 +63,6 @@ def test_the_rectangles_cover_the_repeat_once(name, width):
     np.testing.assert_array_equal(inside, 1)
 
 
-def test_cells_that_are_alike_are_found():
-    for name, alike in (("polyester_lining", 2), ("satin_8", 8), ("cotton_twill", 4)):
-        options = TruthOptions()
-        model = model_of(load_fabric(name), options)
-        assert model.front.top.size / one_of_each(model.front, model.back).sum() == alike
-    varied = model_of(load_fabric("polyester_lining"), TruthOptions(variation=Variation(spread=0.5, repeats=2)))
-    assert one_of_each(varied.front, varied.back).all()
-
-
 def _specular_errors(roughness, split):
     """Return rms errors of the specular part with 4, 8, 16 nodes an axis; plain weave, one repeat, no shadows."""
     fabric = _both("polyester_lining", roughness=roughness)
@@ -79,8 +71,11 @@ def _specular_errors(roughness, split):
     wi, wo = (np.array([_direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
     columns = columns_of(_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
     limits = 1e-15, 0.0, 32, 1 << 30
-    exact = integrate_rows(model, columns, *limits, CUT, 4, 5)[0][:, :2]
-    means = [integrate_rows(model, columns, *limits, split, level - 1, level)[0][:, :2] for level in (1, 2, 3)]
+    different = first_cells(model.front)
+    exact = integrate_rows(model, columns, different, *limits, CUT, 4, 5)[0][:, :2]
+    means = [
+        integrate_rows(model, columns, different, *limits, split, level - 1, level)[0][:, :2] for level in (1, 2, 3)
+    ]
     return [np.sqrt(np.mean(np.sum((mean - exact) ** 2, 1) / np.sum(exact**2, 1))) for mean in means]
 
 
@@ -141,8 +136,8 @@ def test_cutting_lines_at_shadow_edges_pays():
     fabric = load_fabric("polyester_lining")
     queries = draw_queries(QueryOptions(sigma=(0.5, 8.0), max_angle=70.0), fabric.weave.repeat, 5, 0, 24)
     model, columns = model_of(fabric, TruthOptions()), columns_of(queries)
-    exact = integrate_rows(model, columns, 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
-    cut, _, used = integrate_rows(model, columns, 1e-12, 0.0, 32, 8192, CUT, 1, 5)
+    exact = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
+    cut, _, used = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 8192, CUT, 1, 5)
     options = TruthOptions(relative_error=1e-9, absolute_error=0.0, min_count=8192, max_count=8192)
     owen = estimate(fabric, queries, options, 1)
     size = np.linalg.norm(exact[:, :4], axis=1)
@@ -157,7 +152,9 @@ def _coverage(rows):
         fabric = _both(name, **changes)
         queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 17, 0, rows)
         model = model_of(fabric, TruthOptions())
-        exact = integrate_rows(model, columns_of(queries), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
+        exact = integrate_rows(
+            model, columns_of(queries), first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5
+        )[0]
         for tolerance in (0.02, 0.003):
             options = TruthOptions(relative_error=tolerance, absolute_error=0.0, max_count=1 << 14)
             mean, error, _ = _answer(fabric, queries, options)
