@@ -100,7 +100,7 @@ class DisplayOptions(BaseModel):
 
 
 class SceneBenchOptions(BaseModel):
-    """Scenes that every method renders (`reports.measure.scene.frames`), and how true their truth is."""
+    """Scenes that every method renders (`reports.measure.scene.shot`), and how true their truth is."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 

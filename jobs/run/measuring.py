@@ -27,13 +27,13 @@ from reports.measure.furnace import measure_furnace
 from reports.measure.held_out import measure_errors, measure_timing, measure_truth
 from reports.measure.latents import measure_edits, measure_paths, pairs
 from reports.measure.pictures import render_method, render_truth
-from reports.measure.scene.errors import measure_scene, time_scene, write_truth
-from reports.measure.scene.frames import read_shot, shoot
+from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
+from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.silhouette import measure_silhouette, render_edge
 from reports.measure.timing import thread_counts
 from reports.options import EXTREME_PRECISIONS, BenchOptions
 from reports.page.page import ModelNote, PageInput, write_page
-from reports.page.strips import PictureFile
+from reports.page.picture_strips import PictureFile
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from weaves.fabric import Fabric
 

@@ -86,7 +86,7 @@ def truth(out: Path) -> None:
     from rich.console import Console
 
     from reports.record import this_machine, write_records
-    from reports.tables import truth_cells
+    from reports.tables import truth_rows
     from reports.truth import accuracy, bias, effort, throughput
 
     console = Console()
@@ -108,11 +108,11 @@ def truth(out: Path) -> None:
     records += bias.to_records(biases) + effort.to_records(efforts)
     path = out / TRUTH
     write_records(path, records, this_machine(1))
-    console.print(_columns(("what", "fabric", "rate", "note"), truth_cells.rate_rows(records)))
-    for fabric, rows in truth_cells.accuracy_rows(accuracies).items():
-        console.print(_columns((fabric, *truth_cells.ACCURACY), rows))
-    console.print(_columns(("fabric", *truth_cells.BIAS), truth_cells.bias_rows(biases)))
-    console.print(_columns(("fabric", *truth_cells.EFFORT), truth_cells.effort_rows(efforts)))
+    console.print(_columns(("what", "fabric", "rate", "note"), truth_rows.rate_rows(records)))
+    for fabric, rows in truth_rows.accuracy_rows(accuracies).items():
+        console.print(_columns((fabric, *truth_rows.ACCURACY), rows))
+    console.print(_columns(("fabric", *truth_rows.BIAS), truth_rows.bias_rows(biases)))
+    console.print(_columns(("fabric", *truth_rows.EFFORT), truth_rows.effort_rows(efforts)))
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
 
 
@@ -121,7 +121,7 @@ def sampler(out: Path) -> None:
     from rich.console import Console
 
     from reports.record import this_machine, write_records
-    from reports.tables import truth_cells
+    from reports.tables import truth_rows
     from reports.truth import sampling
 
     console = Console()
@@ -132,7 +132,7 @@ def sampler(out: Path) -> None:
             status.update(f"the sampler: {one.fabric}, {one.sampler}")
     path = out / SAMPLER
     write_records(path, sampling.to_records(found), this_machine(1))
-    console.print(_columns(("fabric", *truth_cells.SAMPLERS), truth_cells.sampler_rows(found)))
+    console.print(_columns(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(found)))
     console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
 
 
@@ -154,7 +154,7 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
     """Show findings: worst error, limit, the textbook's error, what cannot be, and where what does not hold fails."""
     from rich.table import Table
 
-    from reports.tables.truth_cells import stability_rows
+    from reports.tables.truth_rows import stability_rows
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
     for name in ("expression", "corner", "worst", "limit", "textbook", "NaN", "< 0", ""):

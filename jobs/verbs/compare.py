@@ -32,7 +32,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     from reports.record import read_machine, read_records
     from reports.tables.compare import LEVEL, refuse_other_machine
     from reports.tables.compare import compare as differences
-    from reports.tables.waiting import busy
+    from reports.tables.machine_load import busy
 
     files = [records_file(path, recipe) for path in (a, b)]
     first, second = (read_records([file]) for file in files)
@@ -85,7 +85,7 @@ def _table(title: str, rows: Sequence[Difference]) -> Table:
     """Show differences: what was measured, A, B, B over A, p-value and verdict, what differs in bold."""
     from rich.table import Table
 
-    from reports.tables.numbers import display
+    from reports.tables.number_format import display
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
     for name in ("method", title, "A", "B", "B / A", "p", ""):

@@ -1,7 +1,7 @@
 """What a scene requires: its questions, the method that meets a wish, and a recipe for just that.
 
-The choice is made from the Records of a page (`reports.tables.choice`); the recipe is a file like any other, with the
-fabrics and the distribution of queries narrowed to the scene.
+The choice is made from the Records of a page (`reports.tables.method_choice`); the recipe is a file like any other,
+with the fabrics and the distribution of queries narrowed to the scene.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ def require(
     from rich.console import Console
 
     from reports.record import read_records
-    from reports.tables.choice import cheapest, nearest, of_method, predictions, with_measured
     from reports.tables.equal_time import size_table
+    from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
     from reports.tables.summary import rows, scene_table
 
     for key, value, allowed in (
@@ -256,7 +256,7 @@ def _choice_table(found: Iterable[Any]) -> Table:
     """Show the methods, the fastest first; those on the front in bold."""
     from rich.table import Table
 
-    from reports.tables.numbers import display
+    from reports.tables.number_format import display
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     for name in ("method", "error", "ms a frame", "not its own", ""):

@@ -202,7 +202,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     """Return how much more the scene's own model errs; nothing where a picture or the truth's frames are not there."""
     from reports.images.exr import RGB, read_exr
     from reports.measure.paired_error import mse_difference
-    from reports.measure.scene.frames import read_shot
+    from reports.measure.scene.shot import read_shot
 
     name, setting = model.options.name, _setting(model)
     pictures, frames = [], None
@@ -229,7 +229,7 @@ def _elsewhere(
     scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
 ) -> Iterator[Saving]:
     """Yield what either model leaves to quadrature in the general recipe's other scenes, whose frames are there."""
-    from reports.measure.scene.frames import read_shot
+    from reports.measure.scene.shot import read_shot
 
     for task in plan(general):
         if task.setting.get("make") != "shot" or Ledger(out).state(task) != "done":

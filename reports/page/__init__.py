@@ -1,1 +1,4 @@
-"""The page of a recipe: page, its figures, and what they look like (style)."""
+"""The HTML page of a recipe: page (what goes in), templates (its text), colours and marks, figures, strips of pictures.
+
+`front_figures` draws errors against costs, `figures` the other plots, `plot_style` their look.
+"""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from reports.images.tiles import EXPOSURE, hex_colour
-from reports.tables.numbers import plain
+from reports.tables.number_format import plain
 from weaves.fabric import Fabric
 
 

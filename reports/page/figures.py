@@ -1,4 +1,4 @@
-"""The plots of a page, one function each: `plot(scheme, data) -> Figure`, drawn by `reports.page.style.render`.
+"""The plots of a page, one function each: `plot(scheme, data) -> Figure`, drawn by `reports.page.plot_style.render`.
 
 Those of fronts, a fault against a cost, are in `reports.page.front_figures`.
 
@@ -19,9 +19,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 
 from reports.measure.aliasing import HALF_NYQUIST
-from reports.page.style import NARROWEST, Scheme, new_figure
+from reports.page.colours import Scheme
+from reports.page.plot_style import NARROWEST, new_figure
 from reports.record import TRUTH
-from reports.tables.numbers import display
+from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, rows
 
 _ROLES: Final = ("seen", "unseen")

@@ -21,9 +21,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from reports.measure.by_size import SIZES
-from reports.page.style import NARROWEST, Scheme, new_figure
-from reports.tables.front import front
-from reports.tables.numbers import display, size
+from reports.page.colours import Scheme
+from reports.page.plot_style import NARROWEST, new_figure
+from reports.tables.number_format import display, size
+from reports.tables.pareto_front import front
 from reports.tables.summary import PAPER, of_baseline, rows
 
 _ROLES: Final = ("seen", "unseen")

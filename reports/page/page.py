@@ -24,29 +24,27 @@ from reports.measure.extremes import extremes_table
 from reports.measure.silhouette import silhouette_table
 from reports.options import BenchOptions
 from reports.page import figures, front_figures
+from reports.page.colours import DARK, LIGHT, Scheme
 from reports.page.fabric_card import fabric_card
 from reports.page.filmstrip import SHOWN, filmstrip, liveliest
-from reports.page.strips import PictureFile, films, strips
-from reports.page.style import DARK, LIGHT, Scheme, render
+from reports.page.picture_strips import PictureFile, films, strips
+from reports.page.plot_style import render
 from reports.record import OF_A_PAGE, TRUTH, Machine, Record, Role, to_table, write_records
-from reports.tables import cells, scene_cells, summary, truth_cells
+from reports.tables import method_rows, scene_rows, summary, truth_rows
+from reports.tables.caveats import caveats, lacking, unseen_by_eye
 from reports.tables.definitions import DEFINITIONS
 from reports.tables.equal_time import equal_time_table, size_table
-from reports.tables.numbers import display, percent, plain
-from reports.tables.tradeoff import tradeoff_table
-from reports.tables.waiting import waiting
-from reports.tables.wording import (
+from reports.tables.headline import headline, learnt
+from reports.tables.machine_load import waiting
+from reports.tables.number_format import display, percent, plain
+from reports.tables.sentences import (
     beaten,
-    caveats,
     cheapest_sentences,
     equal_time_sentences,
-    headline,
-    lacking,
-    learnt,
     least_flicker_sentences,
     scene_sentences,
-    unseen_by_eye,
 )
+from reports.tables.tradeoff import tradeoff_table
 from reports.truth import accuracy, bias, effort, sampling
 from reports.truth.finding import Finding, from_records
 from weaves.fabric import Fabric
@@ -253,48 +251,48 @@ def _html(page: PageInput, tables: dict[str, pd.DataFrame], findings: Sequence[F
     return environment.get_template("page.html.j2").render(
         page=page,
         headlines=_headlines(errors, timing, untrained),
-        figures_of_merit=cells.figures_of_merit(page.records, errors, timing, untrained),
-        front=cells.front_rows(tables["tradeoff"]),
-        front_columns=cells.FRONT,
+        figures_of_merit=method_rows.figures_of_merit(page.records, errors, timing, untrained),
+        front=method_rows.front_rows(tables["tradeoff"]),
+        front_columns=method_rows.FRONT,
         cheapest=cheapest_sentences(tables["tradeoff"]),
         least_flicker=least_flicker_sentences(tables["tradeoff"]),
         beaten=beaten(tables["tradeoff"]),
-        equal_time=cells.equal_time_rows(tables["equal_time"]),
+        equal_time=method_rows.equal_time_rows(tables["equal_time"]),
         equal_time_sentences=equal_time_sentences(tables["equal_time"]),
-        errors=cells.error_rows(errors, per_material),
-        by_fabric=cells.fabric_rows(tables["errors_by_fabric"]),
-        aliasing=cells.aliasing_rows(tables["aliasing"], page.records),
-        energy=cells.energy_rows(tables["energy"], errors, timing),
-        energy_columns=cells.ENERGY,
-        silhouettes=cells.silhouette_rows(tables["silhouettes"]),
-        silhouette_columns=cells.SILHOUETTE,
-        timing=cells.timing_rows(timing),
-        timing_columns=cells.timing_columns(timing),
-        paths=cells.path_rows(summary.path_table(page.records)),
-        edits=cells.edit_rows(page.records),
+        errors=method_rows.error_rows(errors, per_material),
+        by_fabric=method_rows.fabric_rows(tables["errors_by_fabric"]),
+        aliasing=method_rows.aliasing_rows(tables["aliasing"], page.records),
+        energy=method_rows.energy_rows(tables["energy"], errors, timing),
+        energy_columns=method_rows.ENERGY,
+        silhouettes=method_rows.silhouette_rows(tables["silhouettes"]),
+        silhouette_columns=method_rows.SILHOUETTE,
+        timing=method_rows.timing_rows(timing),
+        timing_columns=method_rows.timing_columns(timing),
+        paths=method_rows.path_rows(summary.path_table(page.records)),
+        edits=method_rows.edit_rows(page.records),
         shares=[f"t = {share:g}" for share in latents.SHARES],
-        stability=truth_cells.stability_rows(findings),
-        extremes=cells.extreme_rows(extremes_table(page.records)),
-        extreme_columns=cells.EXTREMES,
-        rates=truth_cells.rate_rows(page.records),
-        accuracies=truth_cells.accuracy_rows(measured["truth_accuracy"]),
+        stability=truth_rows.stability_rows(findings),
+        extremes=method_rows.extreme_rows(extremes_table(page.records)),
+        extreme_columns=method_rows.EXTREMES,
+        rates=truth_rows.rate_rows(page.records),
+        accuracies=truth_rows.accuracy_rows(measured["truth_accuracy"]),
         reference=percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         accuracy_count=max((row.count for row in measured["truth_accuracy"]), default=0),
-        biases=truth_cells.bias_rows(measured["truth_bias"]),
-        efforts=truth_cells.effort_rows(measured["truth_effort"]),
-        samplers=truth_cells.sampler_rows(measured["sampler"]),
+        biases=truth_rows.bias_rows(measured["truth_bias"]),
+        efforts=truth_rows.effort_rows(measured["truth_effort"]),
+        samplers=truth_rows.sampler_rows(measured["sampler"]),
         limit=percent(bias.LIMIT),
         asked=percent(effort.RELATIVE_ERROR),
         columns={
-            "accuracy": truth_cells.ACCURACY,
-            "bias": truth_cells.BIAS,
-            "effort": truth_cells.EFFORT,
-            "sampler": truth_cells.SAMPLERS,
+            "accuracy": truth_rows.ACCURACY,
+            "bias": truth_rows.BIAS,
+            "effort": truth_rows.EFFORT,
+            "sampler": truth_rows.SAMPLERS,
         },
-        titles={name: plain(name) for name in truth_cells.accuracy_rows(measured["truth_accuracy"])},
+        titles={name: plain(name) for name in truth_rows.accuracy_rows(measured["truth_accuracy"])},
         strips=[view for view in views if view.fabric],
-        scenes=scene_cells.scene_rows(tables["scenes"]),
-        scene_columns=[column.title for column in scene_cells.scene_columns(tables["scenes"])],
+        scenes=scene_rows.scene_rows(tables["scenes"]),
+        scene_columns=[column.title for column in scene_rows.scene_columns(tables["scenes"])],
         scene_strips={view.scene: view for view in views if not view.fabric},
         films=films(page.pictures),
         scene_sentences=scene_sentences(tables["scenes"]),

@@ -1,1 +1,5 @@
-"""Records condensed into tables and sentences: summary, front, trade-off, cells, wording."""
+"""Records condensed into tables and sentences.
+
+summary (a row a method), tradeoff and pareto_front, equal_time, compare, method_choice; rows of the page's tables
+(method_rows, scene_rows, truth_rows, number_format); its sentences (headline, sentences, caveats, machine_load).
+"""

@@ -16,7 +16,7 @@ import pandas as pd
 
 from reports.error import ratio
 from reports.record import TRUTH, Metric, Record, to_table
-from reports.tables.front import front
+from reports.tables.pareto_front import front
 
 BASELINE: Final = ("point_sampled", "k = 2")
 """Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 
 from reports.record import TRUTH
-from reports.tables.front import front
+from reports.tables.pareto_front import front
 
 LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 """Errors that the page names the cheapest method for."""

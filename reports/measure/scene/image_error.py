@@ -1,24 +1,17 @@
-"""How far a method's picture is from the truth's, by numbers, to an eye, and how much of it is noise of the truth.
+"""Errors of one picture against the truth's, with intervals and the noise floor of the truth.
 
-Pictures are linear RGB. m is the method's value, t the truth's, s its standard error, <.> the mean over the lit pixels
-(the mask) and the channels. Outside the mask both pictures are set to one grey, the median luminance of the truth's lit
-pixels: nothing there enters, not even by the windows of SSIM and FLIP, and it shifts no exposure of HDR-FLIP.
+m is the method's value, t the truth's, s its standard error, all linear RGB, <.> the mean over the lit pixels (the
+mask) and the channels.
 
 linear light    MSE and relative MSE as in `reports.error`, noise subtracted. Components: `light_errors`.
-display light   L = min(max(exposure m, 0), 1), and its sRGB encoding E, the codes of the picture on the page.
-PSNR            10 log10(1 / <(E_m - E_t)^2>) in dB: peak 1, which is display white. Infinite where pictures are equal.
-SSIM            mean of the map of structural similarity of E, Gaussian window, one channel at a time, range 1, at the
-                picture's edge continued by reflection [Wang2004SSIM], scikit-image. 1 where equal.
-FLIP, LDR       mean of the error map of E at a number of pixels per degree [Andersson2020FLIP], NVIDIA's code. 0 to 1.
-FLIP, HDR       the same for linear values >= 0 over the exposures that the truth's median and maximum ask for
-                [Andersson2021HDRFLIP]. It does not depend on the unit of light.
-Delta E         mean CIEDE2000 of L (`weaves.colour.delta_e`).
+display light   PSNR, SSIM, FLIP, HDR-FLIP and CIEDE2000, means of the maps of `reports.measure.scene.flip_ssim`. PSNR
+                is infinite where pictures are equal.
 
 Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
 subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel (option
-`floor_channels`), fixed seed: about what a perfect method would score. Intervals are 95 % percentile bootstraps over
-square blocks of pixels, since neighbours err alike (`reports.measure.block_bootstrap`); they say how much the choice of
-pixels matters, not the noise floor.
+`floor_channels`), fixed seed: about the score of a perfect method. Intervals are 95 % percentile bootstraps over
+square blocks of pixels, since errors of neighbours are correlated (`reports.measure.block_bootstrap`); they say how
+much the choice of pixels matters, not the noise floor.
 """
 
 from __future__ import annotations
@@ -26,18 +19,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-import flip_evaluator
 import numpy as np
 import numpy.typing as npt
-from skimage.metrics import structural_similarity
 
 from reports.error import Error, relative_squared_error, relative_weight, squared_error
 from reports.measure.block_bootstrap import block_interval, blocks
+from reports.measure.scene.flip_ssim import perceived_maps
 from reports.options import ImageOptions
 from reports.record import Metric, Record
-from weaves.colour import LUMINANCE, delta_e, encoded
 from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
@@ -125,7 +116,7 @@ def image_errors(
     if t.shape[2] != 3 or min(lit.shape) < window:
         raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
     mse, relative = light_errors(m, t, s, lit, options)
-    maps = _perceived(m, t, lit, options)
+    maps = perceived_maps(m, t, lit, options)
     floors = floor or noise_floor(t, s, lit, options)
     perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
     return ImageErrors(mse, relative, perceived, maps, lit)
@@ -139,7 +130,7 @@ def noise_floor(
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
     channels = 1 if options.floor_channels == "together" else 3
     noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], channels))
-    maps = _perceived(noised, t, lit, options)
+    maps = perceived_maps(noised, t, lit, options)
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
@@ -166,38 +157,6 @@ def light_errors(
         for error, (spread, low, high) in zip(errors, spreads, strict=True)
     )
     return mse, relative
-
-
-def _perceived(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
-    """Return the maps of what an eye sees, (H, W); `square` is that of PSNR."""
-    grey = float(np.median(truth[lit] @ LUMINANCE))
-    picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
-    light, light_truth = (np.clip(options.exposure * values, 0.0, 1.0) for values in (picture, truth))
-    shown, shown_truth = encoded(light), encoded(light_truth)
-    window = {"gaussian_weights": True, "sigma": options.ssim_sigma, "use_sample_covariance": False}
-    compare: Any = structural_similarity  # has no types
-    similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
-    # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
-    unit = 1.0 / (truth @ LUMINANCE).max()
-    return {
-        "square": ((shown - shown_truth) ** 2).mean(axis=-1),
-        "ssim": similarity.mean(axis=-1),
-        "flip_ldr": _flip(shown, shown_truth, "LDR", options),
-        "flip_hdr": _flip(np.maximum(unit * picture, 0.0), unit * truth, "HDR", options),
-        "delta_e": delta_e(light, light_truth),
-    }
-
-
-def _flip(picture: Floats, truth: Floats, kind: str, options: ImageOptions) -> Floats:
-    """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
-    values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
-    parameters: dict[str, Any] = {"ppd": options.pixels_per_degree}
-    if kind == "HDR":
-        parameters["tonemapper"] = options.tone_mapper
-    errors, _, _ = flip_evaluator.evaluate(
-        *values, kind, applyMagma=False, computeMeanError=False, parameters=parameters
-    )
-    return np.asarray(errors[..., 0], np.float64)
 
 
 def _measure(metric: Metric, maps: dict[str, Floats], floor: float, lit: Mask, o: ImageOptions) -> Measure:

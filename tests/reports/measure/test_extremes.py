@@ -27,7 +27,7 @@ from reports.measure.extremes import (
 )
 from reports.options import EXTREME_PRECISIONS
 from reports.record import Record
-from reports.tables.cells import EXTREMES, extreme_rows
+from reports.tables.method_rows import EXTREMES, extreme_rows
 from weaves.fabric import load_fabric
 
 LINING = load_fabric("polyester_lining")

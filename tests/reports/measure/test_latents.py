@@ -12,7 +12,7 @@ from pipeline.shards.queries import QueryOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.measure.latents import SHARES, Blends, Pair, between, measure_edits, measure_paths, pairs
-from reports.tables import cells
+from reports.tables import method_rows
 from reports.tables.summary import path_table
 from weaves.fabric import Fabric, load_fabric
 
@@ -117,15 +117,15 @@ def test_a_network_is_measured_and_shown():
 
     table = path_table(records)
     np.testing.assert_array_equal(table["error"], np.concatenate([blended, anew]))
-    rows = cells.path_rows(table)
+    rows = method_rows.path_rows(table)
     assert [row[:3] for row in rows] == [
         ["woven", "denim → yarns of satin 8", "latents blended"],
         ["woven", "denim → yarns of satin 8", "encoded anew"],
     ]
     assert all(len(row) == 3 + len(SHARES) for row in rows)
-    edits = cells.edit_rows(measure_edits(method, pair.first, repeats=3))
+    edits = method_rows.edit_rows(measure_edits(method, pair.first, repeats=3))
     assert [row[1] for row in edits] == ["a yarn", "a colour"]
-    assert cells.path_rows(path_table([])) == cells.edit_rows([]) == []
+    assert method_rows.path_rows(path_table([])) == method_rows.edit_rows([]) == []
 
 
 def test_pairs_say_what_differs():

@@ -6,9 +6,10 @@ import pytest
 
 from pipeline.models.catalogue import CLASSES
 from reports.page import figures
-from reports.page.style import DARK, LIGHT, MARKERS, render
+from reports.page.colours import DARK, LIGHT, MARKERS
+from reports.page.plot_style import render
 from reports.tables import summary
-from reports.tables.numbers import NAMES, display
+from reports.tables.number_format import NAMES, display
 
 PLOTS = ["errors", "aliasing", "spectra", "timing"]
 

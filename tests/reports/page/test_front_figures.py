@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 
 from reports.page import front_figures
-from reports.page.style import DARK, LIGHT, render
+from reports.page.colours import DARK, LIGHT
+from reports.page.plot_style import render
 from reports.tables import summary
 from reports.tables.tradeoff import tradeoff_table
 

@@ -12,12 +12,12 @@ from reports.images.exr import write_exr
 from reports.images.film import frame_layers
 from reports.measure.latents import SHARES
 from reports.measure.pictures import write_picture
-from reports.measure.scene.differences import difference_maps
+from reports.measure.scene.difference_maps import difference_maps
 from reports.measure.scene.image_error import image_errors
 from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.filmstrip import GAP
 from reports.page.page import ModelNote, PageInput, write_page
-from reports.page.strips import PictureFile
+from reports.page.picture_strips import PictureFile
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.truth import accuracy, bias, effort
 from reports.truth.finding import judge, to_records
@@ -138,7 +138,7 @@ def test_the_front_is_named_and_shown(written):
 
 
 def test_methods_that_learn_nothing_make_no_headline(page_input, tmp_path):
-    note = ModelNote("woven", "a rule", kind="quadrature")
+    note = ModelNote("woven", "a rule", kind="gauss_nodes")
     models = [note, *page_input.models[1:]]
     page = Page(write_page(tmp_path, replace(page_input, models=models)).read_text(encoding="utf-8"))
     assert "Woven reaches" not in page.words and "NeuMIP reaches" in page.words

@@ -1,7 +1,7 @@
 """Every column of the tables of scenes and of errors is defined on the page."""
 
 from reports.tables.definitions import DEFINITIONS
-from reports.tables.scene_cells import COLUMNS
+from reports.tables.scene_rows import COLUMNS
 
 
 def test_every_column_of_a_scene_is_defined():

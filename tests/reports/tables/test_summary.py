@@ -3,7 +3,7 @@ import math
 import pytest
 
 from reports.record import Record
-from reports.tables.cells import timing_columns, timing_rows
+from reports.tables.method_rows import timing_columns, timing_rows
 from reports.tables.summary import (
     aliasing_table,
     error_table,

@@ -8,7 +8,7 @@ questions in classes of size,
 and so a scene that no benchmark has rendered has a front of its own. Questions that a method does not know fall back to
 quadrature, whose error is taken as it is measured on the scene's own questions. What a method errs because it takes
 ellipses for round and curved cloth for flat is not in this prediction; where a scene was rendered by the benchmark
-(`reports.measure.scene.errors`), what was measured there takes its place.
+(`reports.measure.scene.scene_errors`), what was measured there takes its place.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import pandas as pd
 
 from reports.measure.by_size import WHOLE
-from reports.tables.front import front
+from reports.tables.pareto_front import front
 from reports.tables.summary import rows
 
 COLUMNS = ("method", "setting", "error", "ms", "fallback", "known")

@@ -12,7 +12,8 @@ import pandas as pd
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
 from reports.record import TRUTH, Record
-from reports.tables.numbers import (
+from reports.tables.headline import learnt
+from reports.tables.number_format import (
     NO_BREAK,
     NONE,
     display,
@@ -29,7 +30,6 @@ from reports.tables.numbers import (
     times,
 )
 from reports.tables.summary import BASELINE, COMPONENTS, rows
-from reports.tables.wording import learnt
 
 Row = dict[str, Any]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from reports.record import Record
-from reports.tables.numbers import NONE, missing, percent, plain, times
+from reports.tables.number_format import NONE, missing, percent, plain, times
 from reports.tables.summary import COMPONENTS
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias

@@ -24,10 +24,10 @@ from reports.images.film import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.differences import difference_maps
+from reports.measure.scene.difference_maps import difference_maps
 from reports.measure.scene.fovvideovdp import fovvideovdp_records
-from reports.measure.scene.frames import Shot
 from reports.measure.scene.image_error import image_errors, noise_floor
+from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
 from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
 from reports.record import TRUTH, Metric, Provenance, Record
@@ -84,7 +84,7 @@ def measure_scene(
         How pictures are compared, and the seed of random methods.
     pictures : mapping
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
-        of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.differences`).
+        of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.difference_maps`).
     """
     image, reference = options.scenes.image, _reference(shot, options.scenes.image)
     truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]

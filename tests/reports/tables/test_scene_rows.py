@@ -3,7 +3,7 @@ import math
 import pytest
 
 from reports.record import Record
-from reports.tables.scene_cells import scene_columns, scene_rows
+from reports.tables.scene_rows import scene_columns, scene_rows
 from reports.tables.summary import scene_table
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from reports.measure.timing import Contender, time_side_by_side
 from reports.record import Record
-from reports.tables.waiting import QUIET, busy, waited, waiting
+from reports.tables.machine_load import QUIET, busy, waited, waiting
 from tests.reports.measure.test_timing import questions
 
 

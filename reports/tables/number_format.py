@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 NONE = "–"
@@ -101,6 +101,12 @@ def size(value: float) -> str:
 def interval(low: float, high: float) -> str:
     """Return both ends with two digits: ``1.2 … 3.4``."""
     return NONE if missing(low) else " … ".join(f"{v:.2g}" if v < 100 else f"{v:,.0f}" for v in (low, high))
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return words as ``a, b and c``; at least one."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def missing(value: float | None) -> bool:

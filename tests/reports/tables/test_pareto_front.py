@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.tables.front import front
+from reports.tables.pareto_front import front
 
 # Few values, so that ties are frequent; and some that were not measured.
 NUMBERS = st.sampled_from([0.0, 1.0, 2.0, 3.0, 5.0, 8.0]) | st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf])

@@ -11,7 +11,7 @@ from typing import Final
 import pandas as pd
 
 from reports.record import TRUTH
-from reports.tables.numbers import beyond_noise, display, scientific
+from reports.tables.number_format import beyond_noise, display, scientific
 from reports.tables.summary import BASELINE, rows
 
 MOST_FILMS: Final = 12

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import pandas as pd
 
-from reports.tables.cells import Row, groups, row_of
-from reports.tables.numbers import (
+from reports.tables.method_rows import Row, groups, row_of
+from reports.tables.number_format import (
     NO_BREAK,
     NONE,
     beyond_noise,

@@ -1,48 +1,8 @@
 import math
 
 import pandas as pd
-import pytest
 
-from pipeline.scenes.options import ViewOptions
-from reports.options import BenchOptions
-from reports.record import Record
-from reports.tables.wording import (
-    beaten,
-    caveats,
-    cheapest_sentences,
-    headline,
-    learnt,
-    least_flicker_sentences,
-    scene_sentences,
-    unseen_by_eye,
-)
-
-
-def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8):
-    errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio, "zero_answers": 0.0}
-    timing = {"method": "woven", "setting": "", "time_ratio": time_ratio}
-    return pd.DataFrame([errors]), pd.DataFrame([timing])
-
-
-def test_headline_admits_a_defeat():
-    text = headline("woven", "", *tables(0.5, 1.66), paper=False)
-    assert text == (
-        "Woven reaches 2.0× higher MSE than point sampling at 2 points on the 8 seen fabrics, at 1.7× its time."
-    )
-
-
-def test_headline_says_only_what_was_measured():
-    assert headline("woven", "", *tables(math.nan, 1.0)) == ""
-    assert "its time" not in headline("woven", "", *tables(3.0), paper=False)
-    assert "on the unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
-
-
-def test_learnt_leaves_points_out():
-    errors = pd.DataFrame(
-        {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
-    )
-    assert learnt(errors) == [("woven", "")]
-    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1")]
+from reports.tables.sentences import beaten, cheapest_sentences, least_flicker_sentences, scene_sentences
 
 
 def test_the_cheapest_is_said_of_what_was_measured():
@@ -64,14 +24,6 @@ def test_the_cheapest_is_said_of_what_was_measured():
     assert unseen.endswith("for 50 %, 10 %, 5 % and 2 % the cheapest is woven (4,000 ns); 1 % is reached by none.")
     assert beaten(table) == {"seen": ["woven"], "unseen": []}
     assert cheapest_sentences(table[:0]) == []
-
-
-@pytest.mark.parametrize("footprint", ["major", "geometric_mean"])
-def test_caveats_name_the_footprint(footprint):
-    options = BenchOptions(view=ViewOptions(footprint=footprint))
-    text = " ".join(caveats(options, [], tables(1.0)[0]))
-    assert ("longer axis" in text) == (footprint == "major")
-    assert "NeuMIP" not in text
 
 
 def test_the_cheapest_within_a_flicker_is_said():
@@ -115,11 +67,3 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
     ]
     assert found["cellar"] == []  # nobody was timed there
     assert scene_sentences(SCENES[:0]) == {}
-
-
-def test_a_measure_that_was_not_installed_is_said_where_scenes_were_measured():
-    frame = Record(method="woven", scene="attic", metric="frame_time", value=20.0)
-    (text,) = unseen_by_eye([frame])
-    assert "pyfvvdp was not installed" in text
-    assert unseen_by_eye([]) == []
-    assert unseen_by_eye([frame, frame.of("fovvideovdp", 9.0, 4, unit="JOD")]) == []

@@ -3,7 +3,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.page.strips import MOST_FILMS, PictureFile, films, strips
+from reports.page.picture_strips import MOST_FILMS, PictureFile, films, strips
 
 
 def file(method, setting="", scene="attic", fabric=""):

@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from reports.tables.choice import MEASURED, PREDICTED, cheapest, nearest, predictions, with_measured
+from reports.tables.method_choice import MEASURED, PREDICTED, cheapest, nearest, predictions, with_measured
 
 SIZES = pd.DataFrame(
     [

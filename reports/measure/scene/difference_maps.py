@@ -1,7 +1,7 @@
 """Where a picture differs from the truth's: maps as layers of its OpenEXR.
 
 Channels: `lit` (1 where a pixel counts), `relative.R`, `.G`, `.B` and `.Y` (signed, as shares), `flip_ldr`, `flip_hdr`,
-`delta_e`, `ssim`, `square`; `reports.measure.scene.image_error` defines them.
+`delta_e`, `ssim`, `square` (`reports.measure.scene.flip_ssim`).
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from pipeline.truth.options import TruthOptions
 from reports.images.exr import read_exr
 from reports.images.film import film
 from reports.measure.scene import errors as scene_bench
-from reports.measure.scene.errors import measure_scene, time_scene, write_truth
-from reports.measure.scene.frames import read_shot, shoot
+from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
+from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.timing import Timing
 from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
 from reports.tables.summary import SCENE_INTERVALS, scene_table

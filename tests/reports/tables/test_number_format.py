@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.tables.numbers import (
+from reports.tables.number_format import (
     beyond_noise,
     fixed,
     percent,

@@ -1,0 +1,81 @@
+"""Caveats of a page: limits of its numbers, and measurements that are missing with the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from pipeline.scenes.options import ViewOptions
+from reports.images.tiles import DIFFERENCE_RANGE, EXPOSURE
+from reports.options import BenchOptions
+from reports.record import Record
+from reports.tables.number_format import display, listed
+from reports.tables.summary import of_baseline
+
+
+def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataFrame) -> list[str]:
+    """Return what a reader must know before quoting a number."""
+    view = options.view
+    notes = [
+        "The conditions of the published table (data set, ranges, training, footprints) are not known. Our ratios are "
+        "the paper's comparison repeated on this project's own ground truth, not a reproduction of its numbers.",
+        "The truth is that of the model: yarns as bent, twisted cylinders, one layer of fibres scattering once, plus a "
+        "diffuse lobe; reflection only. It is not a measurement of real cloth.",
+        "Times are those of this machine and of code called from Python, a batch of queries at a time; the paper's are "
+        "of a GPU renderer. Only ratios within one column mean anything.",
+        "One training, one seed: how much another training would differ was not measured.",
+        _footprint_note(view),
+        f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
+        f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
+        f"in full colour from ±{DIFFERENCE_RANGE:.0%} of the truth's mean.",
+    ]
+    black = errors[of_baseline(errors) & (errors["zero_answers"] > 0)] if len(errors) else errors
+    if len(black):
+        share = float(black["zero_answers"].mean())
+        notes.append(
+            f"Point sampling at 2 points answers 0 for {share:.0%} of the queries: all its points are hidden from the "
+            "viewer, and the formula gives no value there. Drawing on until a point is seen would cost time and lower "
+            "its error."
+        )
+    if per_material:
+        names = " and ".join(display(name) for name in per_material)
+        notes.append(
+            f"{names} learns every fabric by itself, so no fabric is unseen to it; its rows stand for comparison."
+        )
+    return notes
+
+
+def lacking(records: Sequence[Record]) -> list[str]:
+    """Return a sentence for each way of running methods that the machine lacked, with the reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for record in records:
+        if record.metric == "not_run":
+            reasons.setdefault((record.setting, record.note), []).append(display(record.method))
+    return [
+        f"{listed(list(dict.fromkeys(methods)))} by {runtime} {'was' if len(set(methods)) == 1 else 'were'} "
+        f"not measured ({reason.rstrip('.')})."
+        for (runtime, reason), methods in reasons.items()
+    ]
+
+
+def unseen_by_eye(records: Sequence[Record]) -> list[str]:
+    """Return a sentence if scenes were measured without FovVideoVDP."""
+    found = {record.metric for record in records}
+    if "frame_time" not in found or "fovvideovdp" in found:
+        return []
+    return [
+        "How visible the differences in the frames of a scene are was not scored by FovVideoVDP: pyfvvdp was not "
+        "installed when they were measured (pip install pyfvvdp adds it; it may not be used commercially)."
+    ]
+
+
+def _footprint_note(view: ViewOptions) -> str:
+    axis = {
+        "major": "its longer axis: it blurs towards the horizon, and the truth itself does not alias",
+        "geometric_mean": "the geometric mean of its axes: the truth is sharper, and shows moiré of its own",
+    }[view.footprint]
+    return (
+        "Footprints are round, as in the papers. A pixel of the pictures is an ellipse on the cloth; the round one "
+        f"takes {axis}. Views beyond {view.largest_angle:g}° to the normal are left out."
+    )

@@ -1,0 +1,50 @@
+"""Headline sentences of a page: the paper's comparison with the numbers measured here.
+
+A sentence is made only where both of its numbers were measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import pandas as pd
+
+from reports.record import TRUTH
+from reports.tables.number_format import display
+from reports.tables.summary import BASELINE, PAPER, rows
+
+
+def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
+    """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print."""
+    found = errors[(errors["method"] == method) & (errors["setting"] == setting) & errors["ratio"].notna()]
+    parts = [(_comparison(row.ratio), _fabrics(row.fabrics, row.role)) for row in rows(found)]
+    if not parts:
+        return ""
+    (first, where), *others = parts
+    more = "".join(f" and {ratio} on {fabrics}" for ratio, fabrics in others)
+    times = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
+    cost = f", at {times.iloc[0]:.2g}× its time" if len(times) and math.isfinite(times.iloc[0]) else ""
+    lower, faster = PAPER
+    name = display(method, setting)
+    said = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
+    return f"{said}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{said}."
+
+
+def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
+    """Return the first setting of each method that is neither the truth nor among those that nothing is trained for."""
+    first = errors.drop_duplicates("method")
+    keys = zip(first["method"], first["setting"], strict=True)
+    return [key for key in keys if key[0] not in untrained and key[0] != TRUTH]
+
+
+def _comparison(ratio: float) -> str:
+    return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}" if value < 100 else f"{value:,.0f}"
+
+
+def _fabrics(count: int, role: str) -> str:
+    return f"the {role} fabric" if count == 1 else f"the {count} {role} fabrics"
