@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from reports.record import Machine, Record
 from reports.tables.markdown import markdown_table
-from reports.tables.numbers import NONE, missing, times
+from reports.tables.number_format import NONE, missing, times
 from reports.tables.summary import BASELINE, PAPER, error_table, of_baseline, rows, summary_table
 from weaves.errors import BadInput
 

@@ -9,10 +9,11 @@ from typing import Any
 import pandas as pd
 
 from reports.record import TRUTH, Machine, Record
-from reports.tables import cells, scene_cells, summary, truth_cells
+from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.equal_time import equal_time_table, size_table
+from reports.tables.headline import headline
 from reports.tables.markdown import markdown_table
-from reports.tables.numbers import (
+from reports.tables.number_format import (
     NONE,
     display,
     interval,
@@ -25,7 +26,7 @@ from reports.tables.numbers import (
     times,
 )
 from reports.tables.readme import three_decimals
-from reports.tables.wording import equal_time_sentences, headline
+from reports.tables.sentences import equal_time_sentences
 from reports.truth import accuracy, bias, effort, sampling
 from weaves.errors import BadInput
 
@@ -102,10 +103,10 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
         yield "Median time of one query on one thread, with its quartiles; × time: over that of two random points."
         lines = [(_name(row), *_time_cells(row)) for row in summary.rows(timing)]
         yield markdown_table(("method", "ns a query", "quartiles", "× time", "bytes stored"), lines)
-    energy = cells.energy_rows(summary.energy_table(records), errors, timing)
+    energy = method_rows.energy_rows(summary.energy_table(records), errors, timing)
     if energy:
         yield "## Energy: largest directional albedo over all fabrics"
-        yield _grouped(cells.ENERGY, energy)
+        yield _grouped(method_rows.ENERGY, energy)
     yield from _at_equal_time(records)
 
 
@@ -120,7 +121,7 @@ def _at_equal_time(records: Sequence[Record]) -> Iterator[str]:
         "footprint in yarn spacings: error of the method · error of the rival over it. Below 1× the rival errs less."
     )
     yield "\n".join(f"- {sentence}" for sentence in equal_time_sentences(table))
-    for measure, found in cells.equal_time_rows(table).items():
+    for measure, found in method_rows.equal_time_rows(table).items():
         yield f"### {measure.capitalize()}"
         lines = [(row["label"], row["rival"], *(cell["text"] for cell in row["cells"])) for row in found["rows"]]
         yield markdown_table(("method", "rival", *found["sizes"]), lines)
@@ -131,10 +132,10 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
     table = summary.scene_table(records)
     if table.empty:
         return
-    columns = [column.title for column in scene_cells.scene_columns(table)]
+    columns = [column.title for column in scene_rows.scene_columns(table)]
     yield "## Scenes"
     yield "The last row is what the noise of the truth alone scores."
-    for scene, found in scene_cells.scene_rows(table).items():
+    for scene, found in scene_rows.scene_rows(table).items():
         yield f"### {plain(scene).capitalize()}"
         lines = [(row["label"], *_texts(row["cells"])) for group in found["groups"] for row in group["rows"]]
         yield markdown_table(("method", *columns), [*lines, ("noise of the truth", *found["noise"])])
@@ -142,26 +143,26 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
 
 def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     """Yield what `bench truth` and `bench sampler` measured, if they were run."""
-    rates, accuracies = truth_cells.rate_rows(records), accuracy.from_records(records)
+    rates, accuracies = truth_rows.rate_rows(records), accuracy.from_records(records)
     biases, efforts, samplers = bias.from_records(records), effort.from_records(records), sampling.from_records(records)
     if rates or accuracies or biases or efforts:
         yield "## The ground truth (`twillight bench truth`)"
     if rates:
         yield "### Speed"
         yield markdown_table(("what", "fabric", "rate", "note"), rates)
-    for fabric, lines in truth_cells.accuracy_rows(accuracies).items():
+    for fabric, lines in truth_rows.accuracy_rows(accuracies).items():
         yield f"### Accuracy on {plain(fabric)}"
-        yield markdown_table(("estimator", *truth_cells.ACCURACY), lines)
+        yield markdown_table(("estimator", *truth_rows.ACCURACY), lines)
     if biases:
         yield "### Bias of tabulated answers: mean of each component against sampling"
-        yield markdown_table(("fabric", *truth_cells.BIAS), truth_cells.bias_rows(biases))
+        yield markdown_table(("fabric", *truth_rows.BIAS), truth_rows.bias_rows(biases))
     if efforts:
         yield "### Where the time of `auto` goes"
-        yield markdown_table(("fabric", *truth_cells.EFFORT), truth_cells.effort_rows(efforts))
+        yield markdown_table(("fabric", *truth_rows.EFFORT), truth_rows.effort_rows(efforts))
     if samplers:
         yield "## Sampling directions (`twillight bench sampler`)"
         yield "How many times less variance than a cosine has, and the time of one direction."
-        yield markdown_table(("fabric", *truth_cells.SAMPLERS), truth_cells.sampler_rows(samplers))
+        yield markdown_table(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(samplers))
 
 
 def _methods(errors: pd.DataFrame) -> list[tuple[str, str]]:
