@@ -89,7 +89,7 @@ def test_bad_input_is_one_sentence(files, old, new, words):
 @pytest.mark.parametrize(
     ("names", "words"),
     [
-        (["spere"], ["bench.scenes.names.0 = 'spere'", "did you mean 'sphere'", "known: curtain, drape"]),
+        (["spere"], ["bench.scenes.names.0 = 'spere'", "did you mean 'sphere'", "known: curtain, dinner_table, drape"]),
         (["sphere", "attic.toml"], ["bench.scenes.names.1 = 'attic.toml'", "beside the recipe"]),
         (["sphere", "sphere"], ["bench.scenes.names.1 = 'sphere'", "must differ"]),
         (["own.toml"], ["own.toml", "unknown key"]),

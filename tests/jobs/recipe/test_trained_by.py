@@ -153,17 +153,17 @@ def test_what_is_trained_again(asks, old, new, retrained):
 
 
 def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, files):
-    files.recipe += '\n[bench.scenes]\nnames = ["curtain", "table"]\n'
+    files.recipe += '\n[bench.scenes]\nnames = ["curtain", "dinner_table"]\n'
     tasks = plan(asks())
     titles = {task.title: task for task in tasks if task.stage == "bench"}
     assert "curved on denim" in titles and "curved on own" in titles and "curved on twill_4_4" not in titles
     assert titles["curved on denim"].spec["models"] == ids(tasks, "train", "curved on denim")
-    assert "curved on the scene curtain" in titles and "curved on the scene table" not in titles
+    assert "curved on the scene curtain" in titles and "curved on the scene dinner_table" not in titles
     assert [fabric for fabric, *_ in titles["extremes of curved"].spec["fabrics"]] == ["denim"]
     notes = {note["name"]: note["about"] for note in tasks[-1].setting["models"]}
     assert "trained by the recipe bent, on queries of its own" in notes["curved"]
-    assert notes["curved"].endswith("left out on twill_4_4, in the scene table: it was not trained on that cloth")
-    assert "left out in the scene curtain, in the scene table: " in notes["neumip"]
+    assert notes["curved"].endswith("left out on twill_4_4, in the scene dinner_table: it was not trained on that cloth")
+    assert "left out in the scene curtain, in the scene dinner_table: " in notes["neumip"]
     assert "left out" not in notes["woven"] + notes["point_sampled"]
     assert set(ids(tasks, "train", "curved")) < set(titles["timing of all methods"].needs)
 
@@ -263,7 +263,7 @@ def test_ways_to_run_are_nothing_to_methods_without_a_network(files):
         ('model = "curved"\nruntimes = ["onx"]\nrecipe = "bent.toml"', ["models.3.runtimes.0 = 'onx'"]),
         ('model = "neumip"\nrecipe = "bent.toml"', ["models = 'neumip'", "names must differ"]),
         ('model = "curved"\nrecipe = "tiny.toml"', ["models.3.recipe", "wait for one another: tiny → tiny"]),
-        ('model = "sums"\nruntimes = []', ["models.3", "no network: leave runtimes out"]),
+        ('model = "soft_nodes"\nruntimes = []', ["models.3", "no network: leave runtimes out"]),
     ],
 )
 def test_bad_input_is_one_sentence(asks, entry, words):
