@@ -1,0 +1,155 @@
+"""What the documents say of the tree: lengths, numbers, paths, commands, examples."""
+
+import importlib.util
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from jobs.cli import app
+from jobs.recipe.load import recipe_names
+from jobs.verbs.bench import BENCHES
+from pipeline.models.catalogue import CLASSES
+from pipeline.scenes.shipped import SHIPPED
+from reports.tables.markdown import block, with_block
+from reports.tables.readme import BLOCK
+from weaves.fabric import PRESETS, load_fabric
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("weaves", "pipeline", "reports", "jobs")
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+DOCUMENTS += [path for room in ROOMS for path in sorted((ROOT / room).rglob("README.md"))]
+
+LONGEST_README = 7500
+"""Characters: one screen and a half."""
+
+NAMES_WITH_DIGITS = ("Python 3.11", "Mitsuba 3")
+
+VERBS = {name for name in app.resolved_commands() if not name.startswith("-")}
+
+OF_RECIPES = {"plan", "generate", "train", "bench", "report", "run", "status", "results", "savings"}
+"""Verbs whose first argument is a recipe."""
+
+
+def text_of(path):
+    return path.read_text(encoding="utf-8")
+
+
+def code_of(path):
+    """Return every span of code, and every line of a code block, of a document."""
+    text = text_of(path)
+    fenced = re.findall(r"^```\w*\n(.*?)^```$", text, re.M | re.S)
+    rest = re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S)
+    indented = re.findall(r"^    (.+)$", rest, re.M)
+    lines = [line for code in fenced for line in code.splitlines()]
+    return [*re.findall(r"`([^`\n]+)`", rest), *indented, *lines]
+
+
+def commands_of(path, program):
+    """Return the arguments of every call of a program that a document shows."""
+    calls = [code.removeprefix("$ ") for code in code_of(path)]
+    return [shlex.split(call, comments=True)[1:] for call in calls if call.startswith(f"{program} ")]
+
+
+def by_name(path):
+    return str(path.relative_to(ROOT))
+
+
+def test_the_readme_is_one_screen_and_a_half():
+    assert len(text_of(ROOT / "README.md")) <= LONGEST_README
+
+
+def test_no_number_of_the_readme_is_typed_by_hand():
+    prose = with_block(text_of(ROOT / "README.md"), BLOCK, "", "README.md")
+    for pattern in (r"<!--.*?-->", r"^    .+$", r"`[^`\n]+`", r"\]\([^)]*\)"):
+        prose = re.sub(pattern, "", prose, flags=re.M)
+    for name in NAMES_WITH_DIGITS:
+        prose = prose.replace(name, "")
+    assert not re.findall(r".*\d.*", prose)
+
+
+def test_the_readme_shows_the_recipe_quick():
+    assert "Recipe `quick`" in block(text_of(ROOT / "README.md"), BLOCK, "README.md")
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+def test_links_and_paths_exist(path):
+    links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text_of(path))]
+    wrong = [link for link in links if "://" not in link and not (path.parent / link).exists()]
+    assert not wrong, f"links that lead nowhere: {wrong}"
+    paths = [code for code in code_of(path) if re.fullmatch(rf"({'|'.join(ROOMS)}|tests)/[\w./-]+", code)]
+    wrong = [name for name in paths if not (ROOT / name).exists()]
+    assert not wrong, f"files that do not exist: {wrong}"
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+def test_modules_exist(path):
+    named = {code for code in code_of(path) if re.fullmatch(rf"({'|'.join(ROOMS)})(\.\w+)+", code)}
+    files = {name for name in named if name.rpartition(".")[2] in ("py", "toml", "md")}
+    wrong = [name for name in sorted(named - files) if not importlib.util.find_spec(name)]
+    assert not wrong, f"modules that do not exist: {wrong}"
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+def test_commands_are_understood(path):
+    for tokens in commands_of(path, "twillight"):
+        if len(tokens) == 1:
+            assert tokens[0] in VERBS, f"{tokens}: no such verb"
+            continue
+        app.parse_args(tokens, exit_on_error=False, print_error=False)
+        if tokens[0] in OF_RECIPES and not tokens[1].isupper() and not tokens[1].endswith(".toml"):
+            assert tokens[1] in {*recipe_names(), *BENCHES}, f"{tokens}: no such recipe"
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+def test_targets_of_make_exist(path):
+    (phony,) = re.findall(r"^\.PHONY: (.+)$", text_of(ROOT / "Makefile"), re.M)
+    asked = {tokens[0] for tokens in commands_of(path, "make")}
+    assert asked - {"VERB"} <= set(phony.split())
+
+
+def test_every_verb_is_in_the_readme():
+    assert {tokens[0] for tokens in commands_of(ROOT / "README.md", "twillight")} == VERBS
+
+
+def test_every_room_of_work_has_a_readme():
+    rooms = ["weaves", *(f"pipeline/{name}" for name in ("truth", "shards", "models", "scenes")), "jobs", "reports"]
+    readme = text_of(ROOT / "README.md")
+    assert [room for room in rooms if f"({room}/README.md)" not in readme] == []
+
+
+def test_denim_is_the_example_of_weaves():
+    text = text_of(ROOT / "weaves" / "README.md")
+    drawn = [line.removeprefix("    ").rstrip() for line in re.findall(r"^    [·█].*$", text, re.M)]
+    assert drawn == [line.rstrip() for line in load_fabric("denim").weave.text().splitlines()]
+    (shown,) = re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)
+    preset = tomllib.loads(text_of(PRESETS / "denim.toml"))
+    assert tomllib.loads(shown) == {key: value for key, value in preset.items() if key != "source"}
+
+
+def test_models_are_listed_with_what_they_know():
+    text = text_of(ROOT / "pipeline" / "models" / "README.md")
+    known = {}
+    for names, *cells in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| (.+?) \| (.+?) \| (.+?) \|$", text, re.M):
+        kinds = {kind for kind, cell in zip(("behind", "stretch", "curvature"), cells, strict=True) if cell == "yes"}
+        known |= dict.fromkeys(re.findall(r"`(\w+)`", names), kinds)
+    assert known == {name: set(options().kinds) for name, options in CLASSES.items()}
+
+
+def test_recipes_and_scenes_are_listed():
+    listed = re.findall(r"^\| (`[^|]+`) \|", text_of(ROOT / "jobs" / "README.md"), re.M)
+    named = {name for cell in listed for name in re.findall(r"`(\w+)`", cell)}
+    extra = set(re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md")))
+    assert set(recipe_names()) <= named | extra
+    scenes = re.findall(r"^\| `(\w+)` \|", text_of(ROOT / "pipeline" / "scenes" / "README.md"), re.M)
+    assert set(scenes) == set(SHIPPED)
+
+
+def test_there_is_one_version():
+    project = tomllib.loads(text_of(ROOT / "pyproject.toml"))["project"]
+    (newest, *_) = re.findall(r"^## (\d+\.\d+\.\d+)", text_of(ROOT / "CHANGELOG.md"), re.M)
+    assert project["version"] == newest
+    least = project["requires-python"].removeprefix(">=")
+    assert f"Python {least} or newer" in text_of(ROOT / "README.md")
