@@ -1,4 +1,4 @@
-"""Colours and marks of methods on a light and a dark page.
+"""Colours and marks of a page, light and dark: of its text, of its grounds and of every method.
 
 A method is known by its name in the recipe: two models of one kind are two methods. The names that models have by
 default keep their colours on every page; others take the spare ones in the order of the page (`Scheme.naming`).
@@ -9,23 +9,33 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, Literal
 
+from reports.page.contrast import readable
 from reports.record import TRUTH
 
-MARKERS: Final = {
+Marker = str | tuple[int, Literal[0, 1, 2], int]
+"""Of matplotlib: a name, or (number of corners, 0 for a polygon and 1 for a star, angle)."""
+
+MARKERS: Final[Mapping[str, Marker]] = {
+    TRUTH: "X",
+    "woven": "o",
+    "neumip": "v",
+    "selvage": "*",
+    "curved": "<",
+    "curved_grazing": "d",
+    "unified_btf": "h",
+    "btf_autoencoder": "p",
     "point_sampled": "s",
     "r2_points": "D",
+    "prefiltered": "P",
     "gauss_nodes": "^",
     "soft_nodes": ">",
-    "prefiltered": "P",
-    "unified_btf": "h",
-    "btf_autoencoder": "H",
 }
-"""Marks of methods in plots; the others are round."""
+"""Marks of methods in plots, no two alike: no method is known by its colour alone."""
 
-MARKS: Final = ("o", "s", "D", "^", "v")
-"""Marks of methods that are not known, one after the other."""
+MARKS: Final[tuple[Marker, ...]] = ((4, 1, 0), (5, 0, 180), (3, 1, 0), (6, 1, 0), "H")
+"""Marks of methods that are not known, one after the other; their number and that of spare colours share no factor."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +47,17 @@ class Scheme:
     muted: str
     line: str
     ground: str
+    card: str
+    """Ground of tables and cards."""
+    tint: str
+    """Ground of the baseline's row."""
+    focus: str
+    """Outline of what the keyboard has reached."""
     methods: Mapping[str, str]
     others: tuple[str, ...]
-    marks: Mapping[str, str] = field(default_factory=dict)
+    marks: Mapping[str, Marker] = field(default_factory=dict)
 
-    def marker(self, method: str) -> str:
+    def marker(self, method: str) -> Marker:
         """Return a method's mark in plots."""
         return self.marks.get(method, "o")
 
@@ -51,38 +67,44 @@ class Scheme:
         spare = itertools.cycle(self.others)
         return {name: self.methods.get(name) or next(spare) for name in names}
 
+    def text(self, colour: str) -> str:
+        """Return a colour of text on `ground` that recalls `colour`."""
+        return readable(colour, self.ground, self.ink)
+
     def naming(self, methods: Iterable[str]) -> Scheme:
         """Return the scheme in which these names have their colours for good, whichever of them a plot shows."""
         names = list(dict.fromkeys(methods))
         strangers = [name for name in names if name not in self.methods]
-        # When the spare colours are through, they come again with the next mark.
-        marks = {name: MARKS[index // len(self.others) % len(MARKS)] for index, name in enumerate(strangers)}
+        marks = {name: MARKS[index % len(MARKS)] for index, name in enumerate(strangers)}
         return replace(self, methods={**self.methods, **self.colours(names)}, marks={**self.marks, **marks})
 
 
 LIGHT: Final = Scheme(
     name="light",
     ink="#23252b",
-    muted="#6b7080",
+    muted="#646978",
     line="#dcd8d0",
     ground="#fbfaf7",
+    card="#ffffff",
+    tint="#f1eee7",
+    focus="#2340b8",
     methods={
         TRUTH: "#23252b",
         "woven": "#3d55cc",
         "neumip": "#0b8f77",
-        "selvage": "#1f9ad6",
+        "selvage": "#1a86bd",
         "curved": "#5a7d1f",
-        "curved_grazing": "#9aa60f",
+        "curved_grazing": "#848f0c",
         "unified_btf": "#8a5a2b",
-        "btf_autoencoder": "#b98a5e",
+        "btf_autoencoder": "#a87947",
         "point_sampled": "#d9622b",
-        "r2_points": "#b8860b",
+        "r2_points": "#a67806",
         "prefiltered": "#6f7484",
         "gauss_nodes": "#8e44ad",
-        "soft_nodes": "#e05fb0",
+        "soft_nodes": "#d24fa2",
     },
     marks=MARKERS,
-    others=("#7a5cf0", "#148f4a", "#a3352b", "#0e7c9b", "#c07a00", "#9c4f86"),
+    others=("#7a5cf0", "#148f4a", "#a3352b", "#0e7c9b", "#b97400", "#9c4f86"),
 )
 DARK: Final = Scheme(
     name="dark",
@@ -90,6 +112,9 @@ DARK: Final = Scheme(
     muted="#9a9daa",
     line="#383b44",
     ground="#17181c",
+    card="#1f2126",
+    tint="#24262c",
+    focus="#a9b8ff",
     methods={
         TRUTH: "#ecebe6",
         "woven": "#8fa2ff",

@@ -1,9 +1,7 @@
-"""The plots of a page, one function each: `plot(scheme, data) -> Figure`, drawn by `reports.page.plot_style.render`.
+"""Plots of errors, aliasing, spectra and times: `plot(scheme, data) -> Figure`, for `reports.page.plot_style.render`.
 
-Those of fronts, a fault against a cost, are in `reports.page.front_figures`.
-
-A method has one colour and one mark everywhere; its knobs stand under each other, or on one curve. Filled marks are
-fabrics seen in training, open ones unseen.
+Plots of errors against costs are in `reports.page.front_figures`. A method has one colour and one mark in all plots.
+Filled marks are fabrics seen in training, open marks unseen ones.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 
 from reports.measure.aliasing import HALF_NYQUIST
-from reports.page.colours import Scheme
+from reports.page.colours import Marker, Scheme
 from reports.page.plot_style import NARROWEST, new_figure
 from reports.record import TRUTH
 from reports.tables.number_format import display
@@ -27,6 +25,7 @@ from reports.tables.summary import BASELINE, rows
 
 _ROLES: Final = ("seen", "unseen")
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
+_MARK_EVERY: Final = 9  # points of a spectrum; one curve's marks are shifted against the next one's
 
 
 def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:
@@ -53,9 +52,9 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
                 _mark(axes, mean.mse, row, colours[method], role, scheme.marker(method), xerr=spread)
         noise = table.loc[table["role"] == role, "truth_noise"].mean()
         axes.axvline(noise, color=scheme.muted, linewidth=0.9, linestyle=(0, (4, 3)))
-        # Above the first row, where no mark can lie.
+        # Above the first row no mark can lie.
         axes.annotate(
-            "noise of the truth, subtracted",
+            "noise of the truth (subtracted)",
             (noise, 1.0),
             xytext=(4, -2),
             xycoords=("data", "axes fraction"),
@@ -97,7 +96,7 @@ def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
 def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[float, float]]]) -> Figure:
     """Draw the power spectrum of the receding plane by every method beside the truth's.
 
-    Of a method with knobs only the last and the baseline are drawn.
+    Only the last setting of a method and the baseline are drawn.
     """
     last = dict(curves.keys())
     shown = {key: curve for key, curve in curves.items() if key == BASELINE or last[key[0]] == key[1]}
@@ -113,21 +112,27 @@ def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[floa
         xlim=(0, 0.62), yscale="log", xlabel="frequency, cycles a pixel",
         ylabel="power over the truth's squared mean", xticks=[0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5],
     )  # fmt: skip
-    labels = []
+    labels: list[tuple[float, str, str]] = []
     for (method, setting), curve in sorted(shown.items(), key=lambda item: item[0][0] == TRUTH):
         points = np.array([point for point in curve if point[1] > 0])
         if not len(points):
             continue
         is_truth = method == TRUTH
-        axes.plot(*points.T, color=colours[method], linewidth=2.6 if is_truth else 1.3, alpha=1 if is_truth else 0.85)
+        axes.plot(
+            *points.T, color=colours[method], linewidth=2.6 if is_truth else 1.3, alpha=1 if is_truth else 0.85,
+            marker=scheme.marker(method), markersize=5, markevery=(len(labels) % _MARK_EVERY, _MARK_EVERY),
+        )  # fmt: skip
         labels.append((math.log(points[-1][1]), display(method, setting), method))
     labels.sort()
     low, high = (math.log(limit) for limit in axes.get_ylim())
     places = _apart([end for end, _, _ in labels], (high - low) / ((height - 0.9) / 0.17), high)
     for place, (_, label, method) in zip(places, labels, strict=True):
         weight = "bold" if method == TRUTH else "normal"
-        at = (0.505, math.exp(place))
-        axes.annotate(label, at, va="center", fontsize=8.5, color=colours[method], fontweight=weight)
+        level = math.exp(place)
+        axes.plot(0.508, level, color=colours[method], marker=scheme.marker(method), markersize=5)
+        axes.annotate(
+            label, (0.516, level), va="center", fontsize=8.5, color=scheme.text(colours[method]), fontweight=weight
+        )
     axes.yaxis.set_minor_formatter(NullFormatter())
     return figure
 
@@ -172,7 +177,7 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
 
 
 def _places(table: pd.DataFrame) -> dict[tuple[str, str], float]:
-    """Return the height of every method's row, downwards: knobs of a method close together, a gap before the next."""
+    """Return the height of every method's row, downwards; settings of one method lie closer together."""
     keys = list(dict.fromkeys(zip(table["method"], table["setting"], strict=True)))
     order = list(dict.fromkeys(method for method, _ in keys))
     keys.sort(key=lambda key: order.index(key[0]))
@@ -208,11 +213,19 @@ def _name_rows(axes: Axes, places: Mapping[tuple[str, str], float], above: float
     axes.tick_params(axis="y", length=0)
 
 
-def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: str, **bars: Any) -> None:
+def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: Marker, **bars: Any) -> None:
     """Put a method's mark: filled where seen, open where unseen."""
     face = colour if role == "seen" else "none"
     axes.errorbar(
-        x, y, fmt=shape, markersize=7, color=colour, markerfacecolor=face, markeredgewidth=1.6, elinewidth=1.6, **bars
+        x,
+        y,
+        marker=shape,
+        markersize=7,
+        color=colour,
+        markerfacecolor=face,
+        markeredgewidth=1.6,
+        elinewidth=1.6,
+        **bars,
     )
 
 

@@ -1,27 +1,28 @@
-"""Plots of a fault against a cost, both logarithmic: every method's curve, and the front that nothing beats on both.
+"""Plots of errors against costs, both logarithmic, with the Pareto front.
 
-A method's knobs are one curve, of which the first and the last are numbered, and so is the baseline. The broad band is
-the front. Where both are of the paper's comparison, an arrow is its own ratio, from our 2 points on: 4.1 times lower
-MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. What is 0 cannot be drawn.
+The settings of a method are one curve; its first and last are labelled, and so is the baseline. The broad band is the
+front. The dashed arrow is the ratio of the paper, drawn from our baseline: 4.1 times lower MSE, which is 2.0 times
+lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0 have no place on a logarithmic axis and are left out.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from reports.measure.by_size import SIZES
 from reports.page.colours import Scheme
+from reports.page.labels import Label, place_labels
 from reports.page.plot_style import NARROWEST, new_figure
 from reports.tables.number_format import display, size
 from reports.tables.pareto_front import front
@@ -82,7 +83,7 @@ def scenes(scheme: Scheme, table: pd.DataFrame) -> Figure:
 
 
 def _by_role(
-    scheme: Scheme, table: pd.DataFrame, cost: str, fault: str, worded: Callable[[float], str], paper: bool = False
+    scheme: Scheme, table: pd.DataFrame, cost: str, error: str, worded: Callable[[float], str], paper: bool = False
 ) -> Figure:
     """Draw `y` against `x` with the front of each role, a panel a role."""
     table = table[(table["x"] > 0) & (table["y"] > 0)]
@@ -91,18 +92,21 @@ def _by_role(
     paper = paper and bool(of_baseline(table).any())
     height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
     figure, panels = new_figure(max(4.9 * len(roles), NARROWEST), height, len(roles), sharey=True)
+    labels: list[Label] = []
     for axes, role in zip(panels, roles, strict=True):
         found = table[table["role"] == role]
         _band(axes, scheme, found[found["front"]].sort_values("x"))
-        for method, knobs in found.groupby("method", sort=False):
-            _knob_curve(axes, scheme, str(method), knobs, colours[str(method)], role)
+        for method, settings in found.groupby("method", sort=False):
+            labels += _curve(axes, scheme, str(method), settings, colours[str(method)], role)
         for row in rows(found[of_baseline(found)]) if paper else ():
             _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
-        _name_faults(axes, worded)
+        _tick(axes.yaxis, axes.get_ylim(), worded)
         axes.margins(0.12)
-    panels[0].set_ylabel(fault)
+        _tick(axes.xaxis, axes.get_xlim(), lambda value: f"{value:,.0f}")
+    panels[0].set_ylabel(error)
     _legend(figure, scheme, colours, f"the paper: {math.sqrt(PAPER[0]):.1f}× lower" if paper else "")
+    place_labels(figure, labels, scheme)
     return figure
 
 
@@ -133,16 +137,16 @@ def _against_time(
             found = found.assign(x=found["time"], y=found[measure])
             best = np.array(front(list(zip(found["x"], found["y"], strict=True))), np.bool_)
             _band(axes, scheme, found[best].sort_values("x"), 5.0)
-            for method, knobs in found.groupby("method", sort=False):
-                knobs = knobs.sort_values("x")
+            for method, settings in found.groupby("method", sort=False):
+                settings = settings.sort_values("x")
                 axes.plot(
-                    knobs["x"], knobs["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
+                    settings["x"], settings["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
                     markersize=4.5, linewidth=1.1,
                 )  # fmt: skip
             for row in rows(found[of_baseline(found)]) if measure == paper else ():
                 _paper_arrow(axes, scheme, (row.x, row.y), PAPER[0])
             axes.set(xscale="log", yscale="log", title="" if place else title)
-            _name_faults(axes, worded, 8)
+            _tick(axes.yaxis, axes.get_ylim(), worded, 8)
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
         line[0].set_ylabel(label)
@@ -159,17 +163,17 @@ def _plain(value: float) -> str:
     return f"{value:.3g}".replace("e-0", "e−")
 
 
-def _name_faults(axes: Axes, worded: Callable[[float], str], most: int | None = None) -> None:
-    """Label the vertical axis at 1, 2 and 5 of every decade; at its powers alone where those are many."""
-    low, high = axes.get_ylim()
+def _tick(axis: Axis, limits: tuple[float, float], worded: Callable[[float], str], most: int | None = None) -> None:
+    """Label a logarithmic axis at 1, 2 and 5 of every decade; at its powers alone where those are many."""
+    low, high = limits
     subs = (1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)
-    axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=most))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
-    axes.yaxis.set_minor_locator(NullLocator())
+    axis.set_major_locator(LogLocator(subs=subs, numticks=most))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
+    axis.set_minor_locator(NullLocator())
 
 
 def _legend(figure: Figure, scheme: Scheme, colours: Mapping[str, str], paper: str) -> None:
-    """Name the methods, once for all panels: names at the marks would cover each other."""
+    """Draw one legend for all panels: colour and mark of every method, and the paper's arrow."""
     handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
     if paper:
         step = f"{paper} at {PAPER[1]}× the time"
@@ -182,29 +186,25 @@ def _band(axes: Axes, scheme: Scheme, best: pd.DataFrame, width: float = 7.0) ->
     axes.plot(best["x"], best["y"], color=scheme.line, linewidth=width, zorder=1, solid_capstyle="round")
 
 
-def _knob_curve(axes: Axes, scheme: Scheme, method: str, knobs: pd.DataFrame, colour: str, role: str) -> None:
-    """Draw a method's knobs as one curve; the first and the last are numbered, and so is the baseline."""
+def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colour: str, role: str) -> Iterator[Label]:
+    """Draw the settings of a method as one curve; yield the labels of the first, the last and the baseline."""
     face = colour if role == "seen" else scheme.ground
     axes.plot(
-        knobs["x"], knobs["y"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
+        settings["x"], settings["y"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
         markeredgewidth=1.6, linewidth=1.3, zorder=3,
     )  # fmt: skip
-    ends = {knobs["setting"].iloc[0], knobs["setting"].iloc[-1]}
-    for row in rows(knobs[knobs["setting"].isin(ends) | of_baseline(knobs)]):
+    ends = {settings["setting"].iloc[0], settings["setting"].iloc[-1]}
+    for row in rows(settings[settings["setting"].isin(ends) | of_baseline(settings)]):
         if row.setting:
-            axes.annotate(
-                row.setting.removeprefix("k = "), (row.x, row.y), xytext=(-7, -5), textcoords="offset points",
-                ha="right", va="top", fontsize=8, color=colour, zorder=4,
-                path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)],
-            )  # fmt: skip
+            yield Label(axes, row.setting.removeprefix("k = "), row.x, row.y, scheme.text(colour))
 
 
 def _paper_arrow(axes: Axes, scheme: Scheme, start: tuple[float, float], lower: float) -> None:
-    """Draw what the paper's ratios would mean from here."""
-    time, fault = start
-    target = (time * PAPER[1], fault / lower)
+    """Draw the paper's ratios of time and error from a start."""
+    time, error = start
+    target = (time * PAPER[1], error / lower)
     axes.scatter(*target, alpha=0.0)  # an arrow alone does not widen the axes
     axes.annotate(
-        "", target, xytext=(time, fault), zorder=5,
+        "", target, xytext=(time, error), zorder=5,
         arrowprops={"arrowstyle": "-|>", "color": scheme.muted, "linestyle": (0, (3, 2)), "shrinkA": 6, "shrinkB": 0},
     )  # fmt: skip

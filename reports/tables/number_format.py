@@ -13,13 +13,14 @@ NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 
 NAMES: Final = {
     "neumip": "NeuMIP",
+    "gauss_nodes": "Gauss nodes",
     "point_sampled": "points",
     "r2_points": "R2 points",
     "unified_btf": "unified BTF",
     "btf_autoencoder": "BTF autoencoder",
     "curved_grazing": "curved, grazing",
 }
-"""What a person calls a method, where its name with spaces is not it."""
+"""Display names of methods, where they are not the name with spaces."""
 
 
 def plain(name: str) -> str:
@@ -28,7 +29,7 @@ def plain(name: str) -> str:
 
 
 def display(method: str, setting: str = "") -> str:
-    """Return what a person calls a method."""
+    """Return the display name of a method, with its setting."""
     name = NAMES.get(method, method.replace("_", " "))
     return f"{name}, {setting.replace(' ', NO_BREAK)}" if setting else name
 

@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.models.catalogue import CLASSES
 from reports.page import figures
-from reports.page.colours import DARK, LIGHT, MARKERS
+from reports.page.colours import DARK, LIGHT, MARKERS, MARKS
 from reports.page.plot_style import render
 from reports.tables import summary
 from reports.tables.number_format import NAMES, display
@@ -82,7 +82,12 @@ def test_every_method_has_a_colour_of_its_own(scheme):
 def test_every_model_has_a_colour_that_no_other_has(scheme):
     assert set(CLASSES) <= set(scheme.methods)
     assert len(set(scheme.methods.values()) | set(scheme.others)) == len(scheme.methods) + len(scheme.others)
-    assert set(NAMES) | set(MARKERS) <= set(scheme.methods)
+    assert set(NAMES) <= set(scheme.methods)
+
+
+def test_every_model_has_a_mark_that_no_other_has():
+    assert set(MARKERS) == set(LIGHT.methods) == set(DARK.methods)
+    assert len({*MARKERS.values(), *MARKS}) == len(MARKERS) + len(MARKS)
 
 
 def test_a_page_gives_names_their_colours_for_good():
@@ -91,7 +96,7 @@ def test_a_page_gives_names_their_colours_for_good():
     assert page.colours(["deep"])["deep"] == page.colours(["wide", "deep"])["deep"]
     assert page.colours(["deep"])["deep"] not in (page.colours(["wide"])["wide"], page.methods["woven"])
     assert LIGHT.colours(["deep"])["deep"] != page.colours(["deep"])["deep"]
-    assert page.marker("deep") == page.marker("woven") != page.marker("point_sampled")
+    assert len({page.marker(name) for name in ("deep", "wide", "woven", "point_sampled")}) == 4
 
 
 def test_two_dozen_unknown_names_are_told_apart_by_colour_and_mark():

@@ -1,0 +1,42 @@
+import pytest
+
+from reports.page.colours import DARK, LIGHT
+from reports.page.contrast import OF_MARKS, OF_TEXT, contrast, readable
+
+SCHEMES = pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
+
+
+def grounds(scheme):
+    return scheme.ground, scheme.card, scheme.tint
+
+
+def test_contrast_of_known_pairs():
+    """Black on white is 21; #767676 is the lightest grey that passes 4.5 on white [Campbell2023WCAG]."""
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0, abs=1e-3)
+    assert contrast("#ffffff", "#ffffff") == 1.0
+    assert contrast("#767676", "#ffffff") > 4.5 > contrast("#777777", "#ffffff")
+    assert contrast("#123456", "#fedcba") == contrast("#fedcba", "#123456")
+
+
+@SCHEMES
+def test_text_can_be_read_on_every_ground(scheme):
+    for ground in grounds(scheme):
+        assert contrast(scheme.ink, ground) >= OF_TEXT
+        assert contrast(scheme.muted, ground) >= OF_TEXT
+
+
+@SCHEMES
+def test_marks_and_the_focus_stand_out_on_every_ground(scheme):
+    for colour in (*scheme.methods.values(), *scheme.others, scheme.focus):
+        assert all(contrast(colour, ground) >= OF_MARKS for ground in grounds(scheme)), colour
+
+
+@SCHEMES
+def test_coloured_text_of_plots_can_be_read(scheme):
+    for colour in (*scheme.methods.values(), *scheme.others):
+        assert contrast(scheme.text(colour), scheme.ground) >= OF_TEXT
+
+
+def test_a_colour_that_can_be_read_stays():
+    assert readable("#3d55cc", "#ffffff", "#000000") == "#3d55cc"
+    assert readable("#ffffff", "#ffffff", "#000000") == "#737373"  # 11 of 20 steps to black
