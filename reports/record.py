@@ -294,16 +294,6 @@ def read_machine(path: Path) -> Machine:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
 
 
-def by_subject(records: Iterable[Record], metrics: Iterable[Metric]) -> dict[tuple[str, str], dict[Metric, Record]]:
-    """Group records by fabric and setting; subjects that lack one of the metrics are left out."""
-    wanted = list(metrics)
-    found: dict[tuple[str, str], dict[Metric, Record]] = {}
-    for record in records:
-        if record.metric in wanted:
-            found.setdefault((record.fabric, record.setting), {})[record.metric] = record
-    return {subject: numbers for subject, numbers in found.items() if len(numbers) == len(wanted)}
-
-
 def to_table(records: Iterable[Record]) -> pd.DataFrame:
     """Return one row a record, provenance as columns of its own, curves and samples left out."""
     left_out = {"curve", "samples", "provenance"}

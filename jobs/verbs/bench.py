@@ -64,14 +64,14 @@ def stability(out: Path) -> None:
     from rich.console import Console
 
     from reports.record import this_machine, write_records
-    from reports.truth.finding import failures, to_records
+    from reports.truth.finding import RECORDS, failures
     from reports.truth.stability import stability as findings_of
 
     console = Console()
     with console.status("stability") as status:
         findings = findings_of(lambda about: status.update(f"stability: {about}"))
     path = out / STABILITY
-    write_records(path, to_records(findings), this_machine(1))
+    write_records(path, RECORDS.to_records(findings), this_machine(1))
     console.print(_table(findings))
     console.print(f"\n{path}: {len(findings)} expressions", soft_wrap=True, highlight=False)
     if wrong := failures(findings):
@@ -104,8 +104,8 @@ def truth(out: Path) -> None:
         accuracies = all_of("accuracy", accuracy.measure())
         biases = all_of("bias", bias.measure())
         efforts = all_of("where the time goes", effort.measure())
-    records = throughput.to_records(rates) + accuracy.to_records(accuracies)
-    records += bias.to_records(biases) + effort.to_records(efforts)
+    records = throughput.RECORDS.to_records(rates) + accuracy.RECORDS.to_records(accuracies)
+    records += bias.RECORDS.to_records(biases) + effort.RECORDS.to_records(efforts)
     path = out / TRUTH
     write_records(path, records, this_machine(1))
     console.print(_columns(("what", "fabric", "rate", "note"), truth_rows.rate_rows(records)))
@@ -131,7 +131,7 @@ def sampler(out: Path) -> None:
             found.append(one)
             status.update(f"the sampler: {one.fabric}, {one.sampler}")
     path = out / SAMPLER
-    write_records(path, sampling.to_records(found), this_machine(1))
+    write_records(path, sampling.RECORDS.to_records(found), this_machine(1))
     console.print(_columns(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(found)))
     console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
 

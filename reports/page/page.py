@@ -46,7 +46,8 @@ from reports.tables.sentences import (
 )
 from reports.tables.tradeoff import tradeoff_table
 from reports.truth import accuracy, bias, effort, sampling
-from reports.truth.finding import Finding, from_records
+from reports.truth.finding import RECORDS as FINDINGS
+from reports.truth.finding import Finding
 from weaves.fabric import Fabric
 
 
@@ -128,7 +129,7 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     extremes = extremes_table(page.records)
     if len(extremes):
         tables["extremes"] = extremes
-    findings = from_records(page.records)
+    findings = FINDINGS.from_records(page.records)
     if findings:
         tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
     for name, measured in _of_the_truth(page.records).items():
@@ -161,10 +162,10 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 def _of_the_truth(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
     """Return what `bench truth` measured beside speeds, and `bench sampler`, by the names of their tables."""
     return {
-        "truth_accuracy": accuracy.from_records(records),
-        "truth_bias": bias.from_records(records),
-        "truth_effort": effort.from_records(records),
-        "sampler": sampling.from_records(records),
+        "truth_accuracy": accuracy.RECORDS.from_records(records),
+        "truth_bias": bias.RECORDS.from_records(records),
+        "truth_effort": effort.RECORDS.from_records(records),
+        "sampler": sampling.RECORDS.from_records(records),
     }
 
 

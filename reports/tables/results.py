@@ -143,8 +143,9 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
 
 def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     """Yield what `bench truth` and `bench sampler` measured, if they were run."""
-    rates, accuracies = truth_rows.rate_rows(records), accuracy.from_records(records)
-    biases, efforts, samplers = bias.from_records(records), effort.from_records(records), sampling.from_records(records)
+    rates, accuracies = truth_rows.rate_rows(records), accuracy.RECORDS.from_records(records)
+    biases, efforts = bias.RECORDS.from_records(records), effort.RECORDS.from_records(records)
+    samplers = sampling.RECORDS.from_records(records)
     if rates or accuracies or biases or efforts:
         yield "## The ground truth (`twillight bench truth`)"
     if rates:

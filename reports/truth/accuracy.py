@@ -9,9 +9,9 @@ true error e. "Points saved" is that number over the points used.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS
 from reports.measure.timing import set_threads
-from reports.record import TRUTH, Metric, Record, by_subject
+from reports.truth.row_records import RowRecords
 from reports.truth.throughput import FABRICS
 from weaves.fabric import Fabric, load_fabric
 
@@ -138,32 +138,17 @@ def _spread(random: Sequence[Accuracy]) -> float:
     return float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
 
 
-_METRICS: Final[dict[Metric, tuple[str, str]]] = {
-    "true_rmse": ("rmse", "1"),
-    "true_error": ("true_error", "1"),
-    "stated_error": ("stated_error", "1"),
-    "points": ("points", "points/query"),
-    "query_rate": ("rate", "queries/s"),
-    "points_saved": ("saved", "1"),
-    "reference_error": ("reference", "1"),
-}
-
-
-def to_records(found: Iterable[Accuracy]) -> list[Record]:
-    """Return measurements as Records, one a number."""
-    return [
-        Record(method=TRUTH, setting=row.setting, fabric=row.fabric).of(
-            metric, getattr(row, name), row.count, unit=unit
-        )
-        for row in found
-        for metric, (name, unit) in _METRICS.items()
-    ]
-
-
-def from_records(records: Sequence[Record]) -> list[Accuracy]:
-    """Return the measurements that records hold; records of others are passed over."""
-    found = []
-    for (fabric, setting), numbers in by_subject(records, _METRICS).items():
-        values: dict[str, Any] = {name: numbers[metric].value for metric, (name, _) in _METRICS.items()}
-        found.append(Accuracy(setting=setting, fabric=fabric, count=numbers["true_rmse"].count, **values))
-    return found
+RECORDS: Final = RowRecords(
+    Accuracy,
+    {
+        "rmse": ("true_rmse", "1"),
+        "true_error": ("true_error", "1"),
+        "stated_error": ("stated_error", "1"),
+        "points": ("points", "points/query"),
+        "rate": ("query_rate", "queries/s"),
+        "saved": ("points_saved", "1"),
+        "reference": ("reference_error", "1"),
+    },
+    setting=("setting",),
+)
+"""Accuracies as Records."""

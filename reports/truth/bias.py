@@ -8,7 +8,7 @@ light in front of the cloth or, its z reversed, behind; the reference is `owen`,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -20,8 +20,8 @@ from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.measure.timing import set_threads
-from reports.record import TRUTH, Record
 from reports.truth.accuracy import fixed
+from reports.truth.row_records import RowRecords
 from reports.truth.throughput import FABRICS
 from weaves.fabric import load_fabric
 
@@ -34,7 +34,6 @@ SIDES: Final = ("light in front", "light behind")
 _ROWS = 4000
 _REFERENCE = 1 << 13
 _SEED = 22
-_JOINT: Final = ": "
 
 Floats = npt.NDArray[np.float64]
 
@@ -102,22 +101,11 @@ def bias_of(found: Floats, truth: Floats) -> tuple[float, float]:
     return ratio, spread / math.sqrt(len(truth)) / mean
 
 
-def to_records(found: Iterable[Bias]) -> list[Record]:
-    """Return biases as Records: the setting says where the light is and which component."""
-    return [
-        Record(method=TRUTH, setting=f"{bias.side}{_JOINT}{bias.component}", fabric=bias.fabric).of(
-            "bias", bias.value, bias.count, standard_error=bias.standard_error
-        )
-        for bias in found
-    ]
-
-
-def from_records(records: Iterable[Record]) -> list[Bias]:
-    """Return the biases that records hold; records of other measurements are passed over."""
-    found = []
-    for record in records:
-        if record.metric == "bias":
-            side, _, component = record.setting.partition(_JOINT)
-            error = record.standard_error or 0.0
-            found.append(Bias(record.fabric, side, component, record.value, error, record.count))
-    return found
+RECORDS: Final = RowRecords(
+    Bias,
+    {"value": ("bias", "1")},
+    setting=("side", "component"),
+    once={"standard_error": "standard_error"},
+    joint=": ",
+)
+"""Biases as Records."""

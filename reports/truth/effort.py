@@ -7,9 +7,9 @@ least; of the rest, what depends on the seed was refined, and what does not is a
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.measure.timing import set_threads
-from reports.record import TRUTH, Metric, Record, by_subject
+from reports.truth.row_records import RowRecords
 from reports.truth.throughput import FABRICS
 from weaves.fabric import Fabric, load_fabric
 
@@ -104,26 +104,9 @@ def _seconds(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
     return float(np.median(times)) / len(queries.u)
 
 
-_METRICS: Final[dict[Metric, tuple[str, str]]] = {
-    "kind_share": ("share", "1"),
-    "kind_points": ("points", "points/query"),
-    "kind_time": ("seconds", "s/query"),
-}
-
-
-def to_records(found: Iterable[Effort]) -> list[Record]:
-    """Return measurements as Records, one a number; the setting is the kind."""
-    return [
-        Record(method=TRUTH, setting=row.kind, fabric=row.fabric).of(metric, getattr(row, name), row.count, unit=unit)
-        for row in found
-        for metric, (name, unit) in _METRICS.items()
-    ]
-
-
-def from_records(records: Sequence[Record]) -> list[Effort]:
-    """Return the measurements that records hold; records of others are passed over."""
-    found = []
-    for (fabric, kind), numbers in by_subject(records, _METRICS).items():
-        values: dict[str, Any] = {name: numbers[metric].value for metric, (name, _) in _METRICS.items()}
-        found.append(Effort(kind=kind, fabric=fabric, count=numbers["kind_share"].count, **values))
-    return found
+RECORDS: Final = RowRecords(
+    Effort,
+    {"share": ("kind_share", "1"), "points": ("kind_points", "points/query"), "seconds": ("kind_time", "s/query")},
+    setting=("kind",),
+)
+"""Efforts as Records."""

@@ -9,14 +9,14 @@ for double precision are the same times 2^-29, the ratio of the two arithmetics.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from reports.record import Metric, Record
+from reports.truth.row_records import RowRecords
 
 SLACK: Final = 2.0
 """How far beyond the listed figure a worst error may lie: it is an extreme of random corners."""
@@ -167,44 +167,21 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if not finding.holds]
 
 
-_METRICS: Final[dict[Metric, str]] = {
-    "worst_error": "worst",
-    "listed_error": "listed",
-    "naive_error": "naive",
-    "not_finite": "not_finite",
-    "negative": "negative",
-    "naive_not_finite": "naive_not_finite",
-}
-_JOINT: Final = " | "
-
-
-def to_records(findings: Iterable[Finding]) -> list[Record]:
-    """Return findings as Records: method the arithmetic, setting ``expression | corner``, one a number."""
-    records = []
-    for finding in findings:
-        subject = Record(method=finding.arithmetic, setting=f"{finding.expression}{_JOINT}{finding.corner}")
-        for metric, name in _METRICS.items():
-            value = float(getattr(finding, name))
-            if not math.isnan(value):
-                note = finding.at if metric == "worst_error" else ""
-                records.append(subject.of(metric, value, finding.count).model_copy(update={"note": note}))
-    return records
-
-
-def from_records(records: Sequence[Record]) -> list[Finding]:
-    """Return the findings that records hold; records of other measurements are passed over."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
-    for record in records:
-        if record.metric in _METRICS:
-            row = found.setdefault((record.method, record.setting), {"at": "", "count": record.count})
-            row[_METRICS[record.metric]] = record.value
-            row["at"] = record.note or row["at"]
-    findings = []
-    for (arithmetic, setting), row in found.items():
-        expression, _, corner = setting.partition(_JOINT)
-        row |= {name: int(row[name]) for name in ("not_finite", "negative", "naive_not_finite")}
-        findings.append(Finding(expression=expression, corner=corner, arithmetic=arithmetic, **row))
-    return findings
+RECORDS: Final = RowRecords(
+    Finding,
+    {
+        "worst": ("worst_error", "1"),
+        "listed": ("listed_error", "1"),
+        "naive": ("naive_error", "1"),
+        "not_finite": ("not_finite", "1"),
+        "negative": ("negative", "1"),
+        "naive_not_finite": ("naive_not_finite", "1"),
+    },
+    setting=("expression", "corner"),
+    method_field="arithmetic",
+    once={"note": "at"},
+)
+"""Findings as Records."""
 
 
 def _word(value: Any) -> str:

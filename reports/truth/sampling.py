@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -24,7 +24,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from reports.record import Metric, Record, by_subject
+from reports.truth.row_records import RowRecords
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
@@ -36,7 +36,6 @@ SETTINGS: Final = (("cosine", 0), ("4 points", 4), ("8 points", 8), ("16 points"
 
 _ROWS, _DIRECTIONS = 200, 16
 _LEAST_COSINE = 1e-6
-_METRICS: Final[tuple[Metric, ...]] = ("variance_saved", "sample_time")
 
 
 @dataclass(frozen=True)
@@ -63,21 +62,13 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Sav
         yield from _savings(_specular(cloth), f"{name} (specular)", rows)
 
 
-def to_records(found: Sequence[Saving]) -> list[Record]:
-    """Return Records."""
-    return [
-        Record(method="sampler", setting=one.sampler, fabric=one.fabric, metric=metric, value=value, count=one.count)
-        for one in found
-        for metric, value in zip(_METRICS, (one.variance_saved, one.sample_time), strict=True)
-    ]
-
-
-def from_records(records: Iterable[Record]) -> list[Saving]:
-    """Return what Records say; those of other measurements are passed over."""
-    return [
-        Saving(setting, fabric, found["variance_saved"].value, found["sample_time"].value, found["sample_time"].count)
-        for (fabric, setting), found in by_subject(records, _METRICS).items()
-    ]
+RECORDS: Final = RowRecords(
+    Saving,
+    {"variance_saved": ("variance_saved", "1"), "sample_time": ("sample_time", "1")},
+    setting=("sampler",),
+    method="sampler",
+)
+"""Savings as Records."""
 
 
 def _savings(fabric: Fabric, name: str, rows: int) -> Iterator[Saving]:

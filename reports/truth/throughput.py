@@ -10,7 +10,8 @@ import resource
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,8 @@ from pipeline.truth.node_table.build import Table, tabulate
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from reports.measure.timing import set_threads
-from reports.record import TRUTH, Record
 from reports.truth.rate import MULTIPLY_ADDS, OPERATIONS, evaluate_points, multiply_adds
+from reports.truth.row_records import RowRecords
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
 
@@ -34,30 +35,26 @@ _REPEATS = 5
 _SEED = 20
 
 
-class Rate(NamedTuple):
-    """One measured speed.
-
-    Attributes
-    ----------
-    what, fabric : str
-        What was counted, and on which cloth.
-    value : float
-        In `unit`; the median.
-    low, high : float
-        The quartiles.
-    unit : str
-        Such as ``points/s``.
-    note : str
-        What else is to be known.
-    """
+@dataclass(frozen=True)
+class Rate:
+    """One measured speed."""
 
     what: str
+    """Work that was counted."""
     fabric: str
+    """Name of the cloth."""
     value: float
+    """In `unit`; the median."""
     low: float
+    """First quartile."""
     high: float
+    """Third quartile."""
     unit: str
+    """Such as ``points/s``."""
     note: str = ""
+    """Conditions of the measurement."""
+    count: int = _REPEATS
+    """Timed calls."""
 
 
 def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate]:
@@ -78,23 +75,13 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
     yield _memory(load_fabric(fabrics[0]), rows)
 
 
-def to_records(rates: Sequence[Rate]) -> list[Record]:
-    """Return rates as Records: the setting says what was counted."""
-    return [
-        Record(
-            method=TRUTH,
-            setting=rate.what,
-            fabric=rate.fabric,
-            metric="rate",
-            value=rate.value,
-            low=rate.low,
-            high=rate.high,
-            count=_REPEATS,
-            unit=rate.unit,
-            note=rate.note,
-        )
-        for rate in rates
-    ]
+RECORDS: Final = RowRecords(
+    Rate,
+    {"value": ("rate", "1")},
+    setting=("what",),
+    once={"low": "low", "high": "high", "unit": "unit", "note": "note"},
+)
+"""Rates as Records."""
 
 
 def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: str = "") -> Rate:
@@ -135,7 +122,7 @@ def _points() -> Iterator[Rate]:
             "points/s",
         )
         arithmetic_share = rate.value * OPERATIONS[name][0] / limit.value
-        yield rate._replace(note=f"{rate.value / plain.value:.0f} x NumPy; {arithmetic_share:.0%} of arithmetic alone")
+        yield replace(rate, note=f"{rate.value / plain.value:.0f} x NumPy; {arithmetic_share:.0%} of arithmetic alone")
     exact = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1024, max_count=1024)
     few = queries.take(slice(200))
     yield _rate(
@@ -195,7 +182,7 @@ def _two_threads(fabric: Fabric, rows: int) -> Rate:
     with ThreadPoolExecutor(2) as pool:
         one = _rate(lambda: float(sum(map(answer, halves))), "queries, one thread", fabric.name, "queries/s")
         two = _rate(lambda: float(sum(pool.map(answer, halves))), "queries, two threads", fabric.name, "queries/s")
-    return two._replace(note=f"{two.value / one.value:.2f} x one thread")
+    return replace(two, note=f"{two.value / one.value:.2f} x one thread")
 
 
 def _memory(fabric: Fabric, rows: int) -> Rate:

@@ -40,9 +40,9 @@ def test_the_truth_is_measured_shown_and_recorded(tmp_path, capsys, monkeypatch)
         assert words in text, text
     assert "−0.10 ± 0.02 % ✓" in text
     records = read_records([tmp_path / TRUTH])
-    assert accuracy.from_records(records) == accuracies
-    assert bias.from_records(records) == biases
-    assert effort.from_records(records) == efforts
+    assert accuracy.RECORDS.from_records(records) == accuracies
+    assert bias.RECORDS.from_records(records) == biases
+    assert effort.RECORDS.from_records(records) == efforts
     assert [record.value for record in records if record.metric == "rate"] == [1.0e6]
 
 

@@ -20,7 +20,7 @@ from reports.page.page import ModelNote, PageInput, write_page
 from reports.page.picture_strips import PictureFile
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.truth import accuracy, bias, effort
-from reports.truth.finding import judge, to_records
+from reports.truth.finding import RECORDS, judge
 from weaves.fabric import load_fabric
 
 VOID = {"meta", "img", "source", "link", "br", "hr", "input"}
@@ -204,7 +204,7 @@ def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path)
         judge("σ", "near <the> axis", "float32", {"w": [0.25]}, [1.0], [1.0], 1e-6, naive=[1.001]),
         judge("f_t", "equal Λ", "float64", {"w": [0.5]}, [1.5], [1.0], 1e-15, naive=[np.nan]),
     ]
-    more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *to_records(findings)]})
+    more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *RECORDS.to_records(findings)]})
     page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
     assert "stability" in page.ids
     assert "#stability" in page.targets
@@ -269,8 +269,8 @@ def test_what_accuracy_costs_is_shown_where_it_was_measured(written, page_input,
         effort.Effort("table alone", "denim", 0.75, 4000.0, 2e-5, 900),
         effort.Effort("sampled", "denim", 0.25, 9000.0, 2e-3, 900),
     ]
-    records = [*page_input.records, *accuracy.to_records(accuracies), *bias.to_records(biases)]
-    more = PageInput(**{**page_input.__dict__, "records": [*records, *effort.to_records(efforts)]})
+    records = [*page_input.records, *accuracy.RECORDS.to_records(accuracies), *bias.RECORDS.to_records(biases)]
+    more = PageInput(**{**page_input.__dict__, "records": [*records, *effort.RECORDS.to_records(efforts)]})
     page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
     assert "accuracy" in page.ids and "#accuracy" in page.targets
     assert "150 queries a fabric" in page.words and "state 0.07 % themselves" in page.words

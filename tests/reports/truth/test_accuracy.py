@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reports.record import Record, read_records, this_machine, write_records
-from reports.truth.accuracy import COUNTS, SETTINGS, Accuracy, from_records, measure, to_records
+from reports.truth.accuracy import COUNTS, RECORDS, SETTINGS, Accuracy, measure
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_more_points_are_more_accurate(found):
 
 def test_records_bring_accuracies_back(found, tmp_path):
     path = tmp_path / "truth.json"
-    write_records(path, [Record(method="truth").of("time", 1.0, 1), *to_records(found)], this_machine(1))
-    again = from_records(read_records([path]))
+    write_records(path, [Record(method="truth").of("time", 1.0, 1), *RECORDS.to_records(found)], this_machine(1))
+    again = RECORDS.from_records(read_records([path]))
     assert again == found
     assert isinstance(again[0], Accuracy)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.conventions import COMPONENTS
-from reports.truth.bias import LIMIT, SIDES, Bias, bias_of, from_records, measure, to_records
+from reports.truth.bias import LIMIT, RECORDS, SIDES, Bias, bias_of, measure
 
 
 def test_a_known_bias_lies_within_its_errors():
@@ -42,4 +42,4 @@ def test_the_table_is_measured_from_both_sides():
     assert [(bias.side, bias.component) for bias in found] == [(side, name) for side in SIDES for name in COMPONENTS]
     # Nothing like a wrong factor: 5 standard errors beyond ten times the limit.
     assert all(abs(bias.value) < 10 * LIMIT + 5 * bias.standard_error for bias in found)
-    assert from_records(to_records(found)) == found
+    assert RECORDS.from_records(RECORDS.to_records(found)) == found

@@ -6,7 +6,7 @@ import pytest
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.truth.effort import CLASSES, classify, from_records, measure, to_records
+from reports.truth.effort import CLASSES, RECORDS, classify, measure
 from weaves.fabric import load_fabric
 
 FABRIC = load_fabric("denim")
@@ -40,4 +40,4 @@ def test_shares_add_up_and_records_bring_them_back():
     found = list(measure(rows=100, fabrics=["basket"]))
     assert [row.kind for row in found] == list(CLASSES)
     assert sum(row.share for row in found) == pytest.approx(1.0)
-    assert from_records(to_records(found)) == found
+    assert RECORDS.from_records(RECORDS.to_records(found)) == found

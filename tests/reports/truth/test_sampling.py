@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reports.truth.sampling import SETTINGS, Saving, from_records, measure, to_records
+from reports.truth.sampling import RECORDS, SETTINGS, Saving, measure
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def test_lobes_save_variance(found):
 
 
 def test_records_bring_everything_back(found):
-    back = from_records(to_records(found))
+    back = RECORDS.from_records(RECORDS.to_records(found))
     assert [(one.sampler, one.fabric, one.count) for one in back] == [(o.sampler, o.fabric, o.count) for o in found]
     np.testing.assert_allclose([one.variance_saved for one in back], [one.variance_saved for one in found])
     assert isinstance(back[0], Saving)

@@ -13,7 +13,7 @@ from pipeline.compiled import float32 as single
 from reports.record import Record, read_records, this_machine, write_records
 from reports.truth import formulas, stability, stability_cloth, stability_point
 from reports.truth.corners import draw, kernel_sigma, kernel_slab, textbook_slab
-from reports.truth.finding import Finding, failures, from_records, judge, to_records
+from reports.truth.finding import RECORDS, Finding, failures, judge
 
 QUICK = {**stability_point.PARTS, **stability_cloth.PARTS}
 QUICK.pop("footprints")
@@ -127,8 +127,8 @@ def test_records_hold_the_findings(tmp_path):
         judge("y", "a | b", "float64", {"y": [3.0]}, [-1.0], [1.0], 1e-9),
     ]
     path = tmp_path / "stability.json"
-    write_records(path, [Record(method="woven").of("time", 1.0, 1), *to_records(findings)], this_machine(1))
-    again = from_records(read_records([path]))
+    write_records(path, [Record(method="woven").of("time", 1.0, 1), *RECORDS.to_records(findings)], this_machine(1))
+    again = RECORDS.from_records(read_records([path]))
     assert again[0] == findings[0]
     assert [f.fault for f in again] == [f.fault for f in findings]
     assert again[1].corner == "a | b"
@@ -145,4 +145,4 @@ def test_the_verb_writes_records_and_fails_if_an_expression_does(monkeypatch, tm
     shown = capsys.readouterr()
     assert ("limit" if code else "ok") in shown.out
     assert ("x in float32, corner: worst error 1.0e-01" in shown.err) == bool(code)
-    assert from_records(read_records([tmp_path / STABILITY]))[0].worst == pytest.approx(value - 1)
+    assert RECORDS.from_records(read_records([tmp_path / STABILITY]))[0].worst == pytest.approx(value - 1)

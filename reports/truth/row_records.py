@@ -1,0 +1,84 @@
+"""Dataclasses as Records and back: one Record for each measured field of a row.
+
+`RowRecords` describes a class of rows once: the fields that name what was measured, and the metric and unit of each
+measured field. A field that is NaN has no Record; reading gives it the default of its class.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Generic, TypeVar, get_type_hints
+
+from reports.record import TRUTH, Metric, Record
+
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True)
+class RowRecords(Generic[Row]):
+    """How the rows of one measurement are written as Records."""
+
+    row: type[Row]
+    """A dataclass."""
+    metrics: Mapping[str, tuple[Metric, str]]
+    """Metric and unit of each measured field."""
+    setting: tuple[str, ...]
+    """Fields that together are the setting, joined by `joint`; only the last one may hold the separator."""
+    method: str = TRUTH
+    """Method of all Records."""
+    method_field: str = ""
+    """Field that holds the method; empty if it is `method`."""
+    once: Mapping[str, str] = field(default_factory=dict)
+    """Attributes of the Record of the first metric, such as ``note``, and the field that each holds."""
+    joint: str = " | "
+    """Separator of the parts of a setting."""
+
+    def to_records(self, found: Iterable[Row]) -> list[Record]:
+        """Return one Record for each number."""
+        return [record for row in found for record in self._of(vars(row))]
+
+    def from_records(self, records: Iterable[Record]) -> list[Row]:
+        """Return the rows that Records hold, in their order; Records of other metrics are left out.
+
+        A row is left out if a field without a default has no Record.
+        """
+        names = {metric: name for name, (metric, _) in self.metrics.items()}
+        first = next(iter(names))
+        found: dict[tuple[str, str, str], dict[str, Any]] = {}
+        for record in records:
+            if record.metric in names and record.setting.count(self.joint) >= len(self.setting) - 1:
+                row = found.setdefault((record.method, record.setting, record.fabric), self._named(record))
+                row[names[record.metric]] = record.value
+                if record.metric == first:
+                    row |= {name: getattr(record, attribute) for attribute, name in self.once.items()}
+        needed = {one.name for one in fields(self.row) if one.default is MISSING}  # type: ignore[arg-type]
+        types = get_type_hints(self.row)
+        return [
+            self.row(**{name: int(value) if types[name] is int else value for name, value in row.items()})
+            for row in found.values()
+            if needed <= row.keys()
+        ]
+
+    def _of(self, row: Mapping[str, Any]) -> Iterable[Record]:
+        subject = Record(
+            method=row[self.method_field] if self.method_field else self.method,
+            setting=self.joint.join(row[name] for name in self.setting),
+            fabric=row.get("fabric", ""),
+        )
+        once = {attribute: row[name] for attribute, name in self.once.items()}
+        for index, (name, (metric, unit)) in enumerate(self.metrics.items()):
+            value = float(row[name])
+            if not math.isnan(value):
+                record = subject.of(metric, value, row["count"], unit=unit)
+                yield record if index else record.model_copy(update=once)
+
+    def _named(self, record: Record) -> dict[str, Any]:
+        """Return the fields that name a Record's row."""
+        known = {one.name for one in fields(self.row)}  # type: ignore[arg-type]
+        named: dict[str, Any] = dict(
+            zip(self.setting, record.setting.split(self.joint, len(self.setting) - 1), strict=True)
+        )
+        named |= {"count": record.count, "fabric": record.fabric, self.method_field: record.method}
+        return {name: value for name, value in named.items() if name in known}

@@ -1,0 +1,73 @@
+"""Rows written as Records come back equal; NaN has no Record; Records of other measurements are left out."""
+
+import math
+from dataclasses import dataclass
+
+import pytest
+
+from reports.record import Record
+from reports.truth.row_records import RowRecords
+
+
+@dataclass(frozen=True)
+class Row:
+    light: str
+    part: str
+    fabric: str
+    value: float
+    at: str
+    failures: int
+    count: int
+    rival: float = math.inf
+
+
+ROWS = RowRecords(
+    Row,
+    {"value": ("worst_error", "1"), "failures": ("not_finite", "1"), "rival": ("naive_error", "1")},
+    setting=("light", "part"),
+    once={"note": "at"},
+)
+FOUND = [
+    Row("front", "warp", "denim", 0.5, "x = 3", 2, 7, 0.25),
+    Row("front", "weft", "denim", 0.1, "x = 4", 0, 7, 0.5),
+]
+
+
+def test_rows_come_back_equal():
+    assert ROWS.from_records(ROWS.to_records(FOUND)) == FOUND
+    assert type(ROWS.from_records(ROWS.to_records(FOUND))[0].failures) is int
+
+
+def test_one_record_a_number():
+    first, second, third = ROWS.to_records(FOUND[:1])
+    assert first == Record(
+        method="truth", setting="front | warp", fabric="denim", metric="worst_error", value=0.5, count=7, note="x = 3"
+    )
+    assert (second.metric, second.value, second.note) == ("not_finite", 2.0, "")
+    assert (third.metric, third.value) == ("naive_error", 0.25)
+
+
+def test_nan_has_no_record_and_comes_back_as_the_default():
+    rows = [Row("front", "warp", "denim", 0.5, "", 2, 7, math.nan)]
+    records = ROWS.to_records(rows)
+    assert [record.metric for record in records] == ["worst_error", "not_finite"]
+    assert ROWS.from_records(records)[0].rival == math.inf
+
+
+@pytest.mark.parametrize(
+    "stray",
+    [
+        Record(method="truth", setting="front | warp", fabric="denim", metric="mse", value=1.0),
+        Record(method="truth", setting="front", fabric="denim", metric="worst_error", value=1.0),
+        Record(method="truth", setting="back | weft", fabric="denim", metric="worst_error", value=1.0),
+    ],
+    ids=["another metric", "another setting", "a row of which the rest is missing"],
+)
+def test_records_that_are_no_row_are_left_out(stray):
+    assert ROWS.from_records([stray, *ROWS.to_records(FOUND[:1])]) == FOUND[:1]
+
+
+def test_the_method_can_be_a_field():
+    by_part = RowRecords(Row, {"value": ("mse", "1")}, setting=("light",), method_field="part")
+    (record,) = by_part.to_records(FOUND[:1])
+    assert (record.method, record.setting) == ("warp", "front")
