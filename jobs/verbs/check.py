@@ -91,5 +91,5 @@ def check_fabric(fabric: Fabric) -> None:
     for invariant in track(INVARIANTS, "checking", console=console, disable=not console.is_terminal, transient=True):
         found += invariant(fabric)
     Console().print(invariants_table(fabric.name, found))
-    if broken := [item.name for item in found if item.verdict == "broken"]:
+    if broken := [item.name for item in found if item.status == "broken"]:
         raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(found)} invariants do not hold: {', '.join(broken)}")

@@ -131,10 +131,10 @@ def evaluation_table(summary: Any) -> Table:
 
 
 def invariants_table(name: str, found: Sequence[Any]) -> Table:
-    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.invariants.Invariant`)."""
+    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.check_result.CheckResult`)."""
     table = _table("invariant", "value", "should be", "holds", "", right=("value",))
     for item in found:
-        style = "bold red" if item.verdict == "broken" else ""
+        style = "bold red" if item.status == "broken" else ""
         table.add_row(item.name, _measured(item), _should_be(item), _holds(item), item.note, style=style)
     table.title, table.title_justify = name, "left"
     return table
@@ -151,7 +151,7 @@ def _should_be(item: Any) -> str:
 
 def _holds(item: Any) -> str:
     inside = item.relation == "<=" and item.sigmas < -5
-    match item.verdict:
+    match item.status:
         case "exact":
             return "exactly"
         case "statistics":

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import AREA, SUMS, Columns, Model, columns_of, model_of
+from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, independent_pair, r2_pair
-from pipeline.truth.monte_carlo import add_point, place_point, query_scene
+from pipeline.truth.monte_carlo import add_point, place_point, query_directions
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -26,7 +26,7 @@ class PointSampler:
     """
 
     def __init__(self, fabric: Fabric, options: TruthOptions | None = None) -> None:
-        self.model = model_of(fabric, options or TruthOptions())
+        self.model = cloth_side(fabric, options or TruthOptions())
 
     def sample(self, queries: Queries, count: int, seed: int, r2: bool = False) -> npt.NDArray[np.float32]:
         """Return the components from `count` points a query, (N, 4); the viewer is in front.
@@ -42,13 +42,13 @@ class PointSampler:
 
 
 @kernel
-def _sample(model: Model, columns: Columns, count: int, seed: np.uint64, r2: bool) -> npt.NDArray[np.float32]:
+def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool) -> npt.NDArray[np.float32]:
     rows = len(columns.u)
     mean = np.zeros((rows, 4), np.float32)
     sums = np.zeros((1, SUMS))
     for row in range(rows):
         key = derive(seed, row)
-        query = query_scene(columns, row)
+        query = query_directions(columns, row)
         sums[:] = 0.0
         for k in range(count):
             first, second = r2_pair(key, k) if r2 else independent_pair(key, k)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.models.per_fabric import PerFabric
-from pipeline.truth.cloth import Model, columns_of, model_of
+from pipeline.truth.cloth import ClothSide, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import COARSE_LINE
 from pipeline.truth.node_table.answer import sum_rows
@@ -48,7 +48,7 @@ def stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.floa
         if not rows.size:
             continue
         columns = columns_of(flat.take(rows), behind)
-        known = tabulated(model_of(fabric, QUADRATURE, behind), columns)
+        known = tabulated(cloth_side(fabric, QUADRATURE, behind), columns)
         if known.any():
             model, table = _TABLES[behind].of(fabric)
             rows, columns = rows[known], columns.take(known)
@@ -60,8 +60,8 @@ def stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.floa
     return result
 
 
-def _tabulate(fabric: Fabric, behind: bool) -> tuple[Model, Table]:
-    model = model_of(fabric, QUADRATURE, behind)
+def _tabulate(fabric: Fabric, behind: bool) -> tuple[ClothSide, Table]:
+    model = cloth_side(fabric, QUADRATURE, behind)
     return model, tabulate(model.front, model.back, True, nodes=NODES, azimuths=AZIMUTHS)
 
 

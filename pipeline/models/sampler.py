@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.importance.lobes import Lobes, densities, draw, find_lobes
 from pipeline.models.method import Method
-from pipeline.truth.cloth import columns_of, model_of
+from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.colour import luminance
@@ -76,5 +76,5 @@ class Sampler:
             np.array([luminance(getattr(yarn, name)) for yarn in yarns])
             for name in ("specular_rgb", "diffuse_rgb", "diffuse_transmission_rgb")
         )
-        model = model_of(fabric, TruthOptions())
+        model = cloth_side(fabric, TruthOptions())
         return find_lobes(model, columns_of(queries), self.points, self.widening, specular, diffuse, through)

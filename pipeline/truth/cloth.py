@@ -28,7 +28,7 @@ Raw = tuple[Float64, Float64, Index]
 FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
 
 
-class Model(NamedTuple):
+class ClothSide(NamedTuple):
     """One side of a fabric with the options that shape its numbers.
 
     Attributes
@@ -78,10 +78,10 @@ def columns_of(queries: Queries, behind: bool = False) -> Columns:
     return wide._replace(wi=wi, wo=wo)
 
 
-def model_of(fabric: Fabric, options: TruthOptions, behind: bool = False) -> Model:
-    """Return a fabric for kernels, seen from `behind` if asked for."""
+def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> ClothSide:
+    """Return the front of a fabric for kernels, or its back if the viewer is `behind` it."""
     front, back = _sides(fabric, options.variation)
-    return Model(
+    return ClothSide(
         back if behind else front,
         front if behind else back,
         Choices(options.frame == "macro", options.geometry == "linear", options.shadows),

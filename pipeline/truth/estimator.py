@@ -1,8 +1,8 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
-`mc`, `jittered`, `r2`, `owen` sample the footprint (replicates); `quadrature` is Gauss-Legendre on every float; `table`
-sums over nodes with horizons; `auto` takes it where that is good enough, `elliptic` for footprints at an angle too
-(auto).
+`mc`, `jittered`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
+`table` sums over nodes with horizons; `auto` uses the table where its error is small enough, `elliptic` for rotated
+footprints too (node_table.cascade).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Index
 from pipeline.truth import monte_carlo
-from pipeline.truth.cloth import Columns, Model, Raw, columns_of, model_of
+from pipeline.truth.cloth import ClothSide, Columns, Raw, cloth_side, columns_of
 from pipeline.truth.node_table.cascade import auto_rows, elliptic_rows, table_rows
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature.adaptive import quadrature_rows
@@ -23,9 +23,9 @@ from pipeline.truth.query import Answers, Queries, validate
 from weaves.fabric import Fabric
 
 
-def _sampled(method: int, model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+def _sampled(method: int, cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     return monte_carlo.sample_rows(
-        model,
+        cloth,
         columns,
         index,
         method,
@@ -37,7 +37,7 @@ def _sampled(method: int, model: Model, columns: Columns, index: Index, options:
     )
 
 
-Estimator = Callable[[Model, Columns, Index, TruthOptions, int], Raw]
+Estimator = Callable[[ClothSide, Columns, Index, TruthOptions, int], Raw]
 
 ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "mc": partial(_sampled, monte_carlo.INDEPENDENT),
@@ -62,7 +62,7 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     queries : Queries
         N questions; viewer and light may be on either side of the cloth.
     options : TruthOptions
-        Estimator, error asked for, and the choices of the model.
+        Estimator, requested error, and the choices of the model.
     seed : int
         Name of the random numbers, 0 <= seed < 2^64.
     start : int
@@ -79,8 +79,8 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     for behind in (False, True):
         index = np.flatnonzero((queries.wo[:, 2] < 0) == behind)
         if index.size:
-            model, columns = model_of(fabric, options, behind), columns_of(queries.take(index), behind)
-            answer = ESTIMATORS[options.estimator](model, columns, start + index, options, seed)
+            cloth, columns = cloth_side(fabric, options, behind), columns_of(queries.take(index), behind)
+            answer = ESTIMATORS[options.estimator](cloth, columns, start + index, options, seed)
             mean[index], error[index], count[index] = answer
     single_mean, single_error = mean.astype(np.float32), error.astype(np.float32)
     return Answers(

@@ -1,9 +1,10 @@
-"""Sampled estimates: points of the footprint in independent replicates, doubled until the error asked for is reached.
+"""Monte Carlo and randomised quasi-Monte Carlo: points of the footprint, doubled until the error is small enough.
 
-A component is the ratio of two sums, f = N / D; its standard error comes from the spread of the replicates' residuals
-N_r - f D_r (the linearised ratio estimator [Cochran1977Sampling]), with REPLICATES - 1 degrees of freedom. Patches that
-are all but hidden go on until every replicate has seen a point, up to HIDDEN_PATIENCE times the limit. The point sets
-differ in how fast the error falls: as count^-1/2 for independent points, faster for the others.
+The points form independent randomisations r of one point set. A component is the ratio of two sums, f = N / D. Its
+standard error comes from the spread of the residuals N_r - f D_r (the linearised ratio estimator
+[Cochran1977Sampling]), with RANDOMISATIONS - 1 degrees of freedom. Patches that are almost hidden get more points until
+every randomisation has seen one, at most HIDDEN_PATIENCE times the limit. The error falls as count^-1/2 for independent
+points, and faster for the other point sets.
 """
 
 from __future__ import annotations
@@ -15,27 +16,29 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.cloth import AREA, SUMS, Columns, Model
+from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.query import HIDDEN_SHARE
-from pipeline.truth.scattering.point import Scene, point_share, scene
+from pipeline.truth.scattering.point import Directions, directions_of, point_share
 
-REPLICATES: Final = 16
+RANDOMISATIONS: Final = 16
 
 HIDDEN_PATIENCE: Final = 16
-"""Times `max_count` that a patch may spend of which some replicate has not seen a single point."""
+"""Times `max_count` that a patch may spend of which some randomisation has not seen a single point."""
 
 INDEPENDENT, JITTERED, R2, OWEN = range(4)
 
 
 @inlined_kernel
-def place_point(columns: Columns, row: int, model: Model, first: float, second: float) -> tuple[float, float, float]:
+def place_point(
+    columns: Columns, row: int, cloth: ClothSide, first: float, second: float
+) -> tuple[float, float, float]:
     """Return the point that two numbers in (0, 1) name in the footprint of a query, and its weight."""
-    picks, ends = model.front.top.shape
+    picks, ends = cloth.front.top.shape
     return place_pair(
-        model.shape,
+        cloth.shape,
         columns.u[row],
         columns.v[row],
         columns.sigma[row],
@@ -49,51 +52,53 @@ def place_point(columns: Columns, row: int, model: Model, first: float, second: 
 
 
 @inlined_kernel
-def add_point(model: Model, x: float, y: float, weight: float, query: Scene, sums: Float64, r: int) -> None:
+def add_point(
+    cloth: ClothSide, x: float, y: float, weight: float, directions: Directions, sums: Float64, r: int
+) -> None:
     """Add the weighted share of a point to row r of the sums, (rows, SUMS)."""
-    family, area, specular, diffuse, through = point_share(model.front, model.back, x, y, query, model.choices)
+    family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
     if family != GAP:
         sums[r, family] += weight * specular
         sums[r, 2 + family] += weight * diffuse
     sums[r, 4] += weight * through
-    sums[r, AREA] += weight * (query.viewer.z if model.projected else area)
+    sums[r, AREA] += weight * (directions.viewer.z if cloth.projected else area)
 
 
 @kernel
-def query_scene(columns: Columns, row: int) -> Scene:
+def query_directions(columns: Columns, row: int) -> Directions:
     """Prepare the directions of a query."""
     wi, wo = columns.wi[row], columns.wo[row]
-    return scene(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2], columns.curvature[row])
+    return directions_of(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2], columns.curvature[row])
 
 
 @kernel
 def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
-    """Write the ratios and their standard errors from the replicates' sums, (REPLICATES, SUMS); count who saw any."""
+    """Write ratios and standard errors from the sums, (RANDOMISATIONS, SUMS); return how many rows saw a point."""
     area, seen = 0.0, 0
-    for r in range(REPLICATES):
+    for r in range(RANDOMISATIONS):
         area += sums[r, AREA]
         seen += sums[r, AREA] > 0.0
     for c in range(AREA):
         mean[c], error[c] = 0.0, 0.0
         if area > 0.0:
             total = 0.0
-            for r in range(REPLICATES):
+            for r in range(RANDOMISATIONS):
                 total += sums[r, c]
             mean[c] = total / area
             spread = 0.0
-            for r in range(REPLICATES):
+            for r in range(RANDOMISATIONS):
                 residual = sums[r, c] - mean[c] * sums[r, AREA]
                 spread += residual * residual
-            error[c] = math.sqrt(spread * REPLICATES / (REPLICATES - 1)) / area
-            if seen < REPLICATES:
-                # The ratio of a few visible replicates follows them: their spread alone would look too small.
+            error[c] = math.sqrt(spread * RANDOMISATIONS / (RANDOMISATIONS - 1)) / area
+            if seen < RANDOMISATIONS:
+                # The ratio of a few visible randomisations follows them: their spread alone would look too small.
                 error[c] = math.hypot(error[c], mean[c] / math.sqrt(seen))
     return seen
 
 
 @kernel
 def sample_rows(
-    model: Model,
+    cloth: ClothSide,
     columns: Columns,
     index: Index,
     method: int,
@@ -107,7 +112,7 @@ def sample_rows(
 
     Parameters
     ----------
-    model, columns : Model, Columns
+    cloth, columns : ClothSide, Columns
         The cloth and the queries.
     index : int (N,)
         Name of each row: its random numbers are a function of (seed, index).
@@ -119,31 +124,31 @@ def sample_rows(
     rows = len(index)
     means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
     counts = np.zeros(rows, np.int64)
-    sums = np.zeros((REPLICATES, SUMS))
+    sums = np.zeros((RANDOMISATIONS, SUMS))
     for row in range(rows):
         key = derive(seed, index[row])
-        query = query_scene(columns, row)
+        directions = query_directions(columns, row)
         mean, error = means[row], errors[row]
         sums[:] = 0.0
-        done, target = 0, min_count // REPLICATES
+        done, target = 0, min_count // RANDOMISATIONS
         while True:
-            # Extend every replicate from `done` to `target` points.
-            for r in range(REPLICATES):
-                replicate = derive(key, r)
+            # Extend every randomisation from `done` to `target` points.
+            for r in range(RANDOMISATIONS):
+                randomisation = derive(key, r)
                 for k in range(done, target):
                     if method == OWEN:
-                        first, second = owen_pair(replicate, k)
+                        first, second = owen_pair(randomisation, k)
                     elif method == R2:
-                        first, second = r2_pair(replicate, k)
+                        first, second = r2_pair(randomisation, k)
                     elif method == JITTERED:
-                        first, second = jittered_pair(replicate, k, k - done, target - done)
+                        first, second = jittered_pair(randomisation, k, k - done, target - done)
                     else:
-                        first, second = independent_pair(replicate, k)
-                    x, y, weight = place_point(columns, row, model, first, second)
-                    add_point(model, x, y, weight, query, sums, r)
+                        first, second = independent_pair(randomisation, k)
+                    x, y, weight = place_point(columns, row, cloth, first, second)
+                    add_point(cloth, x, y, weight, directions, sums, r)
             done = target
 
-            # Stop when the error asked for is reached, or the points are spent.
+            # Stop when the requested error is reached, or the points are spent.
             seen = ratios(sums, mean, error)
             size, squares = 0.0, 0.0
             for c in range(4):
@@ -151,18 +156,18 @@ def sample_rows(
                 squares += error[c] * error[c]
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
-                error[2] = error[3] = abs(query.light.z) / (math.pi * done * REPLICATES)
+                error[2] = error[3] = abs(directions.light.z) / (math.pi * done * RANDOMISATIONS)
                 squares = 2.0 * error[2] * error[2]
             reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
             # A patch of which hardly a point is seen says nothing of its error yet; its points cost little.
-            limit = max_count if seen == REPLICATES else max_count * HIDDEN_PATIENCE
-            if done * REPLICATES >= limit or (reached and seen == REPLICATES):
+            limit = max_count if seen == RANDOMISATIONS else max_count * HIDDEN_PATIENCE
+            if done * RANDOMISATIONS >= limit or (reached and seen == RANDOMISATIONS):
                 break
             target = 2 * done
-        counts[row] = done * REPLICATES
+        counts[row] = done * RANDOMISATIONS
         area = 0.0
-        for r in range(REPLICATES):
+        for r in range(RANDOMISATIONS):
             area += sums[r, AREA]
-        if area < HIDDEN_SHARE * query.viewer.z * counts[row]:
+        if area < HIDDEN_SHARE * directions.viewer.z * counts[row]:
             mean[:], error[:] = 0.0, 0.0
     return means, errors, counts

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
-from pipeline.truth.cloth import Columns, Model
+from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
 from pipeline.truth.node_table.answer import bounded_slope
@@ -21,7 +21,7 @@ A multiplication with an addition is one; so is a maximum, a comparison or a cho
 
 
 @kernel
-def evaluate_points(model: Model, table: Table, columns: Columns, visibility: bool) -> tuple[float, int]:
+def evaluate_points(model: ClothSide, table: Table, columns: Columns, visibility: bool) -> tuple[float, int]:
     """Evaluate all nodes for every query: specular, and with `visibility` all else; return their sum and count."""
     nodes = table.normal.shape[1]
     buffers = np.ones((6, nodes), np.float32)

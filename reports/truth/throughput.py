@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import columns_of, model_of
+from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.node_table.build import Table, tabulate
 from pipeline.truth.options import EstimatorName, TruthOptions
@@ -99,7 +99,7 @@ def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: st
 def _points() -> Iterator[Rate]:
     """Yield points a second: vectorised kernels, NumPy, and what arithmetic alone could do."""
     fabric = load_fabric("polyester_lining")
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     table = tabulate(model.front, model.back, False)
     queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, _SEED, 0, 2000)
     columns = columns_of(queries)
@@ -138,7 +138,7 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
     """Yield patch queries a second of the default distribution, and what plain Monte Carlo would need."""
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
     start = time.perf_counter()
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     tabulate(model.front, model.back, False)
     built = time.perf_counter() - start
     settings: tuple[tuple[EstimatorName, float], ...] = (("table", 0.01), ("auto", 0.02), ("auto", 0.01))

@@ -54,7 +54,7 @@ from pipeline.analytic.horizon_points.shading import (
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
 from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, kernel
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
 from pipeline.truth.footprint.place import EVENLY
 from pipeline.truth.geometry.azimuths import azimuth_rows
@@ -91,7 +91,7 @@ class GaussQuadrature:
         grid: int = 16,
         azimuths: int = 32,
     ) -> None:
-        model = model_of(fabric, TruthOptions())
+        model = cloth_side(fabric, TruthOptions())
         self.shadows, self.soft, self.across, self.along = shadows, soft, across, along
         self.map = horizon_map(model.front, model.back, grid, azimuths)
         self.nodes = gauss_nodes(model.front, self.map, across, along)

@@ -36,7 +36,7 @@ from pipeline.analytic.horizon_points.shading import (
 )  # fmt: skip
 from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.footprint.place import EVENLY
 from pipeline.truth.footprint.sequences import derive
@@ -66,7 +66,7 @@ class HorizonSampler:
     """
 
     def __init__(self, fabric: Fabric, grid: int = 16, azimuths: int = 32) -> None:
-        model = model_of(fabric, TruthOptions())
+        model = cloth_side(fabric, TruthOptions())
         self.map = horizon_map(model.front, model.back, grid, azimuths)
 
     def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> npt.NDArray[np.float32]:

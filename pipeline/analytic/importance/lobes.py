@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.importance.point import flake_scatter_pdf, sample_flake_scatter
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import Columns, Model
+from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import r2_pair
 from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
@@ -63,7 +63,7 @@ class Lobes(NamedTuple):
 
 @kernel
 def find_lobes(
-    model: Model, columns: Columns, count: int, widening: float, specular: Floats, diffuse: Floats, through: Floats
+    model: ClothSide, columns: Columns, count: int, widening: float, specular: Floats, diffuse: Floats, through: Floats
 ) -> Lobes:
     """Return the mixtures of queries, whose wi does not matter, from `count` points each.
 

@@ -24,7 +24,7 @@ from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import tabulate_waves
 from pipeline.compiled.arrays import Float32 as Single
 from pipeline.compiled.arrays import Index
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
@@ -125,7 +125,7 @@ class Table(NamedTuple):
 
 def tabulate(fabric: Fabric) -> Table:
     """Build the table of a fabric's front, as the default model of the truth sees it."""
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     front = model.front
     picks, ends = front.top.shape
 

@@ -40,7 +40,7 @@ from pipeline.models.networks.texture import level_shapes, random_pyramid, read_
 from pipeline.models.networks.texture_network import TextureNetwork
 from pipeline.models.one_material import OneMaterial, restored
 from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.opacity import has_gaps
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -239,7 +239,7 @@ def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:
 def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
     """Return an untrained network with its questions about the silhouette; there must be exactly one fabric."""
     (fabric,) = fabrics
-    front = model_of(fabric, TruthOptions()).front
+    front = cloth_side(fabric, TruthOptions()).front
     fall = _NO_FALL if has_gaps(front) else float(front.highest - front.lowest)
     return CurvedNetwork(options, fabric.weave.repeat, draw_silhouettes(options, fabric), fall)
 

@@ -1,1 +1,1 @@
-"""Tests of physical invariants on any fabric: invariants, and check_result for what is said of each."""
+"""Checks of physical invariants on any fabric: invariants, and check_result for the result of each."""

@@ -1,7 +1,7 @@
-"""What is said of a measured number: that it holds exactly, within its statistical error, or not.
+"""The result of a check: a number holds exactly, within its statistical error, or not.
 
-A number without statistical error holds if it is what it should be up to rounding; many with errors hold if Student's t
-of the worst stays below the quantile of `LEVEL`, corrected after Sidak for how many they are.
+A number without statistical error holds if it equals its expected value up to rounding. Many numbers with errors hold
+if Student's t of the worst stays below the quantile of `LEVEL`, with Sidak's correction for their number.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from scipy import stats
 from pipeline.compiled.arrays import Float64
 
 LEVEL: Final = 1e-4
-"""Probability that an invariant that holds is called broken."""
+"""Probability that a check fails although the invariant holds."""
 
 ROUNDING: Final = 2e-6
 """Relative error of a few operations on answers in single precision."""
 
 
-class Invariant(NamedTuple):
-    """One thing that must hold, and whether it does.
+class CheckResult(NamedTuple):
+    """A measured number, its expected value, and whether both agree.
 
     Attributes
     ----------
@@ -31,8 +31,8 @@ class Invariant(NamedTuple):
     measured, expected, standard_error : float
         The number, what it should be, and its uncertainty, 0 if it has none.
     relation : str
-        Whether it should be equal or at most so large; ``reported``: there is nothing it should be.
-    verdict : str
+        Whether it should be equal or at most so large; ``reported``: there is no expected value.
+    status : str
         ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
     note : str
         What else to know.
@@ -43,7 +43,7 @@ class Invariant(NamedTuple):
     expected: float
     standard_error: float
     relation: Literal["=", "<=", "reported"]
-    verdict: Literal["exact", "statistics", "broken", "reported"]
+    status: Literal["exact", "statistics", "broken", "reported"]
     note: str
 
     @property
@@ -54,10 +54,10 @@ class Invariant(NamedTuple):
 
 def exact(
     name: str, measured: float, expected: float, tolerance: float, relation: Literal["=", "<="] = "=", note: str = ""
-) -> Invariant:
-    """Judge a number without statistical error; NaN is broken."""
+) -> CheckResult:
+    """Check a number without statistical error; NaN is broken."""
     beyond = measured - expected if relation == "<=" else abs(measured - expected)
-    return Invariant(name, measured, expected, 0.0, relation, "exact" if beyond <= tolerance else "broken", note)
+    return CheckResult(name, measured, expected, 0.0, relation, "exact" if beyond <= tolerance else "broken", note)
 
 
 def worst(
@@ -68,8 +68,8 @@ def worst(
     freedom: int,
     relation: Literal["=", "<="] = "=",
     note: str = "",
-) -> Invariant:
-    """Judge many numbers by the one that lies furthest off in its standard errors, which is the one returned.
+) -> CheckResult:
+    """Check many numbers; the result is that of the number furthest off, in its standard errors.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ def worst(
     limit = float(stats.t.isf(level if relation == "<=" else level / 2.0, freedom))
     holds = bool(score[row] <= limit)
     note = note or (f"worst of {len(values)}, limit {limit:.1f} σ" if len(values) > 1 else "")
-    verdict: Literal["statistics", "broken"] = "statistics" if holds else "broken"
-    return Invariant(name, float(values[row]), expected, float(spread[row]), relation, verdict, note)
+    status: Literal["statistics", "broken"] = "statistics" if holds else "broken"
+    return CheckResult(name, float(values[row]), expected, float(spread[row]), relation, status, note)
 
 
 def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Float64:

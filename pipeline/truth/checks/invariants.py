@@ -1,6 +1,6 @@
-"""What must hold of any cloth, tested on one fabric: reciprocity, energy, periodicity, agreement of the estimators.
+"""Physical invariants of a fabric: reciprocity, energy, periodicity, agreement of the estimators.
 
-Every test returns records of what was measured, what it should be and whether it is
+Every test returns check results: measured value, expected value, and whether both agree
 (pipeline.truth.checks.check_result).
 """
 
@@ -16,12 +16,12 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.checks.check_result import ROUNDING, Invariant, exact, largest, quotient, worst
-from pipeline.truth.cloth import AREA, SUMS, Columns, Model, columns_of, model_of
+from pipeline.truth.checks.check_result import ROUNDING, CheckResult, exact, largest, quotient, worst
+from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.monte_carlo import REPLICATES, query_scene, ratios
+from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions, ratios
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.microflake import density, sigma
@@ -33,12 +33,12 @@ from weaves.surface import GAP as NO_YARN
 from weaves.surface import surface_at
 
 _SEED = 20_250_101
-_STEPS = 128  # directions of light in each replicate of a furnace
-_LATTICE = 256.0  # points of each replicate along a side of the repeat
+_STEPS = 128  # directions of light in each randomisation of a furnace
+_LATTICE = 256.0  # points of each randomisation along a side of the repeat
 _WIDE = 4.0  # repeats: a Gaussian this wide is the average over the repeat
 
 
-def point_reciprocity(fabric: Fabric) -> list[Invariant]:
+def point_reciprocity(fabric: Fabric) -> list[CheckResult]:
     """Test f(wi, wo) = f(wo, wi) of the specular point model, at random points and directions on both sides of them."""
     rng = np.random.default_rng(_SEED)
     rows = 2000
@@ -76,10 +76,10 @@ def _scattered(
     return slab(flakes, sigma_i, sigma_o, abs(cos_i), abs(cos_o), thickness)
 
 
-def patch_reciprocity(fabric: Fabric) -> list[Invariant]:
+def patch_reciprocity(fabric: Fabric) -> list[CheckResult]:
     """Test that f_P(wi, wo) |wo.n_s| = f_P(wo, wi) |wi.n_s| for the specular part, if the normaliser is "projected".
 
-    How far "visible" breaks it is a number without a verdict.
+    How far "visible" breaks it is a number without a status.
     """
     rng = np.random.default_rng(_SEED + 1)
     rows = 24
@@ -103,10 +103,10 @@ def patch_reciprocity(fabric: Fabric) -> list[Invariant]:
     found.append(worst("… with other points on the way back", quotient(f_back, f) - 1.0, 0.0, spread, 15))
     broken = np.abs(quotient(*(value(queries, 1)[0] for queries in (there, back))) - 1.0)
     note = f"median {np.median(broken):.3f}: the walls at float ends are in no height field"
-    return [*found, Invariant("… with the default, visible", broken.max(), 0.0, 0.0, "reported", "reported", note)]
+    return [*found, CheckResult("… with the default, visible", broken.max(), 0.0, 0.0, "reported", "reported", note)]
 
 
-def range_of_values(fabric: Fabric) -> list[Invariant]:
+def range_of_values(fabric: Fabric) -> list[CheckResult]:
     """Test that no answer is negative or not finite, and 0 <= transparency <= 1, over everything that can be asked."""
     rng = np.random.default_rng(_SEED + 2)
     angles = (0.0, 45.0, 80.0, 89.0, 89.9)
@@ -122,7 +122,7 @@ def range_of_values(fabric: Fabric) -> list[Invariant]:
             wo[grid[3] > 1, 2] *= -1.0
             queries = _queries(fabric, wi, wo, grid[2], rng)
             queries.curvature[(grid[3] < 2) & (rng.random(grid.shape[1]) < 0.3)] = 0.1
-            # With so coarse an error asked for, auto answers by the table what the table can answer.
+            # With so coarse an requested error, auto answers by the table what the table can answer.
             options = _fixed(32, estimator=estimator, footprint=footprint, relative_error=1.0)
             answers = estimate(cloth, queries, options, 3)
             for column in answers:
@@ -138,28 +138,28 @@ def range_of_values(fabric: Fabric) -> list[Invariant]:
     ]
 
 
-def energy(fabric: Fabric) -> list[Invariant]:
+def energy(fabric: Fabric) -> list[CheckResult]:
     """Test that no light is made: unit radiance from everywhere is seen as at most 1, if k_d, k_dt or k_s is 1.
 
     int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at several angles of wo; k_s with all that goes
-    straight through. Directions are uniform on the hemisphere, low-discrepancy, shifted at random for each replicate.
+    straight through. Directions are low-discrepancy points of the hemisphere, randomly shifted in each randomisation.
     """
     rng = np.random.default_rng(_SEED + 3)
     found = []
     for theta in (0.0, 30.0, 60.0, 80.0):
         diffuse, specular = [], []
-        wo = _turned(np.full(REPLICATES * _STEPS, theta), np.full(REPLICATES * _STEPS, 0.7))
+        wo = _turned(np.full(RANDOMISATIONS * _STEPS, theta), np.full(RANDOMISATIONS * _STEPS, 0.7))
         for side in (1.0, -1.0):
-            shift = rng.random((REPLICATES, 1, 2))
+            shift = rng.random((RANDOMISATIONS, 1, 2))
             steps = np.arange(_STEPS)[:, None] * (0.7548776662466927, 0.5698402909980532)
             z, turn = ((steps + shift) % 1.0).reshape(-1, 2).T
             sine, turn = np.sqrt(1.0 - z * z), turn * 2.0 * math.pi
             wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), side * np.maximum(z, 1e-4)], axis=-1)
             answers = estimate(fabric, _queries(fabric, wi, wo, _repeat_sigma(fabric), rng), _fixed(256), 4)
-            mean = answers.mean.astype(np.float64).reshape(REPLICATES, _STEPS, 4).mean(axis=1) * 2.0 * math.pi
+            mean = answers.mean.astype(np.float64).reshape(RANDOMISATIONS, _STEPS, 4).mean(axis=1) * 2.0 * math.pi
             diffuse.append(mean[:, 2:].sum(axis=1))
             specular.append(mean[:, :2].sum(axis=1))
-        through = answers.transparency.astype(np.float64).reshape(REPLICATES, _STEPS).mean(axis=1)
+        through = answers.transparency.astype(np.float64).reshape(RANDOMISATIONS, _STEPS).mean(axis=1)
         parts = (
             ("white furnace, reflected, k_d = 1", diffuse[0], ""),
             ("white furnace, transmitted, k_dt = 1", diffuse[1], ""),
@@ -172,12 +172,12 @@ def energy(fabric: Fabric) -> list[Invariant]:
             ),
         )
         for name, total, note in parts:
-            spread = total.std(ddof=1) / math.sqrt(REPLICATES)
-            found.append(worst(f"{name}: {theta:.0f}°", total.mean(), 1.0, spread, REPLICATES - 1, "<=", note))
+            spread = total.std(ddof=1) / math.sqrt(RANDOMISATIONS)
+            found.append(worst(f"{name}: {theta:.0f}°", total.mean(), 1.0, spread, RANDOMISATIONS - 1, "<=", note))
     return sorted(found, key=lambda item: item.name.split(":")[0])
 
 
-def projected_area(fabric: Fabric) -> list[Invariant]:
+def projected_area(fabric: Fabric) -> list[CheckResult]:
     """Test that a viewer sees at most the projected area: <A V> <= |wo.n_s|, for closed height fields equal.
 
     The quotient of the answers under the two normalisers, from the same points.
@@ -185,7 +185,7 @@ def projected_area(fabric: Fabric) -> list[Invariant]:
     rng = np.random.default_rng(_SEED + 5)
     found = []
     for theta, turn in ((0.0, 0.0), *itertools.product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
-        wo = _turned(np.full(REPLICATES, theta), np.full(REPLICATES, turn))
+        wo = _turned(np.full(RANDOMISATIONS, theta), np.full(RANDOMISATIONS, turn))
         queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _repeat_sigma(fabric), rng)
         projected, visible = (
             estimate(fabric, queries, _fixed(16_384, normaliser=normaliser), 5)
@@ -194,13 +194,13 @@ def projected_area(fabric: Fabric) -> list[Invariant]:
             for normaliser in ("projected", "visible")
         )
         share = projected / visible
-        spread = share.std(ddof=1) / math.sqrt(REPLICATES)
+        spread = share.std(ddof=1) / math.sqrt(RANDOMISATIONS)
         name = f"visible area / cos: {theta:.0f}°" + (f", azimuth {turn:g}" if theta else "")
-        found.append(worst(name, share.mean(), 1.0, spread if spread > ROUNDING else 0.0, REPLICATES - 1, "<="))
+        found.append(worst(name, share.mean(), 1.0, spread if spread > ROUNDING else 0.0, RANDOMISATIONS - 1, "<="))
     return found
 
 
-def repeat_average(fabric: Fabric) -> list[Invariant]:
+def repeat_average(fabric: Fabric) -> list[CheckResult]:
     """Test that boxes of whole repeats and wide Gaussians are the repeat average, taken on shifted lattices.
 
     Colour is applied afterwards: the components add up to the whole that is coloured point by point.
@@ -209,7 +209,7 @@ def repeat_average(fabric: Fabric) -> list[Invariant]:
     ends, picks = fabric.weave.repeat
     rows = 6
     queries = _queries(fabric, _directions(rng, rows, 70.0), _directions(rng, rows, 70.0), 1.0, rng)
-    model, columns = model_of(fabric, TruthOptions()), columns_of(queries)
+    cloth, columns = cloth_side(fabric, TruthOptions()), columns_of(queries)
     mean, error, whole = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows)
     colours = np.array(
         [
@@ -219,7 +219,9 @@ def repeat_average(fabric: Fabric) -> list[Invariant]:
     )
     side = max(4, round(_LATTICE / math.sqrt(ends * picks)))
     for row in range(rows):
-        whole[row] = _lattice(model, columns, row, side, rng.random((REPLICATES, 2)), colours, mean[row], error[row])
+        whole[row] = _lattice(
+            cloth, columns, row, side, rng.random((RANDOMISATIONS, 2)), colours, mean[row], error[row]
+        )
     found = []
     for seed, (name, footprint, size) in enumerate(
         (
@@ -235,7 +237,7 @@ def repeat_average(fabric: Fabric) -> list[Invariant]:
         seen = mean[:, :4] > 1e-7
         scale = mean[:, :4][seen]
         spread = np.hypot(answers.standard_error, error[:, :4])[seen] / scale
-        found.append(worst(f"{name} / repeat average", answers.mean[seen] / scale, 1.0, spread, REPLICATES - 1))
+        found.append(worst(f"{name} / repeat average", answers.mean[seen] / scale, 1.0, spread, RANDOMISATIONS - 1))
     apart = largest(quotient(mean[:, :4] @ colours, whole) - 1.0)
     found.append(exact("coloured components / coloured whole − 1", apart, 0.0, 1e-12))
     return found
@@ -243,7 +245,7 @@ def repeat_average(fabric: Fabric) -> list[Invariant]:
 
 @kernel
 def _lattice(
-    model: Model,
+    cloth: ClothSide,
     columns: Columns,
     row: int,
     side: int,
@@ -253,13 +255,15 @@ def _lattice(
     error: Float64,
 ) -> float:
     """Average a query over the repeat by shifted square lattices; write the components, return the coloured whole."""
-    picks, ends = model.front.top.shape
-    query, sums, coloured = query_scene(columns, row), np.zeros((REPLICATES, SUMS)), 0.0
-    for r in range(REPLICATES):
+    picks, ends = cloth.front.top.shape
+    directions, sums, coloured = query_directions(columns, row), np.zeros((RANDOMISATIONS, SUMS)), 0.0
+    for r in range(RANDOMISATIONS):
         for a in range(side * ends):
             for b in range(side * picks):
                 x, y = (a + shifts[r, 0]) / side, (b + shifts[r, 1]) / side
-                family, area, specular, diffuse, _ = point_share(model.front, model.back, x, y, query, model.choices)
+                family, area, specular, diffuse, _ = point_share(
+                    cloth.front, cloth.back, x, y, directions, cloth.choices
+                )
                 sums[r, AREA] += area
                 if family != GAP:
                     sums[r, family] += specular
@@ -269,7 +273,7 @@ def _lattice(
     return float(coloured / sums[:, AREA].sum())
 
 
-def translation(fabric: Fabric) -> list[Invariant]:
+def translation(fabric: Fabric) -> list[CheckResult]:
     """Test that a move by whole repeats changes nothing, between positions that single precision holds exactly."""
     rng = np.random.default_rng(_SEED + 7)
     rows = 16
@@ -286,7 +290,7 @@ def translation(fabric: Fabric) -> list[Invariant]:
     return found
 
 
-def agreement(fabric: Fabric) -> list[Invariant]:
+def agreement(fabric: Fabric) -> list[CheckResult]:
     """Test that all estimators give the same answers, each compared with one of them that takes more points.
 
     One that does not know the cloth, as `table` does not a large irregular draft, is left out.
@@ -308,7 +312,7 @@ def agreement(fabric: Fabric) -> list[Invariant]:
     return found
 
 
-INVARIANTS: Final[tuple[Callable[[Fabric], list[Invariant]], ...]] = (
+INVARIANTS: Final[tuple[Callable[[Fabric], list[CheckResult]], ...]] = (
     point_reciprocity,
     patch_reciprocity,
     range_of_values,

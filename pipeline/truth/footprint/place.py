@@ -15,6 +15,7 @@ from typing import Final
 
 from pipeline.compiled.decorators import inlined_kernel
 from pipeline.compiled.normal import normal_quantile
+from pipeline.truth.geometry.march import wrap
 
 GAUSSIAN, BOX = 0, 1
 
@@ -26,13 +27,6 @@ EVENLY: Final = 0.6
 2 exp(-2 pi^2 .36)."""
 
 BOX_SIDE = math.sqrt(12.0)  # side of the square whose standard deviation is 1
-
-
-@inlined_kernel
-def _wrap(x: float, repeat: float) -> float:
-    """Return x modulo the repeat, in [0, repeat)."""
-    wrapped = x - repeat * math.floor(x / repeat)
-    return wrapped if 0.0 <= wrapped < repeat else 0.0
 
 
 @inlined_kernel
@@ -50,24 +44,24 @@ def place(shape: int, centre: float, sigma: float, repeat: float, number: float)
     """
     if shape == GAUSSIAN:
         if sigma < _WIDE_GAUSSIAN * repeat:
-            return _wrap(centre + sigma * normal_quantile(number), repeat), 1.0
+            return wrap(centre + sigma * normal_quantile(number), repeat), 1.0
         offset = 2.0 * math.pi * (number - 0.5)
         damping = -2.0 * (math.pi * sigma / repeat) ** 2
         weight = 1.0
         if damping > -40.0:
             for k in range(1, _HARMONICS + 1):
                 weight += 2.0 * math.exp(damping * k * k) * math.cos(k * offset)
-        return _wrap(centre + (number - 0.5) * repeat, repeat), max(weight, 0.0)
+        return wrap(centre + (number - 0.5) * repeat, repeat), max(weight, 0.0)
     side = BOX_SIDE * sigma
     if side < repeat:
-        return _wrap(centre + (number - 0.5) * side, repeat), 1.0
+        return wrap(centre + (number - 0.5) * side, repeat), 1.0
     # So many whole repeats everywhere, and one more within what is left around the centre (or its opposite).
     whole = math.floor(side / repeat)
     rest = side / repeat - whole
     distance = abs(number - 0.5) * 2.0
     odd = whole % 2.0 == 1.0
     near = distance > 1.0 - rest if odd else distance < rest
-    return _wrap(centre + (number - 0.5) * repeat, repeat), (whole + (1.0 if near else 0.0)) * repeat / side
+    return wrap(centre + (number - 0.5) * repeat, repeat), (whole + (1.0 if near else 0.0)) * repeat / side
 
 
 _EVEN = 1.0  # in repeats: both axes of a Gaussian this wide cover the repeat evenly, to 4e-16
@@ -109,9 +103,9 @@ def place_pair(
         return x, y, weight_x * weight_y
     if shape == GAUSSIAN:
         if min(sigma, sigma_minor) >= _EVEN * max(ends, picks):
-            return _wrap(u + first * ends, ends), _wrap(v + second * picks, picks), 1.0
+            return wrap(u + first * ends, ends), wrap(v + second * picks, picks), 1.0
         a, b = sigma * normal_quantile(first), sigma_minor * normal_quantile(second)
     else:
         a, b = BOX_SIDE * sigma * (first - 0.5), BOX_SIDE * sigma_minor * (second - 0.5)
     cosine, sine = math.cos(angle), math.sin(angle)
-    return _wrap(u + a * cosine - b * sine, ends), _wrap(v + a * sine + b * cosine, picks), 1.0
+    return wrap(u + a * cosine - b * sine, ends), wrap(v + a * sine + b * cosine, picks), 1.0

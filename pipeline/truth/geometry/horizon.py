@@ -31,12 +31,14 @@ from pipeline.truth.geometry.heightfield import (
     surface_at,
     torus_height,
 )
+from pipeline.truth.geometry.march import Cell, first_cell, float_on_top, next_cell, span_on_top, stride
 
 _HALVINGS, _SECANTS = 3, 4
 _STRIP_POINTS = 8
 _NEAREST = 1e-6
 _FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are not told apart
 _STEEPEST = 1e4
+_FARTHEST = 1e4  # yarn spacings
 
 
 @kernel
@@ -49,10 +51,7 @@ def _slope_of_top(
     dy: float,
     a: float,
     b: float,
-    end: int,
-    pick: int,
-    column: int,
-    row: int,
+    cell: Cell,
     best: float,
 ) -> float:
     """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
@@ -60,11 +59,11 @@ def _slope_of_top(
     The slope is greatest where its tangent passes through the point, at the root of (h - z) - s h', which rises with s.
     """
     # The ray in the frame of the float.
-    family = int(field.top[pick, end])
-    yarn, own = field.yarn[family], field.floats[pick, end, TOP]
+    family = int(field.top[cell.pick, cell.end])
+    yarn, own = field.yarn[family], field.floats[cell.pick, cell.end, TOP]
     r, inverse_r, beta = yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA]
     bend, length, drop = own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP]
-    x, y = local_position(family, own[OFFSET], x, y, column, row)
+    x, y = local_position(family, own[OFFSET], x, y, cell.column, cell.row)
     if family != WARP:
         dx, dy = dy, -dx
 
@@ -118,12 +117,10 @@ def _slope_of_strip(
     dy: float,
     a: float,
     b: float,
-    end: int,
-    pick: int,
-    column: int,
-    row: int,
+    cell: Cell,
 ) -> float:
-    """Return the greatest slope to the yarn beneath between distances a and b, searched point by point."""
+    """Return the greatest slope to the yarn beneath between distances a and b; tested at `_STRIP_POINTS` points."""
+    end, pick, column, row = cell.end, cell.pick, cell.column, cell.row
     family = 1 - int(field.top[pick, end])
     best = 0.0
     a, b = span_over(field, family, x, y, dx, dy, a, b, column, row)
@@ -152,58 +149,24 @@ def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: flo
         Unit azimuth.
     """
     picks, ends = field.top.shape
-    column, row = int(x), int(y)
-    end, pick = column, row
-    step_x = 1 if dx >= 0.0 else -1
-    step_y = 1 if dy >= 0.0 else -1
-    stride_x = 1.0 / abs(dx) if dx != 0.0 else math.inf
-    stride_y = 1.0 / abs(dy) if dy != 0.0 else math.inf
-    next_x = ((column + 1 - x) if step_x > 0 else (x - column)) * stride_x if dx != 0.0 else math.inf
-    next_y = ((row + 1 - y) if step_y > 0 else (y - row)) * stride_y if dy != 0.0 else math.inf
-    own = int(field.top[pick, end]) if side == TOP else -1
-    own_line = column if own == WARP else row
-    own_centre = (row if own == WARP else column) - field.floats[pick, end, TOP, OFFSET]
+    stride_x, stride_y = stride(dx), stride(dy)
+    cell = first_cell(x, y, dx, dy, stride_x, stride_y)
+    own_family, own_yarn, own_centre = float_on_top(field, cell)
     best, distance = 0.0, 0.0
-    while field.highest - z > max(best, _FLATTEST) * distance:
-        leave = min(next_x, next_y)
-        if field.crown[pick, end] - z > best * distance and leave > distance:
-            family = int(field.top[pick, end])
-            line = column if family == WARP else row
-            centre = (row if family == WARP else column) - field.floats[pick, end, TOP, OFFSET]
-            is_own = family == own and line == own_line and centre == own_centre
-            radius = field.yarn[family, RADIUS]
-            # The way through the cell, split where it enters and leaves a narrow top yarn.
-            enter, exit_ = distance, leave
-            if radius < 0.5:
-                across, _ = local_position(family, 0.0, x, y, column, row)
-                slope = dx if family == WARP else dy
-                if slope == 0.0:
-                    enter = distance if abs(across) <= radius else leave
-                else:
-                    first, second = (-radius - across) / slope, (radius - across) / slope
-                    enter = min(max(min(first, second), distance), leave)
-                    exit_ = min(max(max(first, second), distance), leave)
-                if enter > distance:
-                    slope_here = _slope_of_strip(field, x, y, z, dx, dy, distance, enter, end, pick, column, row)
-                    best = max(best, slope_here)
-                if leave > exit_:
-                    slope_here = _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, end, pick, column, row)
-                    best = max(best, slope_here)
+    while distance <= _FARTHEST and field.highest - z > max(best, _FLATTEST) * distance:
+        leave = min(cell.next_x, cell.next_y)
+        if field.crown[cell.pick, cell.end] - z > best * distance and leave > distance:
+            family, yarn, centre = float_on_top(field, cell)
+            is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
+            enter, exit_ = span_on_top(field, cell, x, y, dx, dy, distance, leave)
+            if enter > distance:
+                best = max(best, _slope_of_strip(field, x, y, z, dx, dy, distance, enter, cell))
+            if leave > exit_:
+                best = max(best, _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, cell))
             if exit_ > enter and not is_own:
-                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, end, pick, column, row, best)
+                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, cell, best)
         distance = leave
-        if distance > 1e4:
-            break
-        if next_x <= next_y:
-            next_x += stride_x
-            column += step_x
-            end += step_x
-            end = 0 if end == ends else (ends - 1 if end < 0 else end)
-        else:
-            next_y += stride_y
-            row += step_y
-            pick += step_y
-            pick = 0 if pick == picks else (picks - 1 if pick < 0 else pick)
+        cell = next_cell(cell, dx, dy, stride_x, stride_y, ends, picks)
     return best
 
 

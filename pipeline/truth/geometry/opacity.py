@@ -19,11 +19,12 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import Columns, Model, columns_of, model_of
+from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
+from pipeline.truth.geometry.march import wrap
 from pipeline.truth.geometry.visibility import Ray, ray, visible
-from pipeline.truth.monte_carlo import REPLICATES, place_point
+from pipeline.truth.monte_carlo import RANDOMISATIONS, place_point
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries, validate
 from weaves.errors import BadInput
@@ -34,24 +35,17 @@ _BISECTIONS = 50
 
 
 @kernel
-def _wrapped(x: float, repeat: int) -> float:
-    """Return x modulo the repeat, in [0, repeat)."""
-    inside = x - repeat * math.floor(x / repeat)
-    return inside if 0.0 <= inside < repeat else 0.0
-
-
-@kernel
 def _open_at(field: HeightField, x: float, y: float) -> tuple[bool, float]:
-    """Say whether (x, y), anywhere on the endless cloth, is a gap, and return the height there."""
+    """Return whether (x, y), anywhere on the endless cloth, is a gap, and the height there."""
     picks, ends = field.top.shape
-    x, y = _wrapped(x, ends), _wrapped(y, picks)
+    x, y = wrap(x, ends), wrap(y, picks)
     family, _, height, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y), False)
     return family == GAP, height
 
 
 @kernel
 def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Say whether a sinking ray from the boundary above (x, y) goes through a gap and meets no yarn.
+    """Return whether a sinking ray from the boundary above (x, y) goes through a gap and meets no yarn.
 
     With H the boundary's height, rise < 0 the ray's slope there and q its slope where it crosses the plane, downwards:
     q^2 = rise^2 - 2 kappa H.
@@ -72,13 +66,13 @@ def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: 
     if q == math.inf:
         return True
     back_up = Ray(-towards.x, -towards.y, -towards.z, -dx, -dy, q, bend, towards.stride_x, towards.stride_y)
-    if not visible(front, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, back_up):
+    if not visible(front, wrap(x, ends), wrap(y, picks), 0.0, UNDER, back_up):
         return False
 
     # Beneath the plane, mirrored: the depth q s - kappa s^2 / 2 has to stay greater than that of the yarns.
     onward = Ray(towards.x, towards.y, -towards.z, dx, dy, q, bend, towards.stride_x, towards.stride_y)
     if bend <= 0.0:
-        return visible(back, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, onward)
+        return visible(back, wrap(x, ends), wrap(y, picks), 0.0, UNDER, onward)
     square -= 2.0 * bend * back.highest
     leaves = square > 0.0
     length = 2.0 * back.highest / (q + math.sqrt(square)) if leaves else 2.0 * q / bend
@@ -94,18 +88,18 @@ def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: 
     # Up again on this side.
     x, y = x + length * dx, y + length * dy
     empty, _ = _open_at(front, x, y)
-    return empty and visible(front, _wrapped(x, ends), _wrapped(y, picks), 0.0, UNDER, onward)
+    return empty and visible(front, wrap(x, ends), wrap(y, picks), 0.0, UNDER, onward)
 
 
 @kernel
 def has_gaps(field: HeightField) -> bool:
-    """Say whether there are points that no yarn covers."""
+    """Return whether there are points that no yarn covers."""
     return bool(field.yarn[WARP, RADIUS] < 0.5 and field.yarn[WEFT, RADIUS] < 0.5)
 
 
 @kernel
 def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Say whether a ray that enters the boundary above the point (x, y) of the repeat, sinking, hits any yarn.
+    """Return whether a ray that enters the boundary above the point (x, y) of the repeat, sinking, hits any yarn.
 
     Parameters
     ----------
@@ -123,7 +117,7 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
 
 @kernel
 def _opacity_rows(
-    model: Model,
+    cloth: ClothSide,
     columns: Columns,
     index: Index,
     tolerance: float,
@@ -131,34 +125,34 @@ def _opacity_rows(
     max_count: int,
     seed: np.uint64,
 ) -> tuple[Float64, Float64]:
-    """Return opacities and their standard errors (N,): ratios of replicates' sums, doubled up to the tolerance."""
+    """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance."""
     rows = len(index)
     means, errors = np.zeros(rows), np.zeros(rows)
-    sums = np.zeros((REPLICATES, 2))
+    sums = np.zeros((RANDOMISATIONS, 2))
     for row in range(rows):
         wo = columns.wo[row]
         if wo[2] <= 0.0:
             continue
         towards = ray(-wo[0], -wo[1], -wo[2], columns.curvature[row])
-        fall = model.front.highest - model.front.lowest
-        if not has_gaps(model.front) and towards.rise * towards.rise >= 2.0 * towards.bend * fall:
+        fall = cloth.front.highest - cloth.front.lowest
+        if not has_gaps(cloth.front) and towards.rise * towards.rise >= 2.0 * towards.bend * fall:
             means[row] = 1.0  # the ray sinks below every yarn
             continue
         key = derive(seed, index[row])
         sums[:] = 0.0
-        hit, done, target = 0, 0, min_count // REPLICATES
+        hit, done, target = 0, 0, min_count // RANDOMISATIONS
         while True:
-            for r in range(REPLICATES):
-                replicate = derive(key, r)
+            for r in range(RANDOMISATIONS):
+                randomisation = derive(key, r)
                 for k in range(done, target):
-                    first, second = owen_pair(replicate, k)
-                    x, y, weight = place_point(columns, row, model, first, second)
+                    first, second = owen_pair(randomisation, k)
+                    x, y, weight = place_point(columns, row, cloth, first, second)
                     sums[r, 1] += weight
-                    if hits(model.front, model.back, x, y, towards):
+                    if hits(cloth.front, cloth.back, x, y, towards):
                         sums[r, 0] += weight
                         hit += 1
             done = target
-            points = done * REPLICATES
+            points = done * RANDOMISATIONS
             total = sums[:, 1].sum()
             means[row] = sums[:, 0].sum() / total
             if hit == 0 or hit == points:
@@ -166,9 +160,9 @@ def _opacity_rows(
                 errors[row] = math.sqrt((points + 1.0) / (points + 3.0)) / (points + 2.0)
             else:
                 spread = 0.0
-                for r in range(REPLICATES):
+                for r in range(RANDOMISATIONS):
                     spread += (sums[r, 0] - means[row] * sums[r, 1]) ** 2
-                errors[row] = math.sqrt(spread * REPLICATES / (REPLICATES - 1)) / total
+                errors[row] = math.sqrt(spread * RANDOMISATIONS / (RANDOMISATIONS - 1)) / total
             if errors[row] <= tolerance or points >= max_count:
                 break
             target = 2 * done
@@ -210,7 +204,7 @@ def opacity(
     validate(queries._replace(wi=lifted, wo=lifted))
     index = start + np.arange(len(queries.u))
     mean, error = _opacity_rows(
-        model_of(fabric, options),
+        cloth_side(fabric, options),
         columns_of(queries._replace(wi=lifted)),
         index,
         options.relative_error,
@@ -232,7 +226,7 @@ def _grazing_rows(
     picks, ends = field.top.shape
     cosines = np.zeros(len(u))
     for row in range(len(u)):
-        x, y = _wrapped(u[row], ends), _wrapped(v[row], picks)
+        x, y = wrap(u[row], ends), wrap(v[row], picks)
         dx, dy = -math.cos(azimuth[row]), -math.sin(azimuth[row])
         # Bisection in the tangent of the angle to the boundary; at the upper end the ray sinks below every yarn.
         low, high = 0.0, math.sqrt(2.0 * curvature[row] * (field.highest - field.lowest))
@@ -286,5 +280,5 @@ def grazing_cosine(
     if wrong.any():
         raise BadInput("queries", "curvature", float(columns[3][wrong].flat[0]), f"from 0 to {STEEPEST_CURVATURE:g}")
     flat = [np.ascontiguousarray(column).reshape(-1) for column in columns]
-    cosines = _grazing_rows(model_of(fabric, TruthOptions()).front, *flat)
+    cosines = _grazing_rows(cloth_side(fabric, TruthOptions()).front, *flat)
     return np.asarray(cosines.reshape(columns[0].shape))

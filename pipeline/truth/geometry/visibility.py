@@ -15,17 +15,8 @@ import math
 from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.geometry.heightfield import (
-    OFFSET,
-    RADIUS,
-    TOP,
-    UNDER,
-    WARP,
-    HeightField,
-    height_along,
-    local_position,
-    span_over,
-)
+from pipeline.truth.geometry.heightfield import TOP, UNDER, HeightField, height_along, span_over
+from pipeline.truth.geometry.march import Cell, first_cell, float_on_top, next_cell, span_on_top, stride
 
 _STRIP_POINTS = 16
 _MAX_CELLS = 100_000  # a ray this long is as good as parallel to the cloth
@@ -33,7 +24,7 @@ _NARROWINGS = 40
 
 
 class Ray(NamedTuple):
-    """A direction as `visible` reads it; the same for every point of a query.
+    """A direction prepared for `visible`; the same for every point of a query.
 
     Attributes
     ----------
@@ -75,12 +66,10 @@ def _piece_blocks(
     towards: Ray,
     start: float,
     stop: float,
-    end: int,
-    pick: int,
-    column: int,
-    row: int,
+    cell: Cell,
 ) -> bool:
-    """Say whether the top piece of a cell reaches the ray between distances `start` and `stop`."""
+    """Return whether the top piece of a cell reaches the ray between distances `start` and `stop`."""
+    end, pick, column, row = cell.end, cell.pick, cell.column, cell.row
     dx, dy, rise, bend = towards.dx, towards.dy, towards.rise, towards.bend
     low, low_slope = height_along(field, TOP, x + start * dx, y + start * dy, dx, dy, end, pick, column, row)
     low, low_slope = low - _altitude(z, towards, start), low_slope - (rise + bend * start)
@@ -122,12 +111,10 @@ def _strip_blocks(
     towards: Ray,
     start: float,
     stop: float,
-    end: int,
-    pick: int,
-    column: int,
-    row: int,
+    cell: Cell,
 ) -> bool:
-    """Say whether the yarn beneath reaches the ray between `start` and `stop`, searched point by point."""
+    """Return whether the yarn beneath reaches the ray between `start` and `stop`; tested at `_STRIP_POINTS` points."""
+    end, pick, column, row = cell.end, cell.pick, cell.column, cell.row
     dx, dy = towards.dx, towards.dy
     family = 1 - int(field.top[pick, end])
     # A yarn may be narrower than the distance of points along the whole way.
@@ -149,14 +136,12 @@ def ray(x: float, y: float, z: float, bend: float) -> Ray:
     if flat < 1e-9:
         return Ray(x, y, z, 1.0, 0.0, math.inf if z > 0.0 else -math.inf, 0.0, 1.0, math.inf)
     dx, dy = x / flat, y / flat
-    stride_x = 1.0 / abs(dx) if dx != 0.0 else math.inf
-    stride_y = 1.0 / abs(dy) if dy != 0.0 else math.inf
-    return Ray(x, y, z, dx, dy, z / flat, bend, stride_x, stride_y)
+    return Ray(x, y, z, dx, dy, z / flat, bend, stride(dx), stride(dy))
 
 
 @inlined_kernel
 def visible(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> bool:
-    """Say whether the point (x, y, z) sees a direction; one on the cloth only if that lies above its tangent plane.
+    """Return whether the point (x, y, z) sees a direction; a point on the cloth needs one above its tangent plane.
 
     Parameters
     ----------
@@ -176,66 +161,25 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
     if rise <= 0.0 and (bend <= 0.0 or z - 0.5 * rise * rise / bend <= field.lowest):
         return False
     picks, ends = field.top.shape
-    column, row = int(x), int(y)
-    end, pick = column, row
-    step_x = 1 if dx >= 0.0 else -1
-    step_y = 1 if dy >= 0.0 else -1
-    # Distance to the next cell border in x and in y.
-    next_x = ((column + 1 - x) if step_x > 0 else (x - column)) * stride_x if dx != 0.0 else math.inf
-    next_y = ((row + 1 - y) if step_y > 0 else (y - row)) * stride_y if dy != 0.0 else math.inf
-    # The float under the start, named by its family, its yarn and its centre.
-    own = int(field.top[pick, end]) if side == TOP else -1
-    own_line = column if own == WARP else row
-    own_centre = (row if own == WARP else column) - field.floats[pick, end, TOP, OFFSET]
-
+    cell = first_cell(x, y, dx, dy, stride_x, stride_y)
+    own_family, own_yarn, own_centre = float_on_top(field, cell)
     distance = 0.0
     for _ in range(_MAX_CELLS):
         if rise + bend * distance >= 0.0 and _altitude(z, towards, distance) >= field.highest:
             return True
-        leave = min(next_x, next_y)
+        leave = min(cell.next_x, cell.next_y)
         # A ray is lowest where it enters the cell, unless it still sinks.
         turn = min(max(-rise / bend, distance), leave) if bend > 0.0 else distance
-        if field.crown[pick, end] > _altitude(z, towards, turn) and leave > distance:
-            family = int(field.top[pick, end])
-            line = column if family == WARP else row
-            centre = (row if family == WARP else column) - field.floats[pick, end, TOP, OFFSET]
-            is_own = family == own and line == own_line and centre == own_centre
-            radius = field.yarn[family, RADIUS]
-            if radius >= 0.5:
-                if not is_own and _piece_blocks(field, x, y, z, towards, distance, leave, end, pick, column, row):
-                    return False
-            else:
-                # Split the way through the cell where it enters and leaves the narrow top yarn.
-                across, _ = local_position(family, 0.0, x, y, column, row)
-                slope = dx if family == WARP else dy
-                if slope == 0.0:
-                    inside = abs(across) <= radius
-                    enter = distance if inside else leave
-                    exit_ = leave
-                else:
-                    first, second = (-radius - across) / slope, (radius - across) / slope
-                    enter = min(max(min(first, second), distance), leave)
-                    exit_ = min(max(max(first, second), distance), leave)
-                if (
-                    exit_ > enter
-                    and not is_own
-                    and _piece_blocks(field, x, y, z, towards, enter, exit_, end, pick, column, row)
-                ):
-                    return False
-                if enter > distance and _strip_blocks(field, x, y, z, towards, distance, enter, end, pick, column, row):
-                    return False
-                if leave > exit_ and _strip_blocks(field, x, y, z, towards, exit_, leave, end, pick, column, row):
-                    return False
-        # Step into the next cell.
+        if field.crown[cell.pick, cell.end] > _altitude(z, towards, turn) and leave > distance:
+            family, yarn, centre = float_on_top(field, cell)
+            is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
+            enter, exit_ = span_on_top(field, cell, x, y, dx, dy, distance, leave)
+            if exit_ > enter and not is_own and _piece_blocks(field, x, y, z, towards, enter, exit_, cell):
+                return False
+            if enter > distance and _strip_blocks(field, x, y, z, towards, distance, enter, cell):
+                return False
+            if leave > exit_ and _strip_blocks(field, x, y, z, towards, exit_, leave, cell):
+                return False
         distance = leave
-        if next_x <= next_y:
-            next_x += stride_x
-            column += step_x
-            end += step_x
-            end = 0 if end == ends else (ends - 1 if end < 0 else end)
-        else:
-            next_y += stride_y
-            row += step_y
-            pick += step_y
-            pick = 0 if pick == picks else (picks - 1 if pick < 0 else pick)
+        cell = next_cell(cell, dx, dy, stride_x, stride_y, ends, picks)
     return True

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
-from pipeline.truth.cloth import Columns, Model, Raw
+from pipeline.truth.cloth import ClothSide, Columns, Raw
 from pipeline.truth.footprint.mixture import FINE_LINE, axes
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.symmetry import different_cells
@@ -28,23 +28,23 @@ from weaves.errors import BadInput
 _MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
 _SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
 _UNBOUNDED: Final = (1.0, np.inf)  # relative and absolute error: whatever the table states will do
-_STUDENT: Final = 1.2  # 16 replicates: so much wider is Student's t at 99.7 %
+_STUDENT: Final = 1.2  # 16 randomisations: so much wider is Student's t at 99.7 %
 """Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
 
 
-def auto_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
-    """Answer each query by the first that states the error asked for: a coarse table, a fine one, sampling."""
-    return _first_good(tabulated(model, columns) & _axial(model, columns), model, columns, index, options, seed)
+def auto_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+    """Answer each query by the first that states the requested error: a coarse table, a fine one, sampling."""
+    return _first_good(tabulated(cloth, columns) & _axial(cloth, columns), cloth, columns, index, options, seed)
 
 
-def elliptic_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+def elliptic_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer as `auto_rows` does, footprints at an angle by the tables too."""
-    return _first_good(tabulated(model, columns), model, columns, index, options, seed)
+    return _first_good(tabulated(cloth, columns), cloth, columns, index, options, seed)
 
 
 def _first_good(
     known: Mask,
-    model: Model,
+    cloth: ClothSide,
     columns: Columns,
     index: Index,
     options: TruthOptions,
@@ -61,7 +61,7 @@ def _first_good(
         chosen = columns.take(asked)
         bound = _UNBOUNDED if coarse else (options.relative_error, options.absolute_error)
         mean, error, count = sum_rows(
-            model, _table(model, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed), FINE_LINE
+            cloth, _table(cloth, chosen, coarse), chosen, index[asked], *bound, np.uint64(seed), FINE_LINE
         )
         size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
@@ -71,7 +71,7 @@ def _first_good(
     missing = np.flatnonzero(left)
     if missing.size:
         mean, error, count = sample_rows(
-            model,
+            cloth,
             columns.take(missing),
             index[missing],
             OWEN,
@@ -86,9 +86,9 @@ def _first_good(
     return means, errors, counts
 
 
-def table_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+def table_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever they state."""
-    known, wide = tabulated(model, columns), _wide(columns)
+    known, wide = tabulated(cloth, columns), _wide(columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
         allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints of at least {_SMALLEST:.3g} yarn "
@@ -101,54 +101,54 @@ def table_rows(model: Model, columns: Columns, index: Index, options: TruthOptio
         if asked.size:
             chosen = columns.take(asked)
             answer = sum_rows(
-                model, _table(model, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed), FINE_LINE
+                cloth, _table(cloth, chosen, coarse), chosen, index[asked], *_UNBOUNDED, np.uint64(seed), FINE_LINE
             )
             means[asked], errors[asked], counts[asked] = answer
     return means, errors, counts
 
 
 def _wide(columns: Columns) -> Mask:
-    """Say for which queries the coarse table is good enough to be asked."""
+    """Return for which queries the coarse table is good enough to be asked."""
     return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
 
 
-def tabulated(model: Model, columns: Columns) -> Mask:
-    """Say which queries the table knows of, (N,)."""
-    choices = model.choices
-    other = choices.macro or choices.linear or not choices.shadows or model.varied
-    if other or different_cells(model.front) > _MOST_CELLS:
+def tabulated(cloth: ClothSide, columns: Columns) -> Mask:
+    """Return which queries the table knows of, (N,)."""
+    choices = cloth.choices
+    other = choices.macro or choices.linear or not choices.shadows or cloth.varied
+    if other or different_cells(cloth.front) > _MOST_CELLS:
         return np.zeros(len(columns.u), np.bool_)
     known = (np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST) & (columns.curvature == 0.0)
-    if (oblique := ~_axial(model, columns)).any():
+    if (oblique := ~_axial(cloth, columns)).any():
         x, y, correlation = np.abs(axes(columns.sigma, columns.sigma_minor, columns.angle))
         blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= _SMALLEST
-        known &= ~oblique | (blurred & (correlation <= FINE_LINE.most) & (model.shape == GAUSSIAN))
+        known &= ~oblique | (blurred & (correlation <= FINE_LINE.most) & (cloth.shape == GAUSSIAN))
     return np.asarray(known)
 
 
-def _axial(model: Model, columns: Columns) -> Mask:
-    """Say which footprints are round or lie along the axes."""
+def _axial(cloth: ClothSide, columns: Columns) -> Mask:
+    """Return which footprints are round or lie along the axes."""
     along = columns.angle == 0.0
-    if model.shape == GAUSSIAN:
+    if cloth.shape == GAUSSIAN:
         along |= columns.sigma == columns.sigma_minor
     return np.asarray(along)
 
 
-_TABLES: dict[tuple[int, bool, bool], tuple[Model, Table]] = {}
+_TABLES: dict[tuple[int, bool, bool], tuple[ClothSide, Table]] = {}
 _KEPT: Final = 48  # of 1 to 5 MB each: those of a benchmark that asks about a dozen cloths in turn
 _BUILDING: Final = Lock()
 
 
-def _table(model: Model, columns: Columns, coarse: bool) -> Table:
+def _table(cloth: ClothSide, columns: Columns, coarse: bool) -> Table:
     """Return the table of one side of a cloth, one of the last few built."""
     behind = bool((columns.wi[:, 2] < 0.0).any())
     with _BUILDING:
         for with_behind in (True, False):
-            kept = _TABLES.get((id(model.front), with_behind, coarse))
-            if kept and kept[0].front is model.front and (with_behind or not behind):
+            kept = _TABLES.get((id(cloth.front), with_behind, coarse))
+            if kept and kept[0].front is cloth.front and (with_behind or not behind):
                 return kept[1]
         while len(_TABLES) >= _KEPT:
             _TABLES.pop(next(iter(_TABLES)))
-        table = tabulate(model.front, model.back, behind, coarse)
-        _TABLES[id(model.front), behind, coarse] = (model, table)
+        table = tabulate(cloth.front, cloth.back, behind, coarse)
+        _TABLES[id(cloth.front), behind, coarse] = (cloth, table)
     return table

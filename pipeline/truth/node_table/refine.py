@@ -1,6 +1,7 @@
-"""The table's doubtful nodes sampled again: points with exact visibility where a shadow's border crosses a node.
+"""Refinement of an answer: nodes that a border of a shadow crosses are sampled with exact visibility.
 
-Every other node keeps what the table says; so a few hundred points do what thousands would do over the whole footprint.
+All other nodes keep their share from the table. A few hundred points are then as accurate as thousands over the whole
+footprint.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import AREA, SUMS, Model
+from pipeline.truth.cloth import AREA, SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.monte_carlo import add_point
 from pipeline.truth.node_table.build import COLUMNS, FAMILY, KIND_X, KIND_Y, ROWS, START, Table
 from pipeline.truth.node_table.kernels import SMOOTH
-from pipeline.truth.scattering.point import Scene
+from pipeline.truth.node_table.shares import NodeShares
+from pipeline.truth.scattering.point import Directions
 
 UNSEEN: Final = 0.002
 """Relative error of an answer that neither nodes nor borders show."""
@@ -28,30 +30,26 @@ _NEGLIGIBLE: Final = 1e-5
 
 @kernel
 def refine(
-    model: Model,
+    cloth: ClothSide,
     table: Table,
-    query: Scene,
+    directions: Directions,
     key: np.uint64,
     side: int,
-    shares: Float32,
-    areas: Float32,
-    diffuses: Float32,
-    speculars: Float32,
-    margins: Float32,
-    lit_margins: Float32,
+    shares: NodeShares,
     below: float,
     mean: Float64,
     error: Float64,
 ) -> int:
-    """Sample the nodes on borders with exact visibility in place of the table's share of them; return the points.
+    """Replace the shares of the nodes on borders by samples with exact visibility; return the number of points.
 
-    Each such node gets `side` by `side` jittered points. `mean` and `error` of the four components, and the denominator
-    `below`, are the table's; the first two are written.
+    Each such node gets `side` by `side` jittered points. `mean` and `error` of the four components are the table's and
+    are written; `below` is the table's denominator.
     """
     subsamples = side * side
     change, variance = np.zeros(SUMS), np.zeros(4)
     value, first, second = np.zeros((1, SUMS)), np.zeros(SUMS), np.zeros(4)
     points = 0
+    weight, margins, lit_margins = shares.weight, shares.margins, shares.lit_margins
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
         start, across, family = piece[START], piece[COLUMNS], piece[FAMILY]
@@ -61,8 +59,8 @@ def refine(
         end, pick = table.copies[p, 0, 0], table.copies[p, 0, 1]
         x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
         for k in range(start, stop):
-            a, c = np.float64(areas[k]), np.float64(diffuses[k]) / math.pi
-            s, share = np.float64(speculars[k]), np.float64(shares[k])
+            a, c = np.float64(shares.areas[k]), np.float64(shares.diffuses[k]) / math.pi
+            s, share = np.float64(shares.speculars[k]), np.float64(weight[k])
             if share <= 0.0:
                 continue
             if not (_on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)):
@@ -74,8 +72,8 @@ def refine(
             if share < _NEGLIGIBLE * below:
                 continue
             i, j = (k - start) % across, (k - start) // across
-            tilt_x = _tilt(shares, k, 1, x_edges, i, across)
-            tilt_y = _tilt(shares, k, across, y_edges, j, piece[ROWS])
+            tilt_x = _tilt(weight, k, 1, x_edges, i, across)
+            tilt_y = _tilt(weight, k, across, y_edges, j, piece[ROWS])
             first[:], second[:] = 0.0, 0.0
             for sub in range(subsamples):
                 u = (sub % side + uniform(key, k, 2 * sub)) / side
@@ -83,8 +81,8 @@ def refine(
                 x = end + x_edges[i] + u * (x_edges[i + 1] - x_edges[i])
                 y = pick + y_edges[j] + v * (y_edges[j + 1] - y_edges[j])
                 value[:] = 0.0
-                weight = share * max(1.0 + tilt_x * (u - 0.5) + tilt_y * (v - 0.5), 0.0)
-                add_point(model, x, y, weight, query, value, 0)
+                tilted = share * max(1.0 + tilt_x * (u - 0.5) + tilt_y * (v - 0.5), 0.0)
+                add_point(cloth, x, y, tilted, directions, value, 0)
                 for q in range(4):
                     residual = value[0, q] - mean[q] * value[0, AREA]
                     second[q] += residual * residual
@@ -99,7 +97,7 @@ def refine(
             change[AREA] += first[AREA] / subsamples - a
             change[family] -= s
             change[2 + family] -= c
-    total = below if model.projected else below + change[AREA]
+    total = below if cloth.projected else below + change[AREA]
     for q in range(4):
         mean[q] = max((mean[q] * below + change[q]) / total, 0.0)
         error[q] = math.sqrt(variance[q]) / total + UNSEEN * mean[q]
@@ -108,7 +106,7 @@ def refine(
 
 @kernel
 def _on_border(margins: Float32, k: int, columns: int, first: int, last: int) -> bool:
-    """Say whether a neighbour of node k is on the other side of a border."""
+    """Return whether a neighbour of node k is on the other side of a border."""
     here = margins[k] > 0.0
     column = (k - first) % columns
     if column > 0 and (margins[k - 1] > 0.0) != here:
@@ -121,10 +119,10 @@ def _on_border(margins: Float32, k: int, columns: int, first: int, last: int) ->
 
 
 @kernel
-def _tilt(shares: Float32, k: int, step: int, edges: Float32, place: int, count: int) -> float:
+def _tilt(weight: Float32, k: int, step: int, edges: Float32, place: int, count: int) -> float:
     """Return the relative change of the footprint's density across node k, from its neighbours along one axis."""
     if place == 0 or place == count - 1:
         return 0.0
-    below = shares[k - step] / (edges[place] - edges[place - 1])
-    above = shares[k + step] / (edges[place + 2] - edges[place + 1])
-    return float(0.5 * (above - below) * (edges[place + 1] - edges[place]) / shares[k])
+    below = weight[k - step] / (edges[place] - edges[place - 1])
+    above = weight[k + step] / (edges[place + 2] - edges[place + 1])
+    return float(0.5 * (above - below) * (edges[place + 1] - edges[place]) / weight[k])

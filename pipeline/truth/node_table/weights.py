@@ -1,4 +1,4 @@
-"""Which share of a footprint falls on which node of a table."""
+"""Weights: the share of a footprint that falls on each node of a table."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import Columns
 from pipeline.truth.footprint.masses import interval_masses
 from pipeline.truth.footprint.mixture import Line, along_axes, line_points
+from pipeline.truth.geometry.march import wrap
 from pipeline.truth.node_table.build import COLUMNS, KIND_X, KIND_Y, ROWS, START, Table
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
@@ -28,7 +29,7 @@ def fill_weights(
     points: Float32,
     weight: Float32,
 ) -> None:
-    """Write the share of a footprint that falls on each node and its copies; one at an angle by a `line` (oblique).
+    """Write the share of a footprint that falls on each node and its copies; a rotated one by a `line` (mixture).
 
     `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any;
     `points` (2, line.points) is scratch too.
@@ -68,7 +69,7 @@ def _add(
         centre, sigma, cells = u, sigma_x, ends
         if axis == 1:
             centre, sigma, cells = v, sigma_y, picks
-        centre -= math.floor(centre / cells) * cells
+        centre = wrap(centre, float(cells))
         for cell in range(cells):
             for kind in range(kinds):
                 touched[axis, cell, kind] = interval_masses(
@@ -97,7 +98,7 @@ def _add_product(along_x: Float32, along_y: Float32, share: np.float32, weight: 
 
 @fast_kernel
 def any_weight(share: Float32) -> bool:
-    """Say whether any of the shares is above 0."""
+    """Return whether any of the shares is above 0."""
     total = _0
     for k in range(len(share)):
         total += share[k]

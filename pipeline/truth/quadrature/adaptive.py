@@ -22,10 +22,10 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import AREA, SUMS, Columns, Model, Raw
+from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, Raw
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.symmetry import first_cells
-from pipeline.truth.monte_carlo import OWEN, query_scene, sample_rows
+from pipeline.truth.monte_carlo import OWEN, query_directions, sample_rows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.parts import (
     BOX_WEIGHT,
@@ -55,7 +55,7 @@ _WORST: Final = 0.0625  # parts with this share of the worst one's squared error
 
 @kernel
 def integrate_rows(
-    model: Model,
+    cloth: ClothSide,
     columns: Columns,
     different: Mask,
     relative_error: float,
@@ -70,7 +70,7 @@ def integrate_rows(
 
     Parameters
     ----------
-    model, columns : Model, Columns
+    cloth, columns : ClothSide, Columns
         The cloth and the queries.
     different : Mask (picks, ends)
         The cells that stand for all under a footprint that covers the repeat evenly: the first of each orbit.
@@ -84,38 +84,32 @@ def integrate_rows(
     rows = len(columns.u)
     means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
     counts = np.zeros(rows, np.int64)
-    picks, ends = model.front.top.shape
-    everything = rectangles(model.front, np.ones((picks, ends), np.bool_))
-    kinds, share = rectangles(model.front, different), picks * ends / different.sum()
+    picks, ends = cloth.front.top.shape
+    everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
+    kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
     x_pieces, y_pieces = np.zeros((32, 3)), np.zeros((32, 3))
     grid, states = np.zeros((64, 64, SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
-        query = query_scene(columns, row)
+        directions = query_directions(columns, row)
         sigma_x, sigma_y = columns.sigma[row], columns.sigma_minor[row]
         if sigma_x != sigma_y and abs(math.cos(columns.angle[row])) < 0.5:
             sigma_x, sigma_y = sigma_y, sigma_x
-        x_axis = Axis(model.shape, columns.u[row], sigma_x, float(ends))
-        y_axis = Axis(model.shape, columns.v[row], sigma_y, float(picks))
-        even = model.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
+        x_axis = Axis(cloth.shape, columns.u[row], sigma_x, float(ends))
+        y_axis = Axis(cloth.shape, columns.v[row], sigma_y, float(picks))
+        even = cloth.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
         pieces = kinds if even else everything
-        total = 0
-        for p in range(len(pieces)):
-            nothing = np.zeros((0, PART))
-            total += cut_parts(pieces[p], model.front.yarn, x_axis, y_axis, x_pieces, y_pieces, nothing)
-        parts = np.zeros((total, PART))
-        total = 0
-        for p in range(len(pieces)):
-            total += cut_parts(pieces[p], model.front.yarn, x_axis, y_axis, x_pieces, y_pieces, parts[total:])
+        parts = _all_parts(pieces, cloth.front.yarn, x_axis, y_axis, x_pieces, y_pieces)
         if even:
             parts[:, BOX_WEIGHT] *= share
             parts[:, MASS] *= share
+        total = len(parts)
 
         # The first rule on every part; then the worst parts get the next, at first all of them.
         sums, levels = np.zeros((total, SUMS)), np.full(total, first)
         changes, earlier = np.zeros((total, SUMS)), np.zeros((total, SUMS))
         costs, badness = np.zeros(total, np.int64), np.zeros(total)
         for p in range(total):
-            counts[row] += integrate(model, query, parts[p], x_axis, y_axis, first, split, grid, states, sums[p])
+            counts[row] += integrate(cloth, directions, parts[p], x_axis, y_axis, first, split, grid, states, sums[p])
         cut = -1.0
         while True:
             refined = False
@@ -126,13 +120,13 @@ def integrate_rows(
                     changes[p] = sums[p]
                     levels[p] += 1
                     costs[p] = integrate(
-                        model, query, parts[p], x_axis, y_axis, levels[p], split, grid, states, sums[p]
+                        cloth, directions, parts[p], x_axis, y_axis, levels[p], split, grid, states, sums[p]
                     )
                     changes[p] = sums[p] - changes[p]
                     counts[row] += costs[p]
                     refined = True
-            worst, size = _judge(
-                query.viewer.z if model.choices.shadows else 0.0,
+            worst, size = _estimate_errors(
+                directions.viewer.z if cloth.choices.shadows else 0.0,
                 parts,
                 levels,
                 sums,
@@ -144,7 +138,7 @@ def integrate_rows(
             )
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
-                errors[row, 2:4] = abs(query.light.z) / (math.pi * counts[row])
+                errors[row, 2:4] = abs(directions.light.z) / (math.pi * counts[row])
             squares = 0.0
             for c in range(4):
                 squares += errors[row, c] ** 2
@@ -155,13 +149,29 @@ def integrate_rows(
         area = 0.0
         for p in range(total):
             area += sums[p, AREA]
-        if area < HIDDEN_SHARE * query.viewer.z:
+        if area < HIDDEN_SHARE * directions.viewer.z:
             means[row], errors[row] = 0.0, 0.0
     return means, errors, counts
 
 
 @kernel
-def _judge(
+def _all_parts(
+    pieces: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, x_pieces: Float64, y_pieces: Float64
+) -> Float64:
+    """Return the parts of all rectangles that the footprint reaches, (n, PART)."""
+    nothing = np.zeros((0, PART))
+    total = 0
+    for p in range(len(pieces)):
+        total += cut_parts(pieces[p], yarn, x_axis, y_axis, x_pieces, y_pieces, nothing)
+    parts = np.zeros((total, PART))
+    total = 0
+    for p in range(len(pieces)):
+        total += cut_parts(pieces[p], yarn, x_axis, y_axis, x_pieces, y_pieces, parts[total:])
+    return parts
+
+
+@kernel
+def _estimate_errors(
     cosine: float,
     parts: Float64,
     levels: Index,
@@ -209,34 +219,34 @@ def _judge(
     return worst, size
 
 
-def quadrature_rows(model: Model, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every row: means and error bounds (N, 5), and points used.
 
     Rotated footprints are no product in x and y; they are sampled as `owen` does, and only they depend on `seed`.
 
     Parameters
     ----------
-    model, columns : Model, Columns
+    cloth, columns : ClothSide, Columns
         The cloth and the queries.
     index : int (N,)
         Name of each row.
     options : TruthOptions
-        Error asked for, and counts; the points of the two first rules may exceed `max_count`.
+        Requested error, and counts; the points of the two first rules may exceed `max_count`.
     seed : int
         Name of the random numbers.
     """
     quarter = np.sin(2.0 * columns.angle)
-    aligned = (np.abs(quarter) < 1e-6) | ((model.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
+    aligned = (np.abs(quarter) < 1e-6) | ((cloth.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
     rows = len(index)
     means, errors, counts = np.zeros((rows, AREA)), np.zeros((rows, AREA)), np.zeros(rows, np.int64)
     limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
     if aligned.any():
         found = integrate_rows(
-            model, columns.take(aligned), first_cells(model.front), *limits, _SPLIT, _FIRST, LEVELS - 1
+            cloth, columns.take(aligned), first_cells(cloth.front), *limits, _SPLIT, _FIRST, LEVELS - 1
         )
         means[aligned], errors[aligned], counts[aligned] = found
     if not aligned.all():
         rotated = ~aligned
-        found = sample_rows(model, columns.take(rotated), index[rotated], OWEN, *limits, np.uint64(seed))
+        found = sample_rows(cloth, columns.take(rotated), index[rotated], OWEN, *limits, np.uint64(seed))
         means[rotated], errors[rotated], counts[rotated] = found
     return means, errors, counts

@@ -15,10 +15,10 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.cloth import AREA, SUMS, Model
+from pipeline.truth.cloth import AREA, SUMS, ClothSide
 from pipeline.truth.geometry.heightfield import GAP, WEFT
 from pipeline.truth.quadrature.parts import A0, A1, B0, B1, BOX_WEIGHT, HALF, KIND, MIDDLE, Axis, density
-from pipeline.truth.scattering.point import Scene, point_share
+from pipeline.truth.scattering.point import Directions, point_share
 
 _BISECTIONS: Final = 8
 LEVELS: Final = 6
@@ -39,19 +39,19 @@ def _weight_across(part: Float64, axis: Axis, a: float) -> float:
 
 
 @kernel
-def _shares(model: Model, query: Scene, part: Float64, a: float, b: float, shares: Float64) -> int:
+def _shares(cloth: ClothSide, directions: Directions, part: Float64, a: float, b: float, shares: Float64) -> int:
     """Write what a point of a part adds to the sums; return which of viewer, light and back it sees, as bits."""
-    picks, ends = model.front.top.shape
+    picks, ends = cloth.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
     x, y = (b, across) if part[KIND] == WEFT else (across, b)
     x = x - ends if x >= ends else x
     y = y - picks if y >= picks else y
-    family, area, specular, diffuse, through = point_share(model.front, model.back, x, y, query, model.choices)
+    family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
     shares[:] = 0.0
     if family != GAP:
         shares[family], shares[2 + family] = specular, diffuse
     shares[4] = through
-    shares[AREA] = query.viewer.z if model.projected else area
+    shares[AREA] = directions.viewer.z if cloth.projected else area
     state = 1 if area > 0.0 else 0
     if specular + diffuse > 0.0:
         state += 2
@@ -62,8 +62,8 @@ def _shares(model: Model, query: Scene, part: Float64, a: float, b: float, share
 
 @kernel
 def integrate(
-    model: Model,
-    query: Scene,
+    cloth: ClothSide,
+    directions: Directions,
     part: Float64,
     x_axis: Axis,
     y_axis: Axis,
@@ -81,7 +81,7 @@ def integrate(
     for i in range(n):
         for j in range(n):
             a, b = mid_a + half_a * _NODES[rule + i], mid_b + half_b * _NODES[rule + j]
-            states[i, j] = _shares(model, query, part, a, b, grid[i, j])
+            states[i, j] = _shares(cloth, directions, part, a, b, grid[i, j])
     used = n * n
 
     # Lines run in the direction that crosses more edges.
@@ -113,7 +113,7 @@ def integrate(
                 for _ in range(_BISECTIONS):
                     centre = 0.5 * (low + high)
                     a, b = (centre, fixed) if inner_a else (fixed, centre)
-                    if _shares(model, query, part, a, b, point) == before:
+                    if _shares(cloth, directions, part, a, b, point) == before:
                         low = centre
                     else:
                         high = centre
@@ -126,7 +126,7 @@ def integrate(
                     weight = half * _WEIGHTS[rule + i]
                     weight *= _weight_across(part, across, t) if inner_a else density(along, t)
                     line += weight * (grid[i, k] if inner_a else grid[k, i])
-            elif before != 0 or model.projected:
+            elif before != 0 or cloth.projected:
                 size = 2
                 while size < m - first:
                     size *= 2
@@ -135,7 +135,7 @@ def integrate(
                     weight = 0.5 * (finish - begin) * _WEIGHTS[i]
                     weight *= _weight_across(part, across, t) if inner_a else density(along, t)
                     a, b = (t, fixed) if inner_a else (fixed, t)
-                    _shares(model, query, part, a, b, point)
+                    _shares(cloth, directions, part, a, b, point)
                     line += weight * point
                 used += size
             begin, first = finish, m

@@ -39,7 +39,7 @@ class Choices(NamedTuple):
     shadows: bool
 
 
-class Scene(NamedTuple):
+class Directions(NamedTuple):
     """One query's light and viewer, both in front as the viewer sees it.
 
     Attributes
@@ -57,7 +57,7 @@ class Scene(NamedTuple):
 
 
 @kernel
-def scene(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curvature: float) -> Scene:
+def directions_of(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curvature: float) -> Directions:
     """Prepare unit wi and wo, wo with z > 0, over a cylinder curved by `curvature` in the viewer's plane.
 
     Towards the light the cylinder is curved by Euler's curvature * cos^2 of the angle between the two planes.
@@ -66,7 +66,7 @@ def scene(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curv
     squares = (ix * ix + iy * iy) * (ox * ox + oy * oy)
     # A viewer on the normal looks along x.
     turn = across * across / squares if squares > 1e-18 else ix * ix / max(ix * ix + iy * iy, 1e-300)
-    return Scene(
+    return Directions(
         ray(ix, iy, iz, curvature * min(turn, 1.0)),
         ray(ox, oy, oz, curvature),
         ray(ix, iy, -iz, 0.0),
@@ -76,7 +76,7 @@ def scene(ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, curv
 
 @inlined_kernel
 def point_share(
-    front: HeightField, back: HeightField, x: float, y: float, query: Scene, choices: Choices
+    front: HeightField, back: HeightField, x: float, y: float, directions: Directions, choices: Choices
 ) -> tuple[int, float, float, float, float]:
     """Return what the point (x, y) of the repeat adds to numerators and denominator.
 
@@ -86,7 +86,7 @@ def point_share(
         The repeat and its back reflected in the fabric plane.
     x, y : float
         Position in it, 0 <= x < ends, 0 <= y < picks.
-    query : Scene
+    directions : Directions
         The directions.
     choices : Choices
         Options of the model.
@@ -98,12 +98,12 @@ def point_share(
     area, specular, diffuse, through : float
         A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); what goes straight through, times A(wo).
     """
-    light, viewer = query.light, query.viewer
+    light, viewer = directions.light, directions.viewer
     family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y), choices.linear)
     if family == GAP:
         # A ray that enters a gap and ends on a yarn further down counts there, not here.
         if choices.shadows and not (
-            visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, query.viewer_behind)
+            visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, directions.viewer_behind)
         ):
             return family, 0.0, 0.0, 0.0, 0.0
         return family, viewer.z, 0.0, 0.0, viewer.z
@@ -127,7 +127,7 @@ def point_share(
     if light.z > 0.0 or light.bend > 0.0:
         lit = cos_i > 0.0 and (not choices.shadows or visible(front, x, y, z, side, light))
     if not lit and light.z < 0.0:
-        lit = transmitted = cos_i < 0.0 and _lit_from_behind(back, x, y, query.light_behind, choices)
+        lit = transmitted = cos_i < 0.0 and _lit_from_behind(back, x, y, directions.light_behind, choices)
     if not lit:
         return family, area, 0.0, 0.0, through
     facing = abs(cos_i)
@@ -145,7 +145,7 @@ def point_share(
 
 @inlined_kernel
 def _lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices: Choices) -> bool:
-    """Say whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
+    """Return whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
     if not choices.shadows:
         return True
     _, side, z, nx, ny, nz, _, _, _ = surface_at(back, x, y, int(x), int(y), choices.linear)

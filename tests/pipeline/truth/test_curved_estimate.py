@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering.point import point_share, scene
+from pipeline.truth.scattering.point import directions_of, point_share
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, WARP, WEFT, surface_at
 
@@ -102,7 +102,7 @@ def test_curved_estimates_match_brute_force(name, curvature, light, viewer):
     assert (behind > 0) == (wi[2] < 0)
 
     # Point by point: only where a march steps over an edge may they differ.
-    model, query = model_of(fabric, EXACT), scene(*wi, *wo, curvature)
+    model, query = cloth_side(fabric, EXACT), directions_of(*wi, *wo, curvature)
     kernels = [point_share(model.front, model.back, *p, query, model.choices) for p in zip(x, y, strict=True)]
     assert all(k[0] == family for k, family in zip(kernels, yarn, strict=True))
     wrong = ~np.isclose([k[1:4] for k in kernels], shares, rtol=1e-9, atol=1e-12).all(axis=1)

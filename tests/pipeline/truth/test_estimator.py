@@ -11,7 +11,7 @@ from pipeline.analytic.exact_points import PointSampler
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
-from pipeline.truth.monte_carlo import REPLICATES
+from pipeline.truth.monte_carlo import RANDOMISATIONS
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -115,8 +115,9 @@ def test_order_of_convergence(estimator, low, high):
 def test_reported_errors_cover_the_true_error(estimator):
     """z-scores against a reference with 64 times the points, footprints of a yarn and more.
 
-    With 16 replicates z follows Student's t with 15 degrees of freedom: .9 % lie beyond 3, and the ratio estimator's
-    skewness at fixed count adds to it; 2 % are allowed, and the mean z must vanish within Sidak-corrected noise.
+    With 16 randomisations z follows Student's t with 15 degrees of freedom: .9 % lie beyond 3, and the ratio
+    estimator's skewness at fixed count adds to it; 2 % are allowed, and the mean z must vanish within
+    Sidak-corrected noise.
     """
     fabric = load_fabric("wool_gabardine")
     queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=80.0), fabric.weave.repeat, 5, 0, 120)
@@ -132,7 +133,7 @@ def test_reported_errors_cover_the_true_error(estimator):
     z = (answers.mean - reference.mean)[seen] / np.hypot(answers.standard_error, reference.standard_error)[seen]
     assert (np.abs(z) > 3).mean() < 0.02
     assert 0.8 < np.sqrt(np.mean(z**2)) < 1.3
-    assert REPLICATES == 16
+    assert RANDOMISATIONS == 16
 
 
 def test_the_two_estimators_agree():
@@ -146,7 +147,7 @@ def test_the_two_estimators_agree():
     spread = np.hypot(first.standard_error, second.standard_error)
     t = np.abs(first.mean - second.mean)[spread > 1e-6] / spread[spread > 1e-6]
     sidak = 1 - (1 - LEVEL) ** (1 / t.size)
-    assert t.max() < stats.t.ppf(1 - sidak / 2, 2 * (REPLICATES - 1))
+    assert t.max() < stats.t.ppf(1 - sidak / 2, 2 * (RANDOMISATIONS - 1))
 
 
 def test_a_box_of_whole_repeats_and_a_wide_gaussian_are_the_repeat_average():
@@ -201,7 +202,7 @@ def test_the_stopping_rule_reaches_the_error_or_spends_its_points():
 def test_hidden_patches_do_not_understate_their_error():
     """Two runs differ by no more than their stated errors say, hidden patches at grazing angles included.
 
-    Before a patch had to be seen by every replicate, the measured variance was 24 times the stated one on this fabric.
+    Before every randomisation had to see the patch, the measured variance was 24 times the reported one here.
     """
     fabric = load_fabric("twill_4_4")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 600)

@@ -24,13 +24,13 @@ def brief(monkeypatch):
 
 
 def broken(test, fabric=FABRIC):
-    return [item.name for item in test(fabric) if item.verdict == "broken"]
+    return [item.name for item in test(fabric) if item.status == "broken"]
 
 
 @pytest.mark.parametrize("test", invariants.INVARIANTS, ids=lambda test: test.__name__)
 def test_a_preset_keeps_the_invariants_at_few_points(brief, test):
     found = test(FABRIC)
-    assert found and not [item for item in found if item.verdict == "broken"]
+    assert found and not [item for item in found if item.status == "broken"]
     assert len({item.name for item in found}) == len(found)
 
 
@@ -103,29 +103,29 @@ def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():
     families = 4000
     numbers = np.random.default_rng(1).standard_t(15, (families, 24))
     for relation in ("=", "<="):
-        count = sum(worst("t", row, 0.0, np.ones(24), 15, relation).verdict == "broken" for row in numbers)
+        count = sum(worst("t", row, 0.0, np.ones(24), 15, relation).status == "broken" for row in numbers)
         assert count <= stats.poisson.isf(1e-3, families * LEVEL)
         # And not much more rarely: numbers twice as far off are called broken many times.
-        wide = sum(worst("t", 2 * row, 0.0, np.ones(24), 15, relation).verdict == "broken" for row in numbers)
+        wide = sum(worst("t", 2 * row, 0.0, np.ones(24), 15, relation).status == "broken" for row in numbers)
         assert wide > 20
 
 
 def test_the_worst_is_returned_with_its_own_error():
     item = worst("x", [1.0, 1.2, 0.7], 1.0, [0.1, 0.1, 0.5], 15)
-    assert (item.measured, item.standard_error, item.verdict) == (1.2, 0.1, "statistics")
+    assert (item.measured, item.standard_error, item.status) == (1.2, 0.1, "statistics")
     assert item.sigmas == pytest.approx(2.0)
-    assert worst("x", [0.5, 1.0], 1.0, [0.01, 0.01], 15, "<=").verdict == "statistics"
-    assert worst("x", [0.5, 1.2], 1.0, [0.01, 0.01], 15, "<=").verdict == "broken"
-    assert worst("x", [1.0, math.nan], 1.0, [0.1, 0.1], 15).verdict == "broken"
-    assert worst("x", 1.0, 1.0, math.nan, 15).verdict == "broken"
+    assert worst("x", [0.5, 1.0], 1.0, [0.01, 0.01], 15, "<=").status == "statistics"
+    assert worst("x", [0.5, 1.2], 1.0, [0.01, 0.01], 15, "<=").status == "broken"
+    assert worst("x", [1.0, math.nan], 1.0, [0.1, 0.1], 15).status == "broken"
+    assert worst("x", 1.0, 1.0, math.nan, 15).status == "broken"
 
 
 def test_numbers_without_error_are_exact_or_broken():
-    assert exact("x", 1e-7, 0.0, 1e-6).verdict == "exact"
-    assert exact("x", 2e-6, 0.0, 1e-6).verdict == "broken"
-    assert exact("x", -5.0, 0.0, 0.0, "<=").verdict == "exact"
-    assert exact("x", -5.0, 0.0, 0.0).verdict == "broken"
-    assert exact("x", math.nan, 0.0, 1.0).verdict == "broken"
+    assert exact("x", 1e-7, 0.0, 1e-6).status == "exact"
+    assert exact("x", 2e-6, 0.0, 1e-6).status == "broken"
+    assert exact("x", -5.0, 0.0, 0.0, "<=").status == "exact"
+    assert exact("x", -5.0, 0.0, 0.0).status == "broken"
+    assert exact("x", math.nan, 0.0, 1.0).status == "broken"
     np.testing.assert_array_equal(quotient([0.0, 1.0, 3.0], [0.0, 0.0, 2.0]), [1.0, np.inf, 1.5])
 
 

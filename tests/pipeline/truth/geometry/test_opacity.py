@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.opacity import grazing_cosine, hits, opacity
 from pipeline.truth.geometry.visibility import ray
@@ -66,7 +66,7 @@ def _marched(fabric, x, y, z, w, curvature):
 @pytest.mark.parametrize(("curvature", "cosine"), [(0.04, 0.03), (0.1, 0.08), (0.5, 0.25)])
 def test_hits_match_a_march(name, curvature, cosine):
     fabric = load_fabric(name)
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     generator = np.random.default_rng(round(100 * curvature))
     ends, picks = fabric.weave.repeat
     x, y = generator.random((2, 600)) * np.array([[ends], [picks]])
@@ -85,7 +85,7 @@ def test_opacity_is_the_share_of_rays_that_hit_and_states_its_error(name, curvat
     wo = _wo([math.sqrt(0.04 * curvature)], 0.5)
     options = TruthOptions(footprint="box", min_count=512, max_count=512)
     queries = _queries(wo, curvature, sigma=ends / math.sqrt(12))
-    model, towards = model_of(fabric, options), ray(*(-wo[0].astype(np.float64)), curvature)
+    model, towards = cloth_side(fabric, options), ray(*(-wo[0].astype(np.float64)), curvature)
     x, y = np.meshgrid((np.arange(80) + 0.5) * ends / 80, (np.arange(80) + 0.5) * picks / 80)
     exact = np.mean([hits(model.front, model.back, a, b, towards) for a, b in zip(x.flat, y.flat, strict=True)])
     assert 0.1 < exact < 0.9
@@ -129,7 +129,7 @@ def test_relief_scales_heights():
 @pytest.mark.parametrize("name", ["denim", "silk_charmeuse"])
 def test_grazing_cosine_is_the_step_of_opacity(name):
     fabric = load_fabric(name)
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     generator = np.random.default_rng(4)
     x, y = generator.random((2, 100)) * fabric.weave.repeat[0]
     azimuth, curvature = generator.random(100) * 2 * math.pi, generator.random(100)
@@ -188,7 +188,7 @@ def test_gaps_let_rays_through(width, curvature, depth):
     surface to the plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ.
     """
     fabric = _both(load_fabric("denim"), width=width)
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     highest, lowest = model.front.highest, -model.back.highest
     slope = math.sqrt(2 * curvature * (highest + depth)) if curvature else depth
     wo = _wo([slope / math.hypot(1, slope)], 0.3)

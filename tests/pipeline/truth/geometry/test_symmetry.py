@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.symmetry import different_cells, first_cells, longest_period, orbits, translations
 from pipeline.truth.options import TruthOptions, Variation
 from weaves.fabric import load_fabric
 
 
 def _front(name, **options):
-    return model_of(load_fabric(name), TruthOptions(**options)).front
+    return cloth_side(load_fabric(name), TruthOptions(**options)).front
 
 
 @pytest.mark.parametrize(

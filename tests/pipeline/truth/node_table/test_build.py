@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import model_of
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import GAP, surface_at
 from pipeline.truth.geometry.horizon import horizon
@@ -33,7 +33,7 @@ def _narrow(name, width):
     [("polyester_lining", 2), ("cotton_twill", 4), ("satin_8", 8), ("silk_charmeuse", 5), ("basket", 8)],
 )
 def test_translations_leave_one_cell_of_each_orbit(name, cells):
-    model = model_of(load_fabric(name), TruthOptions())
+    model = cloth_side(load_fabric(name), TruthOptions())
     table = tabulate(model.front, model.back, False, nodes=8, azimuths=4)
     assert len(table.pieces) == cells
     assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
@@ -42,7 +42,7 @@ def test_translations_leave_one_cell_of_each_orbit(name, cells):
 
 
 def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
-    model = model_of(_narrow("polyester_lining", 0.7), TruthOptions())
+    model = cloth_side(_narrow("polyester_lining", 0.7), TruthOptions())
     table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
     areas = dict.fromkeys(range(3), 0.0)
     for number, piece in enumerate(table.pieces):
@@ -55,7 +55,7 @@ def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
 @pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "denim", "silk_shantung"])
 def test_horizons_part_what_is_visible_from_what_is_not(name):
     """A direction a little above the horizon is visible, one a little below is not; .3 % may be borderline."""
-    field = model_of(load_fabric(name), TruthOptions()).front
+    field = cloth_side(load_fabric(name), TruthOptions()).front
     picks, ends = field.top.shape
     random = np.random.default_rng(3)
     wrong = asked = 0

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import columns_of, model_of
+from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.symmetry import first_cells
@@ -42,14 +42,14 @@ def _both(name, **changes):
 def _answer(fabric, queries, options):
     """Call the estimator itself, in float64: viewers must be in front."""
     index = np.arange(len(queries.u))
-    return quadrature_rows(model_of(fabric, options), columns_of(queries), index, options, 0)
+    return quadrature_rows(cloth_side(fabric, options), columns_of(queries), index, options, 0)
 
 
 @pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "herringbone", "silk_shantung", "basket"])
 @pytest.mark.parametrize("width", [1.0, 0.7])
 def test_the_rectangles_cover_the_repeat_once(name, width):
     fabric = _both(name, width=width)
-    model = model_of(fabric, TruthOptions())
+    model = cloth_side(fabric, TruthOptions())
     ends, picks = fabric.weave.repeat
     found = rectangles(model.front, np.ones((picks, ends), np.bool_))
     area = np.sum((found[:, 1] - found[:, 0]) * (found[:, 3] - found[:, 2]))
@@ -67,7 +67,7 @@ def _specular_errors(roughness, split):
     """Return rms errors of the specular part with 4, 8, 16 nodes an axis; plain weave, one repeat, no shadows."""
     fabric = _both("polyester_lining", roughness=roughness)
     pairs = [((30, 30), (30, 210)), ((40, 10), (35, 100)), ((20, 70), (45, 300)), ((10, 0), (25, 160))]
-    model = model_of(fabric, TruthOptions(shadows=False))
+    model = cloth_side(fabric, TruthOptions(shadows=False))
     wi, wo = (np.array([_direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
     columns = columns_of(_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
     limits = 1e-15, 0.0, 32, 1 << 30
@@ -135,7 +135,7 @@ def test_cutting_lines_at_shadow_edges_pays():
     """At about 8,000 points the mean error with cut lines is less than half that of Owen-scrambled points."""
     fabric = load_fabric("polyester_lining")
     queries = draw_queries(QueryOptions(sigma=(0.5, 8.0), max_angle=70.0), fabric.weave.repeat, 5, 0, 24)
-    model, columns = model_of(fabric, TruthOptions()), columns_of(queries)
+    model, columns = cloth_side(fabric, TruthOptions()), columns_of(queries)
     exact = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
     cut, _, used = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 8192, CUT, 1, 5)
     options = TruthOptions(relative_error=1e-9, absolute_error=0.0, min_count=8192, max_count=8192)
@@ -151,7 +151,7 @@ def _coverage(rows):
     for name, changes in (("polyester_lining", {}), ("satin_8", {}), ("cotton_twill", {"width": 0.7})):
         fabric = _both(name, **changes)
         queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 17, 0, rows)
-        model = model_of(fabric, TruthOptions())
+        model = cloth_side(fabric, TruthOptions())
         exact = integrate_rows(
             model, columns_of(queries), first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5
         )[0]
