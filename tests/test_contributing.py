@@ -1,0 +1,110 @@
+"""The recipes of CONTRIBUTING.md, each followed to the letter in a copy of the tree."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("weaves", "pipeline", "reports", "jobs")
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+SECTIONS = dict(re.findall(r"^### (.+?)\n(.*?)(?=^##|\Z)", TEXT, re.M | re.S))
+
+CHECKS = {
+    "A weave": """
+from weaves.draft import cells
+from weaves.fabric import load_fabric, preset_names
+assert "sacking" in preset_names()
+draft = load_fabric("sacking").weave
+assert draft.repeat == (4, 8)
+assert set(cells(draft).top_length.ravel().tolist()) == {2.0, 4.0}
+""",
+    "An estimator": """
+import numpy as np
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+u = np.zeros(3, np.float32)
+up = np.tile(np.float32([0, 0, 1]), (3, 1))
+answers = estimate(load_fabric("denim"), Queries.round(u, u, u + 1, up, up), TruthOptions(estimator="paper"), 0)
+assert np.allclose(answers.mean.sum(axis=1), 1 / np.pi)
+assert answers.standard_error.max() == 0
+""",
+    "A model": """
+import numpy as np
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from pathlib import Path
+from pipeline.models.catalogue import CLASSES
+from pipeline.models.method import Method
+from pipeline.models.registry import load_methods
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+(method,) = load_methods(CLASSES["matt"](albedo=0.25))
+assert isinstance(method, Method)
+u = np.zeros(2, np.float32)
+up = np.tile(np.float32([0, 0, 1]), (2, 1))
+answers = method.predict(load_fabric("denim"), Queries.round(u, u, u + 1, up, up))
+assert np.allclose(answers.sum(axis=1), 0.25 / np.pi)
+text = Path("jobs/recipes/smoke.toml").read_text()
+Path("my.toml").write_text(text.replace("[bench]", '[[models]]\\nmodel = "matt"\\n\\n[bench]', 1))
+assert any("matt" in task.title for task in plan(load_recipe("my.toml")))
+""",
+    "A scene": """
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+frame = render(load(load_scene("wall")), size=(16, 16))
+assert frame.gbuffers["denim"].mask.any()
+""",
+}
+
+
+def followed(section, folder):
+    """Copy the tree, write the files of a section and make its changes; return the files that it names."""
+    for room in ROOMS:
+        shutil.copytree(ROOT / room, folder / room, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    blocks = re.findall(r"^```(\w+) (\S+)\n(.*?)^```$", section, re.M | re.S)
+    for kind, name, content in blocks:
+        path = folder / name
+        if kind != "diff":
+            assert not path.exists(), f"{name} exists already"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(content, encoding="utf-8")
+            continue
+        path.write_text(changed(path.read_text(encoding="utf-8"), content, name), encoding="utf-8")
+    return [name for _, name, _ in blocks]
+
+
+def changed(text, diff, name):
+    """Apply lines of a diff: `+` takes the place of the `-` before it, or follows the line before it.
+
+    A part of a line may stand for it.
+    """
+    for old, new in re.findall(r"^([- ].*)\n((?:\+.*\n?)+)", diff, re.M):
+        assert text.count(old[1:]) == 1, f"{name}: {old[1:]!r} is there {text.count(old[1:])} times"
+        lines = [] if old.startswith("-") else [old[1:]]
+        text = text.replace(old[1:], "\n".join([*lines, *(line[1:] for line in new.splitlines())]), 1)
+    return text
+
+
+def test_every_recipe_is_tried():
+    recipes = TEXT.partition("## Recipes for common changes")[2].partition("\n## ")[0]
+    assert re.findall(r"^### (.+)$", recipes, re.M) == list(CHECKS)
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_a_recipe_works_as_it_is_written(name, tmp_path):
+    files = followed(SECTIONS[name], tmp_path)
+    done = subprocess.run([sys.executable, "-c", CHECKS[name]], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    sources = [file for file in files if file.endswith(".py")]
+    linted = subprocess.run(
+        [sys.executable, "-m", "ruff", "check", "--no-cache", *sources], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert linted.returncode == 0, linted.stdout
