@@ -6,13 +6,12 @@ this module are examples.
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
+import tomli_w
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
 
 from weaves.draft import Draft, Loom, Matrix
@@ -85,10 +84,7 @@ class Fabric(BaseModel):
 
     def to_toml(self) -> str:
         """Return a file that `load_fabric` reads back as an equal fabric."""
-        tables: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
-        top = {key: value for key, value in tables.items() if not isinstance(value, dict)}
-        inner = [f"\n[{name}]\n{_lines(table)}" for name, table in tables.items() if isinstance(table, dict)]
-        return "".join([_lines(top), *inner])
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
 
 
 def preset_names() -> list[str]:
@@ -126,15 +122,3 @@ def load_fabric(name_or_path: str | Path) -> Fabric:
 @lru_cache(maxsize=1024)
 def _woven(family: Weave) -> Draft:
     return family.build()
-
-
-def _lines(table: Mapping[str, Any]) -> str:
-    """Write one table as lines of TOML."""
-    return "".join(f"{key} = {_written(value)}\n" for key, value in table.items())
-
-
-def _written(value: Any) -> str:
-    """Write a value: JSON's strings, numbers and arrays are TOML's, but for DEL; a spectrum is an inline table."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_written(item)}" for key, item in value.items()) + " }"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -7,7 +7,6 @@ state is kept, so nothing has to be repaired after a kill.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
@@ -15,6 +14,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
+
+from filelock import FileLock, Timeout
 
 from jobs.plan.task import Task
 from pipeline.atomic import atomic_path, atomic_write
@@ -97,19 +98,18 @@ class Ledger:
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            lock = (self.folder / "lock").open("a")
+            lock = FileLock(self.folder / "lock", blocking=False)
+            lock.acquire()
+        except Timeout as error:
+            allowed = "another run is at work in this folder; wait for it, or choose another --out"
+            raise WorkFailed(f"{self.out}: {allowed}") from error
         except OSError as error:
-            raise BadInput(
-                str(self.out), "", error.strerror or error, "--out must name a folder that can be written"
-            ) from error
-        with lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise WorkFailed(
-                    f"{self.out}: another run is at work in this folder; wait for it, or choose another --out"
-                ) from error
+            allowed = "--out must name a folder that can be written"
+            raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
+        try:
             yield
+        finally:
+            lock.release()
 
     def _receipt(self, task: Task) -> Path:
         return self.folder / f"{task.id}.json"

@@ -14,10 +14,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import tomli_w
+
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from jobs.verbs.toml_text import toml
 from pipeline.atomic import atomic_write
 from pipeline.models.domain import PHYSICS
 from pipeline.scenes.requirement import Requirement
@@ -87,14 +88,14 @@ def write_recipe(
             "shard_rows": general.dataset.shard_rows,
             "seed": general.dataset.seed,
             "rows": _rows(general, effort if model.learns else 1.0),
-            "queries": queries.model_dump(mode="json", exclude_defaults=True),
+            "queries": queries.model_dump(mode="json", exclude_defaults=True, exclude_none=True),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
         "models": [_model(model, setting, effort, options), *_baseline(general, method)],
         "bench": _bench(general, _beside(path, scene)),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    atomic_write(path, toml(table).encode())
+    atomic_write(path, tomli_w.dumps(table).encode())
     load_recipe(path)
 
 
@@ -150,7 +151,7 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
 def _stated(truth: TruthOptions) -> dict[str, Any]:
     """Return a truth's table: its estimator and error in any case, the rest where it is not the default."""
     stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
-    return stated | truth.model_dump(mode="json", exclude_defaults=True)
+    return stated | truth.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
 
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
@@ -179,7 +180,7 @@ def _model(
     model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Return a model's table, with one setting alone where one is wished, and its training cut down."""
-    options = model.options.model_dump(mode="json", exclude_defaults=True) | dict(other)
+    options = model.options.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | dict(other)
     options = {"model": model.options.model, "name": model.options.name} | options
     validated(type(model.options), options, "--set")
     if setting.startswith("k = "):
@@ -191,14 +192,14 @@ def _model(
             "steps": max(1, round(effort * training.steps)),
             "average": round(training.average ** (1 / effort), 6),
         }
-        options["training"] = training.model_dump(mode="json", exclude_defaults=True) | shorter
+        options["training"] = training.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | shorter
     return options
 
 
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
     bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
-    found = bench.model_dump(mode="json", exclude_defaults=True)
+    found = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
 
 
