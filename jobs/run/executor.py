@@ -12,7 +12,7 @@ import os
 import signal
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -22,7 +22,7 @@ from rich.console import Console
 
 from jobs.plan.task import STAGES, Stage, Task, urgencies
 from jobs.run.ledger import Ledger, Product, measure
-from jobs.run.progress import TOPIC, Board
+from jobs.run.progress import KERNELS, TOPIC, Board, Compiling
 from weaves.errors import BadInput, WorkFailed
 
 Progress = Callable[[float], None]
@@ -42,6 +42,24 @@ class Outcome(NamedTuple):
     traceback: str = ""
 
 
+class Preparation(NamedTuple):
+    """What a worker does once before the tasks: compile a group of kernels.
+
+    Attributes
+    ----------
+    name : str
+        What progress shows.
+    function : callable
+        ``function(argument, ready)``; it calls ``ready`` with the name of each kernel.
+    argument : object
+        Its first argument.
+    """
+
+    name: str
+    function: Callable[[Any, Callable[[str], None]], None]
+    argument: Any
+
+
 class Summary(NamedTuple):
     """What a run did: tasks that were done before, tasks done by it, and those that failed."""
 
@@ -59,7 +77,7 @@ def execute(
     stages: Sequence[Stage] = STAGES,
     scheduler: str = "",
     workers: int = 0,
-    prepare: Callable[[], None] | None = None,
+    prepare: Callable[[Sequence[Task]], Sequence[Preparation]] = lambda todo: (),
     recorded: Callable[[Task], None] = lambda task: None,
     console: Console | None = None,
 ) -> Summary:
@@ -79,8 +97,8 @@ def execute(
         Address of a running dask scheduler; empty: a cluster on this machine, which ends with this process.
     workers : int
         Worker processes of the local cluster, one thread each; 0: one a core.
-    prepare : callable, optional
-        Called once in one worker before all others, such as to compile kernels.
+    prepare : callable
+        What workers do before the tasks that are not done yet.
     recorded : callable
         Called in this process after a receipt is written, or products are taken from another data set.
     console : Console, optional
@@ -111,9 +129,8 @@ def execute(
     console = console or Console(stderr=True)
     urgency = urgencies(list(todo.values()))
     with _client(scheduler, min(workers or os.cpu_count() or 1, len(todo))) as client:
-        if prepare:
-            with console.status("compiling kernels"):
-                client.submit(prepare, key="prepare").result()
+        if preparations := prepare(list(todo.values())):
+            _prepare(client, preparations, console)
         with Board(list(todo.values()), console) as board:
             client.subscribe_topic(TOPIC, board.hear)
             running: dict[Any, Task] = {}
@@ -139,6 +156,33 @@ def execute(
                     board.end(task)
     summary.waiting.extend(todo.values())
     return summary
+
+
+def _prepare(client: Any, preparations: Sequence[Preparation], console: Console) -> None:
+    """Compile kernels in all workers at once and show how far it is.
+
+    What fails here fails again in the task that needs it, and is told there.
+    """
+    with Compiling(len(preparations), console) as shown:
+        client.subscribe_topic(KERNELS, shown.hear)
+        slots = sum(client.nthreads().values())
+        waiting, running = list(preparations), dict[Any, str]()
+        while waiting or running:
+            while waiting and len(running) < max(1, slots):
+                one = waiting.pop(0)
+                running[client.submit(_prepare_one, one, pure=False)] = one.name
+                shown.begin(one.name)
+            for future in _first_ended(running):
+                shown.end(running.pop(future))
+        client.unsubscribe_topic(KERNELS)
+
+
+def _prepare_one(one: Preparation) -> None:
+    """Do one preparation in a worker."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    one.function(one.argument, lambda kernel: worker.log_event(KERNELS, kernel))
 
 
 def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
@@ -204,8 +248,8 @@ def _outcome(future: Any) -> Outcome:
     return Outcome({}, 0.0, _sentence(error))
 
 
-def _first_ended(running: dict[Any, Task]) -> list[Any]:
-    """Wait until at least one task has ended."""
+def _first_ended(running: Iterable[Any]) -> list[Any]:
+    """Wait until at least one of these futures has ended, and return those that have."""
     from distributed import CancelledError, wait
 
     try:

@@ -1,4 +1,7 @@
-"""One progress bar a stage, weighted by what each task is expected to cost, with the time left."""
+"""What a run shows while it works: the kernels being compiled, then one progress bar a stage.
+
+Bars are weighted by what each task is expected to cost.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,49 @@ from jobs.plan.task import STAGES, Stage, Task
 
 TOPIC = "progress"
 """Dask topic on which workers tell how far a task is: {"task": id, "fraction": share done}."""
+
+
+KERNELS = "kernels"
+"""Dask topic on which workers name each kernel that is compiled or read from the cache."""
+
+
+class Compiling:
+    """The line shown while kernels are compiled; a context manager."""
+
+    def __init__(self, groups: int, console: Console) -> None:
+        self._total, self._ended = groups, 0
+        self._under_way: list[str] = []
+        self._ready: set[str] = set()
+        self._status = console.status(self._line())
+
+    def __enter__(self) -> Compiling:
+        self._status.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._status.stop()
+
+    def begin(self, group: str) -> None:
+        """Show that a group of kernels is being compiled."""
+        self._under_way.append(group)
+        self._status.update(self._line())
+
+    def hear(self, event: tuple[float, Any]) -> None:
+        """Take the name of a kernel that is ready."""
+        self._ready.add(event[1])
+        self._status.update(self._line())
+
+    def end(self, group: str) -> None:
+        """Count a group as compiled."""
+        self._ended += 1
+        self._under_way.remove(group)
+        self._status.update(self._line())
+
+    def _line(self) -> str:
+        groups = f"{self._ended} of {self._total} groups done"
+        return f"compiling kernels: {len(self._ready)} ready, {groups}; now {', '.join(self._under_way) or 'none'}"
 
 
 class Board:

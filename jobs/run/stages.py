@@ -20,21 +20,6 @@ def run(task: Task, out: Path, progress: Progress) -> None:
     RUNNERS[task.stage](task, out, progress)
 
 
-def compile_kernels() -> None:
-    """Compile the ground truth's kernels into numba's cache, so that of many workers one alone has to."""
-    from pipeline.analytic.exact_points import PointSampler
-    from pipeline.shards.queries import QueryOptions, draw_queries
-    from pipeline.truth.estimator import ESTIMATORS, estimate
-    from pipeline.truth.options import TruthOptions
-    from weaves.fabric import load_fabric, preset_names
-
-    fabric = load_fabric(preset_names()[0])
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 0, 0, 1)
-    for name in ESTIMATORS:
-        estimate(fabric, queries, TruthOptions(estimator=name, min_count=32, max_count=32), 0)
-    PointSampler(fabric).sample(queries, 1, 0)
-
-
 def _generate(task: Task, out: Path, progress: Progress) -> None:
     from pipeline.shards.generate import ShardTask, generate_shard
 

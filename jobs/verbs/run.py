@@ -12,10 +12,11 @@ from jobs.plan.dataset import shards
 from jobs.plan.plan import plan
 from jobs.plan.task import Stage, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.executor import execute
+from jobs.run.compiling import compile_group, kernel_groups
+from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.stages import compile_kernels, run
+from jobs.run.stages import run
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.tables import methods_table, summary_table
 from weaves.errors import WorkFailed
@@ -49,7 +50,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
             stages=stages,
             scheduler=scheduler,
             workers=workers,
-            prepare=compile_kernels if {"generate", "bench"}.intersection(stages) else None,
+            prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
             recorded=recorded,
         )
     chosen = [task for task in tasks if task.stage in stages]

@@ -5,8 +5,10 @@ kernel's package, and of the packages it may import, cannot serve a stale kernel
 (`PACKAGES`), so that editing an approximation recompiles no ground truth. No fast-math but where a kernel says so
 (`fast_kernel`).
 
-pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. One process
-alone compiles at a time; the others wait and read what it wrote, because numba lets two overwrite each other's index.
+pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. Processes
+compile different kernels at the same time. Of one kernel, one process alone: the others wait and read what it wrote,
+because numba lets two processes overwrite each other's index of a kernel. A kernel is compiled while the locks of its
+callers are held; calls form no circle, so no two processes wait for each other.
 """
 
 from __future__ import annotations
@@ -60,31 +62,41 @@ _CACHE = _cache_home()
 
 make_reproducible()
 
-_LOCK = FileLock(_CACHE / "kernels.lock", thread_local=False)
+_listeners: list[Callable[[str], None]] = []
 
 
 @contextmanager
-def _alone() -> Iterator[None]:
-    """Hold this process's compiler and the cache's lock, in this order; whoever dies lets go of both."""
-    with global_compiler_lock:
-        _CACHE.mkdir(parents=True, exist_ok=True)
-        with _LOCK:
-            yield
+def announced(ready: Callable[[str], None]) -> Iterator[None]:
+    """Call `ready` with the name of every kernel that this process compiles, or reads from the cache, meanwhile."""
+    _listeners.append(ready)
+    try:
+        yield
+    finally:
+        _listeners.remove(ready)
 
 
 def _decorator(**flags: Any) -> Callable[[_Function], _Function]:
-    """Return a decorator with these flags, whose kernels one process alone compiles or reads at a time."""
+    """Return a decorator with these flags; each kernel is compiled or read by one process at a time."""
     compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)
 
     def decorate(function: _Function) -> _Function:
+        folder = _cache_folder(_package_of(function.__module__))
         # numba reads its cache folder when a function is decorated.
-        numba.config.CACHE_DIR = str(_cache_folder(_package_of(function.__module__)))  # type: ignore[attr-defined]
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
         dispatcher: Any = compiled(function)
         compile_or_load = dispatcher.compile
+        name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+        lock = FileLock(folder / f"{name}.lock", thread_local=False)
 
         def compile_alone(signature: Any) -> Any:
-            with _alone():
-                return compile_or_load(signature)
+            # This process's compiler first, then the kernel's file; a process that dies releases both.
+            with global_compiler_lock:
+                folder.mkdir(parents=True, exist_ok=True)
+                with lock:
+                    result = compile_or_load(signature)
+            for listener in _listeners:
+                listener(name)
+            return result
 
         dispatcher.compile = compile_alone
         return cast(_Function, dispatcher)

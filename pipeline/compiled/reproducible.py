@@ -8,8 +8,8 @@ things that are no part of a function decide about its bits:
 - the flags of whoever calls a function first, which the function then keeps for all (`_OwnFlags`);
 - the flags of whoever first uses an operation that numba writes in Python, such as `x**2` (`_compile_subroutine`).
 
-With reassociation allowed, each regroups sums: last bits. These are numba's internals;
-tests/pipeline/truth/test_kernel.py fails when an upgrade makes one of them void.
+With reassociation allowed, each of the four changes the last bits of sums. These are numba's internals;
+tests/pipeline/compiled/test_decorators.py fails when an upgrade makes one of them void.
 """
 
 from __future__ import annotations

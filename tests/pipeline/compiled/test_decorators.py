@@ -86,8 +86,8 @@ import hashlib
 import sys
 import numpy as np
 from pipeline.models.gauss_nodes.options import GaussNodesOptions
-from pipeline.models.gauss_nodes.model import Quadrature
-from pipeline.models.soft_nodes.model import Sums
+from pipeline.models.gauss_nodes.model import GaussNodes
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.analytic.horizon_points.sampler import HorizonSampler
@@ -98,8 +98,8 @@ fabric = load_fabric("denim")
 queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="table"), 1)[:2]),
-    "quadrature": lambda: Quadrature(4, GaussNodesOptions(model="quadrature")).predict(fabric, queries),
-    "sums": lambda: Sums().predict(fabric, queries),
+    "gauss_nodes": lambda: GaussNodes(4, GaussNodesOptions(model="gauss_nodes")).predict(fabric, queries),
+    "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
     "points": lambda: HorizonSampler(fabric).sample(queries, 16, True, 1),
 }
 answers = {name: asked[name]() for name in sys.argv[1:]}
@@ -127,12 +127,14 @@ def copies(tmp_path: Path) -> list[Path]:
     """Return three folders with the decorators and small kernels, nothing compiled."""
     folders = [tmp_path / name for name in "abc"]
     for folder in folders:
+        compiled = folder / "pipeline" / "compiled"
+        compiled.mkdir(parents=True)
+        for path in (ROOT / "pipeline" / "compiled").glob("*.py"):
+            shutil.copy(path, compiled)
+        (folder / "pipeline" / "__init__.py").touch()
         truth = folder / "pipeline" / "truth"
-        truth.mkdir(parents=True)
-        for name in ("kernel", "compiler"):
-            source = ROOT / "pipeline" / "truth" / f"{name}.py"
-            if source.exists():
-                shutil.copy(source, truth)
+        truth.mkdir()
+        (truth / "__init__.py").touch()
         (truth / "small.py").write_text(KERNELS)
     return folders
 
@@ -169,7 +171,7 @@ def test_real_kernels_answer_the_same_cold_and_warm_in_any_order(tmp_path):
     for name in "ab":
         for package in ("weaves", "pipeline"):
             shutil.copytree(ROOT / package, tmp_path / name / package, ignore=shutil.ignore_patterns("__pycache__"))
-    order = ("table", "quadrature", "sums", "points")
+    order = ("table", "gauss_nodes", "soft_nodes", "points")
     cold = answers(start(tmp_path / "a", REAL, *order))
     assert answers(start(tmp_path / "a", REAL, *order[::-1])) == cold
     assert answers(start(tmp_path / "b", REAL, *order[::-1])) == cold

@@ -1,0 +1,107 @@
+"""The kernels that tasks use, compiled before the tasks start.
+
+A group is one estimator, or one model that learns nothing, asked a few queries. Workers compile several groups at the
+same time; what groups have in common is compiled once (`pipeline.compiled.decorators`). A kernel that no group reaches
+is compiled by the first task that calls it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from jobs.plan.task import Task
+from pipeline.models.catalogue import CLASSES
+from pipeline.models.options import Options
+
+_ROWS: Final = 8
+
+_SAMPLED: Final = ("mc", "jittered", "r2")
+"""Estimators with the kernels of `owen`."""
+
+_IN_SCENES: Final = ("scene", "frame time")
+"""Measurements in which a table, and where it does not reach quadrature, stand in for a method."""
+
+_LONGEST_FIRST: Final = ("table", "quadrature", "soft_nodes", "gauss_nodes", "owen")
+
+
+class KernelGroup(NamedTuple):
+    """Kernels that are compiled together.
+
+    Attributes
+    ----------
+    name : str
+        The estimator, or the model's name.
+    model : Options or None
+        Options of the model; None for an estimator.
+    """
+
+    name: str
+    model: Options | None
+
+
+def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
+    """Return the groups that some tasks use, those that take longest first."""
+    found: dict[str, KernelGroup] = {}
+    for task in tasks:
+        for name in _estimators(task):
+            name = "owen" if name in _SAMPLED else name
+            found[name] = KernelGroup(name, None)
+        for options in _models(task.spec):
+            found[options.model_dump_json(exclude={"name"})] = KernelGroup(options.name, options)
+    order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
+    return sorted(found.values(), key=lambda group: order.get(group.name, len(order)))
+
+
+def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
+    """Compile the kernels of a group, or read them from the cache; `ready` is called with the name of each kernel."""
+    from pipeline.compiled.decorators import announced
+    from pipeline.models.registry import load_methods
+    from pipeline.shards.queries import QueryOptions, draw_queries
+    from pipeline.truth.estimator import estimate
+    from pipeline.truth.options import TruthOptions
+    from weaves.fabric import load_fabric, preset_names
+
+    fabric = load_fabric(preset_names()[0])
+    # Round and elliptic footprints take different ways through `elliptic`.
+    kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if group.name == "elliptic" else [QueryOptions()]
+    with announced(ready):
+        for kind in kinds:
+            queries = draw_queries(kind, fabric.weave.repeat, 0, 0, _ROWS)
+            if group.model is None:
+                options = {"estimator": group.name, "min_count": 32, "max_count": 32}
+                estimate(fabric, queries, TruthOptions.model_validate(options), 0)
+            else:
+                for method in load_methods(group.model):
+                    method.predict(fabric, queries)
+
+
+def _estimators(task: Task) -> Iterator[str]:
+    """Yield the estimators that a task asks."""
+    for table in _tables(task.spec, "estimator"):
+        yield table["estimator"]
+    make = task.setting.get("make")
+    if make in _IN_SCENES:
+        yield from ("table", "quadrature")
+    if make == "extremes":
+        yield "quadrature"
+
+
+def _models(spec: Any) -> Iterator[Options]:
+    """Yield the models without training that a task's specification names, with the first value of their knob alone."""
+    for table in _tables(spec, "model"):
+        if table["model"] == "selvage":  # corrects soft_nodes
+            yield CLASSES["soft_nodes"]()
+        elif not CLASSES[table["model"]].learns:
+            yield CLASSES[table["model"]].model_validate(table).single()[0]
+
+
+def _tables(value: Any, key: str) -> Iterator[Mapping[str, Any]]:
+    """Yield every table within a JSON value that has a key."""
+    if isinstance(value, Mapping):
+        if key in value:
+            yield value
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for inner in value:
+            yield from _tables(inner, key)
