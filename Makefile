@@ -18,15 +18,16 @@ plan generate check train bench status: $(READY)
 	@$(BIN)/twillight $@ $(RECIPE)
 
 # What the recipes of three scenes save against the general one, which runs first if it has not; it goes on where it was.
+savings: RECIPE = standard
 savings: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
 	@$(BIN)/twillight require sphere --recipe $(RECIPE) --method woven --set hidden=64
-	@$(BIN)/twillight require table --recipe $(RECIPE) --method woven --effort .33
+	@$(BIN)/twillight require dinner_table --recipe $(RECIPE) --method woven --effort .33
 	@$(BIN)/twillight require roll --recipe $(RECIPE) --method neumip --effort 1
 	@$(BIN)/twillight run out/recipes/require-sphere.toml
-	@$(BIN)/twillight run out/recipes/require-table.toml
+	@$(BIN)/twillight run out/recipes/require-dinner_table.toml
 	@$(BIN)/twillight run out/recipes/require-roll.toml
-	@$(BIN)/twillight savings $(RECIPE) sphere table roll
+	@$(BIN)/twillight savings $(RECIPE) sphere dinner_table roll
 
 # The table of README.md, from the page that `make report` writes.
 readme: $(READY)
@@ -37,9 +38,11 @@ results: RECIPE = standard
 results: $(READY)
 	@$(BIN)/twillight results $(RECIPE) --file reports/RESULTS.md
 
+# Linters, types, and the tests in one process a core. Every test process computes on one thread.
 test: lint
-	$(BIN)/python -m pytest -m "not slow"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow" --numprocesses logical --maxprocesses 8 --dist loadscope
 
+# The tests marked slow: long statistics, every kernel compiled from nothing, every recipe made small. Takes long.
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow
 
@@ -51,9 +54,11 @@ lint: $(READY)
 # Nothing is installed again until the pinned versions or the package's own description change.
 $(READY): requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Twillight needs Python 3.11 or newer: say which with make PYTHON=/path/to/python3"; exit 1; }
-	@echo "installing the pinned packages into .venv (once)"
+	@echo "installing, 1 of 3: the virtual environment .venv"
 	@$(PYTHON) -m venv .venv
+	@echo "installing, 2 of 3: the packages pinned in requirements.txt; this downloads about a gigabyte and takes minutes"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --requirement requirements.txt
+	@echo "installing, 3 of 3: twillight itself"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 

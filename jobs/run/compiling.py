@@ -48,7 +48,10 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
             name = "owen" if name in _SAMPLED else name
             found[name] = KernelGroup(name, None)
         for options in _models(task.spec):
-            found[options.model_dump_json(exclude={"name"})] = KernelGroup(options.name, options)
+            # The value of the knob is an argument of the same kernels.
+            found.setdefault(
+                options.model_dump_json(exclude={"name", options.knob}), KernelGroup(options.name, options)
+            )
     order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
     return sorted(found.values(), key=lambda group: order.get(group.name, len(order)))
 

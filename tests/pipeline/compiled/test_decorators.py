@@ -166,6 +166,23 @@ def test_a_kernel_runs_its_own_copies_of_what_it_calls(copies):
     assert answers(start(copies[0], WEAK)).split() == ["True"]
 
 
+NAMES = """
+import numpy as np
+from pipeline.compiled.decorators import announced
+from pipeline.truth import small
+
+names = []
+with announced(names.append):
+    small.fast(np.ones(61, np.float32))
+small.plain(np.ones(61, np.float32))
+print(*sorted(name.rpartition("-")[0].rpartition(".")[2] for name in names))
+"""
+
+
+def test_each_kernel_is_announced_when_it_is_compiled(copies):
+    assert answers(start(copies[0], NAMES)).split() == ["fast", "inverse_length", "shared"]
+
+
 @pytest.mark.slow
 def test_real_kernels_answer_the_same_cold_and_warm_in_any_order(tmp_path):
     for name in "ab":

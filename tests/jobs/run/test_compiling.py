@@ -1,0 +1,37 @@
+import pytest
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.compiling import compile_group, kernel_groups
+
+
+@pytest.fixture(scope="module")
+def tasks():
+    return plan(load_recipe("quick"))
+
+
+def names(tasks):
+    return {group.name for group in kernel_groups(tasks)}
+
+
+def test_a_task_asks_for_what_it_uses_alone(tasks):
+    training_rows = [t for t in tasks if t.stage == "generate" and t.spec["truth"]["estimator"] == "table"]
+    assert names(training_rows) == {"table"}
+    assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
+    assert names(t for t in tasks if t.setting.get("make") == "extremes" and t.group == "prefiltered") == {
+        "quadrature",
+        "prefiltered",
+    }
+
+
+def test_each_group_is_compiled_once_whatever_the_value_of_a_knob(tasks):
+    groups = kernel_groups(tasks)
+    assert len(groups) == len({group.name for group in groups})
+
+
+def test_what_a_process_has_is_not_compiled_again(tasks):
+    group = next(group for group in kernel_groups(tasks) if group.name == "prefiltered")
+    compile_group(group, lambda kernel: None)
+    heard = []
+    compile_group(group, heard.append)
+    assert heard == []
