@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32, Mask
 from pipeline.compiled.decorators import inlined_fast_kernel
 from pipeline.compiled.float32 import remaining
 
@@ -23,14 +23,14 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 @inlined_fast_kernel
 def axis_densities(
-    places: Single,
-    weights: Single,
+    places: Float32,
+    weights: Float32,
     columns: int,
     centre: np.float32,
     deviation: np.float32,
     reach: np.float32,
-    density: Single,
-    touched: npt.NDArray[np.bool_],
+    density: Float32,
+    touched: Mask,
     found: npt.NDArray[np.uint32],
 ) -> int:
     """Write the Gaussian at the nodes of all rules, times their weights, in the cells of one axis; list those touched.

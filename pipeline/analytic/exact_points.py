@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, independent_pair, r2_pair
@@ -28,7 +28,7 @@ class PointSampler:
     def __init__(self, fabric: Fabric, options: TruthOptions | None = None) -> None:
         self.model = cloth_side(fabric, options or TruthOptions())
 
-    def sample(self, queries: Queries, count: int, seed: int, r2: bool = False) -> npt.NDArray[np.float32]:
+    def sample(self, queries: Queries, count: int, seed: int, r2: bool = False) -> Float32:
         """Return the components from `count` points a query, (N, 4); the viewer is in front.
 
         The points are independent, or with `r2` the first of that sequence, shifted at random once a query
@@ -42,7 +42,7 @@ class PointSampler:
 
 
 @kernel
-def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool) -> npt.NDArray[np.float32]:
+def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool) -> Float32:
     rows = len(columns.u)
     mean = np.zeros((rows, 4), np.float32)
     sums = np.zeros((1, SUMS))

@@ -7,9 +7,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Double = npt.NDArray[np.float64]
+from pipeline.compiled.arrays import Float64
 
 
 class Rule(NamedTuple):
@@ -25,10 +24,10 @@ class Rule(NamedTuple):
         The same as shares of the variable that the rule is Gauss's in, v across a yarn: from 0 to 1.
     """
 
-    places: Double
-    weights: Double
-    borders: Double
-    shares: Double
+    places: Float64
+    weights: Float64
+    borders: Float64
+    shares: Float64
 
 
 @lru_cache(maxsize=256)
@@ -45,19 +44,19 @@ def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
     return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]), shares)
 
 
-def grid_edges(low: float, high: float, count: int, radius: float) -> Double:
+def grid_edges(low: float, high: float, count: int, radius: float) -> Float64:
     """Return the borders of `count` cells of a grid: evenly from `low` to `high`, or evenly in v."""
     share = np.linspace(0.0, 1.0, count + 1)
     return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
 
 
-def grid_middles(low: float, high: float, count: int, radius: float) -> Double:
+def grid_middles(low: float, high: float, count: int, radius: float) -> Float64:
     """Return the middles of the same cells."""
     share = (np.arange(count) + 0.5) / count
     return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
 
 
-def overlap(borders: Double, edges: Double) -> Double:
+def overlap(borders: Float64, edges: Float64) -> Float64:
     """Return which share of each box lies in each cell of a grid, (boxes, cells); rows sum to 1."""
     share = np.minimum(borders[1:, None], edges[None, 1:]) - np.maximum(borders[:-1, None], edges[None, :-1])
     share = np.maximum(share, 0.0)

@@ -19,12 +19,12 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.analytic.flakes_float32 import sigma, spread
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.compiled.float32 import absorbed
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.slab_float32 import reflection
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
@@ -59,11 +59,11 @@ class Pyramid(NamedTuple):
         Optical thickness.
     """
 
-    texels: Single
-    levels: npt.NDArray[np.int64]
-    repeat: npt.NDArray[np.float64]
+    texels: Float32
+    levels: Index
+    repeat: Float64
     finest: float
-    yarn: Single
+    yarn: Float32
     thickness: np.float32
 
 
@@ -81,7 +81,7 @@ class PrefilteredMaps:
     def __init__(self, fabric: Fabric, texels_per_yarn: int) -> None:
         self.pyramid = pyramid(fabric, texels_per_yarn)
 
-    def answer(self, queries: Queries, widening: int) -> npt.NDArray[np.float32]:
+    def answer(self, queries: Queries, widening: int) -> Float32:
         """Return the components (N, 4); queries are round, flat and lit from the front."""
         u, v, sigma, wi, wo = (np.ascontiguousarray(column, np.float32) for column in queries[:5])
         return _answer(self.pyramid, u, v, sigma, wi, wo, widening)
@@ -129,8 +129,8 @@ def pyramid(fabric: Fabric, texels_per_yarn: int) -> Pyramid:
 
 @kernel
 def _answer(
-    maps: Pyramid, u: Single, v: Single, sigma: Single, wi: Single, wo: Single, widening: int
-) -> npt.NDArray[np.float32]:
+    maps: Pyramid, u: Float32, v: Float32, deviation: Float32, wi: Float32, wo: Float32, widening: int
+) -> Float32:
     result = np.zeros((len(u), 4), np.float32)
     read = np.zeros(2 * CHANNELS, np.float32)
     texels, levels, repeat, yarn, thickness = maps.texels, maps.levels, maps.repeat, maps.yarn, maps.thickness
@@ -138,7 +138,7 @@ def _answer(
     for row in range(len(u)):
         x, y = np.float64(u[row]) / repeat[0], np.float64(v[row]) / repeat[1]
         x, y = x - math.floor(x), y - math.floor(y)
-        level = min(max(math.log2(2.0 * sigma[row] / maps.finest), 0.0), float(last))
+        level = min(max(math.log2(2.0 * deviation[row] / maps.finest), 0.0), float(last))
         below = min(int(level), max(last - 1, 0))
         share = level - below
         read[:] = _0
@@ -165,13 +165,13 @@ def _answer(
             if widening == TOKSVIG:
                 square = min(square + _HALF * max(_1 - length, _0), _1)
             elif widening == LEAN:
-                spread = (
+                variance = (
                     hx * hx * read[k + 7]
                     + hy * hy * read[k + 8]
                     + hz * hz * read[k + 9]
                     + np.float32(2.0) * (hx * hy * read[k + 10] + hx * hz * read[k + 11] + hy * hz * read[k + 12])
                 )
-                square = min(square + size * max(spread * inverse - along * along, _0), _1)
+                square = min(square + size * max(variance * inverse - along * along, _0), _1)
             t = _1 / np.sqrt(max(length, _TINY))
             cos_o, cos_i = (ox * nx + oy * ny + oz * nz) * n, (ix * nx + iy * ny + iz * nz) * n
             if cos_o <= _0:
@@ -181,15 +181,12 @@ def _answer(
             if cos_i <= _0:
                 continue
             along_i, along_o = (ix * tx + iy * ty + iz * tz) * t, (ox * tx + oy * ty + oz * tz) * t
-            rest = _1 - square
-            sigma_i = np.sqrt(max(_1 - rest * along_i * along_i, square))
-            sigma_o = np.sqrt(max(_1 - rest * along_o * along_o, square))
-            crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
-            depth = thickness * crossed / (cos_i * cos_o)
-            q = square + rest * size * (along_i + along_o) * (along_i + along_o)
-            flakes = square * np.sqrt(square) * _FOURTH_PI / (q * q * crossed)
+            scattered = reflection(
+                square * np.sqrt(square) * _FOURTH_PI, spread(along_i + along_o, size, square),
+                sigma(along_i, square), sigma(along_o, square), cos_i, cos_o, thickness,
+            )  # fmt: skip
             blend = yarn[family, 1]
-            result[row, family] = projected * cos_i * flakes * absorbed(depth)
+            result[row, family] = covered * scattered / (nz * n)
             result[row, 2 + family] = projected * _INVERSE_PI * (blend * cos_i + (_1 - blend) * iz)
         inverse = _1 / max(area, _TINY)
         for c in range(4):
@@ -198,9 +195,7 @@ def _answer(
 
 
 @kernel
-def _add(
-    texels: Single, levels: npt.NDArray[np.int64], level: int, x: float, y: float, share: np.float32, read: Single
-) -> None:
+def _add(texels: Float32, levels: Index, level: int, x: float, y: float, share: np.float32, read: Float32) -> None:
     """Add one level, read bilinearly around shares x and y of the repeat."""
     first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x, y = x * width - 0.5, y * height - 0.5

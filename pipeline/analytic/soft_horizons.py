@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic.gauss_rules import Double
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
@@ -23,8 +22,8 @@ _TINY: Final = np.float32(1e-20)
 
 
 def over_boxes(
-    values: Double | Single, squares: Double | Single, rows: Double, columns: Double
-) -> tuple[Double, Double]:
+    values: Float64 | Float32, squares: Float64 | Float32, rows: Float64, columns: Float64
+) -> tuple[Float64, Float64]:
     """Return mean and variance of horizons over boxes, (azimuths, boxes), boxes of a row following each other.
 
     Parameters

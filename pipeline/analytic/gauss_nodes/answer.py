@@ -52,7 +52,7 @@ from pipeline.analytic.horizon_points.shading import (
     shade_all,
 )  # fmt: skip
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32, Mask
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
@@ -96,7 +96,7 @@ class GaussQuadrature:
         self.map = horizon_map(model.front, model.back, grid, azimuths)
         self.nodes = gauss_nodes(model.front, self.map, across, along)
 
-    def answer(self, queries: Queries) -> npt.NDArray[np.float32]:
+    def answer(self, queries: Queries) -> Float32:
         """Return the components (N, 4); queries are flat and lit from the front."""
         u, v, wi, wo = (
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
@@ -113,18 +113,18 @@ class GaussQuadrature:
 def _answer(
     table: HorizonMap,
     fixed: GaussNodes,
-    u: Single,
-    v: Single,
-    deviation_x: Single,
-    deviation_y: Single,
-    correlation: Single,
-    wi: Single,
-    wo: Single,
+    u: Float32,
+    v: Float32,
+    deviation_x: Float32,
+    deviation_y: Float32,
+    correlation: Float32,
+    wi: Float32,
+    wo: Float32,
     along: int,
     finest: np.float32,
     shadows: bool,
     soft: bool,
-) -> npt.NDArray[np.float32]:
+) -> Float32:
     rows, count = len(u), len(fixed.evenly)
     result = np.zeros((rows, 4), np.float32)
     ends, picks = table.repeat[0], table.repeat[1]
@@ -226,13 +226,13 @@ def _answer(
 
 @fast_kernel
 def _densities(
-    positions: Single,
-    weights: Single,
+    positions: Float32,
+    weights: Float32,
     centre: np.float32,
     s: np.float32,
     even: bool,
-    out: Single,
-    touched: npt.NDArray[np.bool_],
+    out: Float32,
+    touched: Mask,
     cells: npt.NDArray[np.uint32],
 ) -> None:
     """Write the footprint's densities in all cells of one axis; `cells` is scratch."""
@@ -245,22 +245,22 @@ def _densities(
 
 @fast_kernel
 def _uncover(
-    low_i: Single,
-    high_i: Single,
+    low_i: Float32,
+    high_i: Float32,
     turn_i: np.float32,
     iz: np.float32,
-    low_o: Single,
-    high_o: Single,
+    low_o: Float32,
+    high_o: Float32,
     turn_o: np.float32,
     oz: np.float32,
-    steep_i: Single,
-    steep_o: Single,
+    steep_i: Float32,
+    steep_o: Float32,
     sharpness: np.float32,
     alike: np.float32,
     right: np.float32,
     opposite: np.float32,
-    seen: Single,
-    both: Single,
+    seen: Float32,
+    both: Float32,
 ) -> None:
     """Write which share of each node's box is seen, and which is seen and lit."""
     for k in range(len(seen)):

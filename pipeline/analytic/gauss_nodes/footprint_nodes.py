@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.analytic.gauss_nodes.nodes import GaussNodes
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
 from pipeline.analytic.horizon_points.shading import STEP_V, STEP_Y, WEIGHT, X, Y
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import GAP, WARP, WEFT
@@ -34,8 +34,8 @@ def place_nodes(
     y: np.float32,
     s: np.float32,
     along: int,
-    line: Single,
-    lanes: Single,
+    line: Float32,
+    lanes: Float32,
 ) -> int:
     """Place nodes in what a narrow footprint covers of every piece; return how many."""
     ends, picks = table.repeat[0], table.repeat[1]
@@ -104,8 +104,8 @@ def _axis(
     radius: np.float32,
     bent: bool,
     count: int,
-    positions: Single,
-    weights: Single,
+    positions: Float32,
+    weights: Float32,
 ) -> None:
     """Write positions and weights of one axis of a clipped piece: the rule, in v across a yarn, times the Gaussian."""
     rule = 0 if bent else 1

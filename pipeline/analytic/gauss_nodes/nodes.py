@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.gauss_rules import Double, Rule, gauss_rule, overlap
+from pipeline.analytic.gauss_rules import Rule, gauss_rule, overlap
 from pipeline.analytic.horizon_points.horizon_map import SLOTS, HorizonMap, locate, slot_of
 from pipeline.analytic.horizon_points.shading import (
     CURVATURE,
@@ -25,8 +25,7 @@ from pipeline.analytic.horizon_points.shading import (
     Y,
 )  # fmt: skip
 from pipeline.analytic.soft_horizons import over_boxes
-from pipeline.compiled.arrays import Float32 as Single
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.truth.geometry.heightfield import GAP, WEFT, HeightField
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
 from pipeline.truth.geometry.symmetry import orbits
@@ -58,16 +57,16 @@ class GaussNodes(NamedTuple):
         The rule on [-1, 1], across and along.
     """
 
-    lanes: Single
-    mean: Single
-    steepness: Single
-    evenly: Single
+    lanes: Float32
+    mean: Float32
+    steepness: Float32
+    evenly: Float32
     pieces: Index
     copies: Index
-    positions: Single
-    weights: Single
-    own_positions: Single
-    own_weights: Single
+    positions: Float32
+    weights: Float32
+    own_positions: Float32
+    own_weights: Float32
 
 
 def gauss_nodes(field: HeightField, table: HorizonMap, across: int, along: int) -> GaussNodes:
@@ -79,7 +78,7 @@ def gauss_nodes(field: HeightField, table: HorizonMap, across: int, along: int) 
     number = {id(rule): index for index, rule in enumerate(rules)}
     rows: list[tuple[int, ...]] = []
     copies: list[tuple[int, int]] = []
-    parts: list[list[Double]] = []
+    parts: list[list[Float64]] = []
     first = 0
     for (orbit, piece), (x, y) in zip(found, axes, strict=True):
         (pick, end), nx, ny = orbit[0], len(x.places), len(y.places)
@@ -128,7 +127,7 @@ def _axes(piece: Piece, across: int, along: int) -> tuple[Rule, Rule]:
     return (rules[1], rules[0]) if piece.family == WEFT else rules
 
 
-def _soft_horizons(table: HorizonMap, cell: int, piece: Piece, x: Rule, y: Rule) -> tuple[Double, Double]:
+def _soft_horizons(table: HorizonMap, cell: int, piece: Piece, x: Rule, y: Rule) -> tuple[Float64, Float64]:
     """Return mean and standard deviation of the horizon over each node's box, (azimuths, nodes)."""
     block = table.blocks[cell * SLOTS + slot_of(piece)]
     shape = (table.azimuths, table.grid, table.grid)
@@ -140,6 +139,6 @@ def _soft_horizons(table: HorizonMap, cell: int, piece: Piece, x: Rule, y: Rule)
     return mean, np.sqrt(variance)
 
 
-def _filled(rows: list[Double], count: int) -> Single:
+def _filled(rows: list[Float64], count: int) -> Float32:
     """Return rows of `count` numbers, shorter ones filled with 0."""
     return np.array([np.pad(row, (0, count - len(row))) for row in rows], np.float32)

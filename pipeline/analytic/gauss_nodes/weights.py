@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.gauss_nodes.nodes import COPIES, COPY, COUNT_X, COUNT_Y, FIRST, RULE_X, RULE_Y
-from pipeline.compiled.arrays import Float32 as Single
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Index, Mask
 from pipeline.compiled.decorators import fast_kernel
 
 
 @fast_kernel
-def even_densities(weights: Single, s: np.float32, out: Single) -> None:
+def even_densities(weights: Float32, s: np.float32, out: Float32) -> None:
     """Write what `axis_densities` tends to for a wide Gaussian: the nodes' weights, as high as its mean."""
     share = s * np.float32(math.sqrt(2.0 * math.pi)) / np.float32(len(out))
     for c in range(len(out)):
@@ -29,12 +27,12 @@ def even_densities(weights: Single, s: np.float32, out: Single) -> None:
 def product_weights(
     pieces: Index,
     copies: Index,
-    of_x: Single,
-    of_y: Single,
-    touched_x: npt.NDArray[np.bool_],
-    touched_y: npt.NDArray[np.bool_],
+    of_x: Float32,
+    of_y: Float32,
+    touched_x: Mask,
+    touched_y: Mask,
     share: np.float32,
-    weight: Single,
+    weight: Float32,
 ) -> None:
     """Add `share` times each node's weight: products of both axes, summed over the cells that are alike."""
     for p in range(len(pieces)):

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import grid_middles
-from pipeline.compiled.arrays import Float32 as Single
-from pipeline.compiled.arrays import Float64 as Double
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import GAP, TOP, WARP, WEFT, HeightField
@@ -60,14 +59,14 @@ class HorizonMap(NamedTuple):
         Optical thickness.
     """
 
-    repeat: npt.NDArray[np.int64]
+    repeat: Index
     top: npt.NDArray[np.int32]
-    pieces: Single
+    pieces: Float32
     blocks: npt.NDArray[np.int32]
-    horizon: Single
+    horizon: Float32
     grid: int
     azimuths: int
-    yarn: Single
+    yarn: Float32
     thickness: np.float32
 
     def bytes_stored(self) -> int:
@@ -83,8 +82,8 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     picks, ends = field.top.shape
     pieces = np.zeros((picks, ends, SLOTS, 5))
     blocks = np.zeros((picks, ends, SLOTS), np.int32)
-    xs: list[Double] = []
-    ys: list[Double] = []
+    xs: list[Float64] = []
+    ys: list[Float64] = []
     gaps: list[bool] = []
     size = azimuths * grid * grid
     for orbit in orbits(field):
@@ -133,7 +132,7 @@ def _row(piece: Piece) -> tuple[float, ...]:
     return (offset, piece.sign * piece.curve, min(piece.steepest, _STEEPEST), low, 1.0 / (high - low))
 
 
-def _nodes(piece: Piece, grid: int) -> tuple[Double, Double]:
+def _nodes(piece: Piece, grid: int) -> tuple[Float64, Float64]:
     """Return x and y of a block's nodes within the cell, (grid * grid,): across the yarn runs fastest."""
     if piece.family == GAP:
         x = np.full(grid * grid, 0.5 * min(piece.across[1], piece.along[1]))
@@ -146,23 +145,23 @@ def _nodes(piece: Piece, grid: int) -> tuple[Double, Double]:
 @fast_kernel
 def locate(
     count: int,
-    x: Single,
-    y: Single,
+    x: Float32,
+    y: Float32,
     ends: np.int32,
     last_end: np.float32,
     last_pick: np.float32,
     top: npt.NDArray[np.int32],
-    pieces: Single,
+    pieces: Float32,
     blocks: npt.NDArray[np.int32],
     grid: np.int32,
     warp_radius: np.float32,
     weft_radius: np.float32,
-    sine: Single,
-    distance: Single,
-    curvature: Single,
-    limit: Single,
-    warpness: Single,
-    weftness: Single,
+    sine: Float32,
+    distance: Float32,
+    curvature: Float32,
+    limit: Float32,
+    warpness: Float32,
+    weftness: Float32,
     node: npt.NDArray[np.int32],
 ) -> None:
     """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node."""

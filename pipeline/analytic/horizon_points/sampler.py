@@ -8,7 +8,6 @@ density is then constant to 0.2 %. The random numbers are 23 bits of an integer 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
 from pipeline.analytic.horizon_points.shading import (
@@ -34,7 +33,7 @@ from pipeline.analytic.horizon_points.shading import (
     query_rows,
     shade_all,
 )  # fmt: skip
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import deviations
@@ -69,7 +68,7 @@ class HorizonSampler:
         model = cloth_side(fabric, TruthOptions())
         self.map = horizon_map(model.front, model.back, grid, azimuths)
 
-    def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> npt.NDArray[np.float32]:
+    def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> Float32:
         """Return the components from `count` points a query, (N, 4); queries are flat and lit from the front."""
         u, v, wi, wo = (
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
@@ -84,17 +83,17 @@ class HorizonSampler:
 @kernel
 def _sample(
     table: HorizonMap,
-    u: Single,
-    v: Single,
-    deviation_x: Single,
-    deviation_y: Single,
-    correlation: Single,
-    wi: Single,
-    wo: Single,
+    u: Float32,
+    v: Float32,
+    deviation_x: Float32,
+    deviation_y: Float32,
+    correlation: Float32,
+    wi: Float32,
+    wo: Float32,
     count: int,
     r2: bool,
     seed: np.uint64,
-) -> npt.NDArray[np.float32]:
+) -> Float32:
     rows = len(u)
     result = np.zeros((rows, 4), np.float32)
     at_once = max(1, LANES // count)
@@ -144,7 +143,7 @@ def _sample(
 
 @fast_kernel
 def _place(
-    out: Single,
+    out: Float32,
     first: int,
     count: int,
     centre: np.float32,
@@ -165,8 +164,8 @@ def _place(
 
 @fast_kernel
 def _place_obliquely(
-    out_x: Single,
-    out_y: Single,
+    out_x: Float32,
+    out_y: Float32,
     first: int,
     count: int,
     x: np.float32,

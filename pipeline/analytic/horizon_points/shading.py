@@ -13,13 +13,15 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
 from pipeline.analytic.soft_horizons import above, ramp
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
-from pipeline.compiled.float32 import absorbed
 from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
+from pipeline.truth.scattering.slab_float32 import reflection
 
 LANES: Final = 2048
 """Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""
@@ -37,14 +39,14 @@ I0, I1, O0, O1, NODE = range(5)
 INTEGERS: Final = 5
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-_TINY = np.float32(1e-20)
+_EDGE = np.float32(1e-6)  # least squared cosine across a yarn
 _INVERSE_PI = np.float32(1.0 / math.pi)
-_FOURTH_PI = np.float32(1.0 / (4.0 * math.pi))
+_EIGHTH_PI = np.float32(1.0 / (8.0 * math.pi))  # a quarter of the density's 1 / pi, the mean of two places
 
 
 @kernel
 def query_rows(
-    wi: Single, wo: Single, azimuths: int, nodes: int, values: Single, rows: npt.NDArray[np.int32], at: int
+    wi: Float32, wo: Float32, azimuths: int, nodes: int, values: Float32, rows: npt.NDArray[np.int32], at: int
 ) -> None:
     """Write what a query's lanes share to column `at`: nine numbers from IX on, and four rows from I0 on.
 
@@ -63,7 +65,12 @@ def query_rows(
 
 @kernel
 def fill_lanes(
-    lanes: Single, places: npt.NDArray[np.int32], values: Single, rows: npt.NDArray[np.int32], queries: int, count: int
+    lanes: Float32,
+    places: npt.NDArray[np.int32],
+    values: Float32,
+    rows: npt.NDArray[np.int32],
+    queries: int,
+    count: int,
 ) -> None:
     """Copy what queries share to their `count` lanes each.
 
@@ -85,14 +92,14 @@ def _repeat(source: npt.NDArray[Any], queries: int, count: int, out: npt.NDArray
 def uncover(
     count: int,
     places: npt.NDArray[np.int32],
-    horizon: Single,
-    iz: Single,
-    oz: Single,
-    turn_i: Single,
-    turn_o: Single,
-    steepness: Single,
-    seen: Single,
-    both: Single,
+    horizon: Float32,
+    iz: Float32,
+    oz: Float32,
+    turn_i: Float32,
+    turn_o: Float32,
+    steepness: Float32,
+    seen: Float32,
+    both: Float32,
 ) -> None:
     """Write how far points are seen, and seen and lit: ramps of a given steepness, in sines of elevation, from 0 to 1.
 
@@ -111,30 +118,30 @@ def uncover(
 @fast_kernel
 def shade(
     count: int,
-    weight: Single,
-    ix: Single,
-    iy: Single,
-    iz: Single,
-    ox: Single,
-    oy: Single,
-    oz: Single,
-    size: Single,
-    sine: Single,
-    distance: Single,
-    curvature: Single,
-    limit: Single,
-    warpness: Single,
-    weftness: Single,
-    seen: Single,
-    both: Single,
-    step_v: Single,
-    step_y: Single,
-    warp: Single,
-    weft: Single,
+    weight: Float32,
+    ix: Float32,
+    iy: Float32,
+    iz: Float32,
+    ox: Float32,
+    oy: Float32,
+    oz: Float32,
+    size: Float32,
+    sine: Float32,
+    distance: Float32,
+    curvature: Float32,
+    limit: Float32,
+    warpness: Float32,
+    weftness: Float32,
+    seen: Float32,
+    both: Float32,
+    step_v: Float32,
+    step_y: Float32,
+    warp: Float32,
+    weft: Float32,
     thickness: np.float32,
-    area: Single,
-    diffuse: Single,
-    specular: Single,
+    area: Float32,
+    diffuse: Float32,
+    specular: Float32,
 ) -> None:
     """Write each point's shares of area, diffuse and specular sums."""
     # Read once: a load under a condition would keep the loop from vector units.
@@ -147,61 +154,43 @@ def shade(
         yarns = warpness[k] + weftness[k]
         radius = radius_a if is_warp else radius_b
         alpha = alpha_a if is_warp else alpha_b
-        beta = beta_a if is_warp else beta_b
         blend = blend_a if is_warp else blend_b
-        sin_t = sin_a if is_warp else sin_b
-        cos_t = cos_a if is_warp else cos_b
+        fibre = Fibre(
+            sin_a if is_warp else sin_b, cos_a if is_warp else cos_b, beta_a if is_warp else beta_b
+        )  # fmt: skip
         # The yarn's frame.
         ix_k, iy_k, iz_k, ox_k, oy_k, oz_k = ix[k], iy[k], iz[k], ox[k], oy[k], oz[k]
         lix, liy = (ix_k if is_warp else iy_k), (iy_k if is_warp else -ix_k)
         lox, loy = (ox_k if is_warp else oy_k), (oy_k if is_warp else -ox_k)
         sv = sine[k]
-        cv = np.sqrt(max((_1 - sv) * (_1 + sv), np.float32(1e-6)))
-        su = distance[k] * curvature[k] / (_1 + radius * curvature[k] * cv)
-        su = min(max(su, -limit[k]), limit[k])
-        cu = np.sqrt((_1 - su) * (_1 + su))
-        nx, ny, nz = beta * sv, beta * su * cv, cu * cv
-        n = _1 / np.sqrt(nx * nx + ny * ny + nz * nz)
-        tx, ty, tz = -cv * sin_t, cu * cos_t + su * sv * sin_t, beta * (cu * sv * sin_t - su * cos_t)
-        t = _1 / np.sqrt(tx * tx + ty * ty + tz * tz)
-        cos_o = max((lox * nx + loy * ny + oz_k * nz) * n, _0)
-        cos_i = max((lix * nx + liy * ny + iz_k * nz) * n, _0)
-        along_i = (lix * tx + liy * ty + iz_k * tz) * t
-        along_o = (lox * tx + loy * ty + oz_k * tz) * t
+        cv = np.sqrt(max((_1 - sv) * (_1 + sv), _EDGE))
+        angles, inner = bend(sv, cv, radius, distance[k], curvature[k], limit[k])
+        nx, ny, nz = normal(angles, fibre.beta)
+        t = tangent(angles, fibre)
+        cos_o, cos_i = max(lox * nx + loy * ny + oz_k * nz, _0), max(lix * nx + liy * ny + iz_k * nz, _0)
+        along_i, along_o = lix * t.x + liy * t.y + iz_k * t.z, lox * t.x + loy * t.y + oz_k * t.z
         square = alpha * alpha
-        rest = _1 - square
-        h = along_i + along_o
-        sigma_i = np.sqrt(max(_1 - rest * along_i * along_i, square))
-        sigma_o = np.sqrt(max(_1 - rest * along_o * along_o, square))
-        crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
-        # Changes of the half vector's cosine along and across the yarn, over a box around the point, as two places.
-        inner = curvature[k] / (_1 + radius * curvature[k] * cv)
-        hx, hy, hz = lix + lox, liy + loy, iz_k + oz_k
-        uy, uz = cu * sv * sin_t - su * cos_t, -beta * (cu * cos_t + su * sv * sin_t)
-        vx, vy, vz = sv * sin_t, su * cv * sin_t, beta * cu * cv * sin_t
-        du = step_y[k] * inner / cu * t * (hy * uy + hz * uz - h * t * (uy * ty + uz * tz))
-        dv = step_v[k] * t * (hx * vx + hy * vy + hz * vz - h * t * (vx * tx + vy * ty + vz * tz))
-        spread = np.sqrt(du * du + dv * dv)
-        q0, q1 = (
-            square + rest * size[k] * (h - spread) * (h - spread),
-            square + rest * size[k] * (h + spread) * (h + spread),
-        )
-        q0, q1 = q0 * q0, q1 * q1
-        flakes = _HALF * (q0 + q1) / (q0 * q1 * crossed)
-        cosines = cos_i * cos_o
-        depth = thickness * crossed / (cosines + _TINY)
-        wide = weight[k] / (nz * n)
+        # The half vector's cosine changes along and across the yarn, over a box around the point: two places of it.
+        by_u, by_v = turning(lix + lox, liy + loy, iz_k + oz_k, t, angles, fibre)
+        du, dv = step_y[k] * inner / angles.cos_u * by_u, step_v[k] * by_v
+        h, apart = along_i + along_o, np.sqrt(du * du + dv * dv)
+        q0, q1 = spread(h - apart, size[k], square), spread(h + apart, size[k], square)
+        scattered = reflection(
+            _EIGHTH_PI * alpha * square * (q0 + q1), q0 * q1, sigma(along_i, square), sigma(along_o, square),
+            cos_i, cos_o, thickness,
+        )  # fmt: skip
+        wide = weight[k] / nz
         a = wide * cos_o
         bare = weight[k] * oz_k
         area[k] = (a if yarns > _0 else bare) * viewed
         lit = lit * yarns
         faces = _1 if cos_i > _0 else _0
         diffuse[k] = a * lit * faces * _INVERSE_PI * (blend * cos_i + (_1 - blend) * iz_k)
-        specular[k] = wide * lit * alpha * square * _FOURTH_PI * cosines * absorbed(depth) * flakes
+        specular[k] = wide * lit * scattered
 
 
 @kernel
-def shade_all(table: HorizonMap, count: int, lanes: Single, places: npt.NDArray[np.int32], shadows: bool) -> None:
+def shade_all(table: HorizonMap, count: int, lanes: Float32, places: npt.NDArray[np.int32], shadows: bool) -> None:
     """Write the shares of `count` located lanes; without `shadows` nothing hides them."""
     if shadows:
         uncover(
@@ -222,11 +211,11 @@ def shade_all(table: HorizonMap, count: int, lanes: Single, places: npt.NDArray[
 def gather(
     count: int,
     first: int,
-    area: Single,
-    diffuse: Single,
-    specular: Single,
-    warpness: Single,
-    weftness: Single,
+    area: Float32,
+    diffuse: Float32,
+    specular: Float32,
+    warpness: Float32,
+    weftness: Float32,
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
     """Return the sums of area and of the four components over `count` lanes from `first` on."""
     a, s_warp, s_weft, c_warp, c_weft = _0, _0, _0, _0, _0
@@ -243,7 +232,7 @@ def gather(
 
 
 @fast_kernel
-def plain_sum(values: Single, count: int) -> np.float32:
+def plain_sum(values: Float32, count: int) -> np.float32:
     """Return the sum of the first `count` values."""
     total = _0
     for k in range(count):

@@ -20,9 +20,9 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.importance.point import flake_scatter_pdf, sample_flake_scatter
+from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.footprint.place import place_pair
@@ -36,8 +36,6 @@ BROAD: Final = 0.2
 """Share of a family's lobes that its broad one has."""
 
 _LEAST: Final = 0.02  # share of each cosine at least: no light is without a sample
-
-Floats = npt.NDArray[np.float64]
 
 
 class Lobes(NamedTuple):
@@ -55,15 +53,15 @@ class Lobes(NamedTuple):
         Probability of the cosine on the viewer's side and of that on the other.
     """
 
-    tangent: Floats
-    alpha: Floats
-    share: Floats
-    cosine: Floats
+    tangent: Float64
+    alpha: Float64
+    share: Float64
+    cosine: Float64
 
 
 @kernel
 def find_lobes(
-    model: ClothSide, columns: Columns, count: int, widening: float, specular: Floats, diffuse: Floats, through: Floats
+    model: ClothSide, columns: Columns, count: int, widening: float, specular: Float64, diffuse: Float64, through: Float64
 ) -> Lobes:
     """Return the mixtures of queries, whose wi does not matter, from `count` points each.
 
@@ -108,7 +106,7 @@ def find_lobes(
 
 
 @kernel
-def _widen(tangent: Floats, alpha: Floats, share: Floats, families: npt.NDArray[np.int64], widening: float) -> None:
+def _widen(tangent: Float64, alpha: Float64, share: Float64, families: Index, widening: float) -> None:
     """Widen the roughness of each family's lobes by how much its tangents differ, and add its broad lobe."""
     count = len(share) - 2
     for family in range(2):
@@ -134,7 +132,7 @@ def _widen(tangent: Floats, alpha: Floats, share: Floats, families: npt.NDArray[
 
 
 @kernel
-def draw(lobes: Lobes, wo: Floats, random: Floats) -> Floats:
+def draw(lobes: Lobes, wo: Float64, random: Float64) -> Float64:
     """Return a unit wi for each query, (N, 3), from three numbers in [0, 1), (N, 3)."""
     found = np.zeros((len(wo), 3))
     for row in range(len(wo)):
@@ -158,7 +156,7 @@ def draw(lobes: Lobes, wo: Floats, random: Floats) -> Floats:
 
 
 @kernel
-def densities(lobes: Lobes, wi: Floats, wo: Floats) -> Floats:
+def densities(lobes: Lobes, wi: Float64, wo: Float64) -> Float64:
     """Return the density with which `draw` finds each unit wi, (N,), in 1/sr over the whole sphere."""
     found = np.zeros(len(wo))
     for row in range(len(wo)):

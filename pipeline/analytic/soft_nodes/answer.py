@@ -27,7 +27,7 @@ from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, LANES, X_HIGH, X_L
 from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_gaps, shade_placed
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_axis
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
@@ -50,14 +50,14 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 @kernel
 def sum_queries(
     table: Table,
-    u: Single,
-    v: Single,
-    deviation_x: Single,
-    deviation_y: Single,
-    correlation: Single,
-    wi: Single,
-    wo: Single,
-) -> tuple[Single, Single]:
+    u: Float32,
+    v: Float32,
+    deviation_x: Float32,
+    deviation_y: Float32,
+    correlation: Float32,
+    wi: Float32,
+    wo: Float32,
+) -> tuple[Float32, Float32]:
     """Return the sums of N queries, light and viewer in front.
 
     Parameters

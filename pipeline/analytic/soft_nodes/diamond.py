@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic.gauss_rules import Double
+from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import fast_kernel
 
 AZIMUTHS: Final = 32
@@ -29,7 +29,7 @@ def around(x: np.float32, y: np.float32) -> tuple[int, int, np.float32]:
     return low, (low + 1 if low + 1 < AZIMUTHS else 0), t - np.float32(low)
 
 
-def from_even(values: Double) -> Double:
+def from_even(values: Float64) -> Float64:
     """Return values known for azimuths even in the angle from +x, (rows, N), at the AZIMUTHS of the diamond angle."""
     count = len(values)
     t = 4.0 * np.arange(AZIMUTHS) / AZIMUTHS

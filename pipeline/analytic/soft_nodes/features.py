@@ -40,7 +40,7 @@ from pipeline.analytic.soft_nodes.shade import (
     SPECULAR,
     SPECULAR_DOUBT,
 )
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
@@ -73,16 +73,16 @@ _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # 
 
 @fast_kernel
 def _assemble(
-    found: Single,
-    gaps: Single,
-    size: Single,
-    wi: Single,
-    wo: Single,
-    cloth: Single,
-    twists: Single,
-    features: Single,
-    components: Single,
-    bounds: Single,
+    found: Float32,
+    gaps: Float32,
+    size: Float32,
+    wi: Float32,
+    wo: Float32,
+    cloth: Float32,
+    twists: Float32,
+    features: Float32,
+    components: Float32,
+    bounds: Float32,
 ) -> None:
     """Turn sums into features (N, FEATURES), components (N, 4), and what these are without shadows (N, 4)."""
     for n in range(len(found)):
@@ -138,12 +138,12 @@ class Reading(NamedTuple):
         The same without shadows of the light.
     """
 
-    features: Single
-    components: Single
-    bounds: Single
+    features: Float32
+    components: Float32
+    bounds: Float32
 
 
-def cloth_features(table: Table) -> Single:
+def cloth_features(table: Table) -> Float32:
     """Return what is the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
     yarn = table.yarn.astype(np.float64)
     by_family = [

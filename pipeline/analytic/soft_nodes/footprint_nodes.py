@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_horizons import above, ramp
 from pipeline.analytic.soft_nodes.nodes import BOUND, CURVE, LANES, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import WARP
@@ -63,7 +63,7 @@ def _sine_cosine(v: np.float32) -> tuple[np.float32, np.float32]:
 
 @fast_kernel
 def place_nodes(
-    bounds: Single,
+    bounds: Float32,
     first_cell: int,
     size: int,
     radius: np.float32,
@@ -76,10 +76,10 @@ def place_nodes(
     x_high: np.float32,
     y_low: np.float32,
     y_high: np.float32,
-    nodes: Single,
+    nodes: Float32,
     cells: npt.NDArray[np.uint32],
     start: int,
-    line: Single,
+    line: Float32,
 ) -> int:
     """Place nodes of a footprint in a piece of yarn, and write them from `start` on.
 
@@ -150,7 +150,7 @@ def place_nodes(
 
 
 @kernel
-def fill_block(nodes: Single, cells: npt.NDArray[np.uint32], start: int) -> int:
+def fill_block(nodes: Float32, cells: npt.NDArray[np.uint32], start: int) -> int:
     """Fill the last block of lanes with nodes that weigh nothing; return the blocks."""
     blocks = (start + LANES - 1) // LANES
     for k in range(start, blocks * LANES):
@@ -163,7 +163,7 @@ def fill_block(nodes: Single, cells: npt.NDArray[np.uint32], start: int) -> int:
 
 @fast_kernel
 def gap_area(
-    bounds: Single,
+    bounds: Float32,
     grid: npt.NDArray[np.uint8],
     first_cell: int,
     size: int,

@@ -16,14 +16,13 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.gauss_rules import Double, Rule, gauss_rule, grid_edges, grid_middles, overlap
+from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
 from pipeline.analytic.soft_horizons import over_boxes
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
 from pipeline.analytic.soft_nodes.kinds import COLUMNS, Kind, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import tabulate_waves
-from pipeline.compiled.arrays import Float32 as Single
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
@@ -94,27 +93,27 @@ class Table(NamedTuple):
     """
 
     repeat: Index
-    yarn: Single
+    yarn: Float32
     thickness: np.float32
-    float_length: Single
+    float_length: Float32
     uniform: float
     waves_from: float
     starts: Index
-    nodes: Single
-    evenly: Single
-    mean: Single
-    sharpness: Single
+    nodes: Float32
+    evenly: Float32
+    mean: Float32
+    sharpness: Float32
     kinds: npt.NDArray[np.uint32]
     kind_starts: npt.NDArray[np.uint32]
     cell_kinds: npt.NDArray[np.uint32]
-    places: Single
-    weights: Single
+    places: Float32
+    weights: Float32
     waves: Index
-    wave_size: Single
-    wave_nodes: Single
+    wave_size: Float32
+    wave_nodes: Float32
     piece_starts: Index
     pieces: Index
-    bounds: Single
+    bounds: Float32
     grid: npt.NDArray[np.uint8]
 
     @property
@@ -173,7 +172,7 @@ def tabulate(fabric: Fabric) -> Table:
         for end, pick in kind.cells:
             cell_kinds[pick * ends + end].append(index)
 
-    def lanes_of(values: Double) -> Single:
+    def lanes_of(values: Float64) -> Float32:
         return np.ascontiguousarray(values.reshape(*values.shape[:-1], -1, LANES), np.float32)
 
     return Table(
@@ -221,7 +220,7 @@ def _bounds(piece: Piece) -> tuple[float, ...]:
     return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, STEEPEST))
 
 
-def _filled(rows: list[Double], edge: bool) -> Single:
+def _filled(rows: list[Float64], edge: bool) -> Float32:
     """Return rows of COLUMNS numbers, the last one repeated if `edge`, else 0."""
     found = np.zeros((len(rows), COLUMNS), np.float32)
     for index, row in enumerate(rows):
@@ -229,10 +228,10 @@ def _filled(rows: list[Double], edge: bool) -> Single:
     return found
 
 
-def _float_lengths(front: HeightField) -> Single:
+def _float_lengths(front: HeightField) -> Float32:
     found = []
     for family in (WARP, WEFT):
-        # Floats that never end count as long as the repeat.
+        # Float64 that never end count as long as the repeat.
         shown = np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], 0.5 * front.top.shape[family])
         found.append(2.0 * float(shown.mean()) if shown.size else 1.0)
     return np.array(found, np.float32)
@@ -254,7 +253,7 @@ def _horizon_grids(
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
 
 
-def _soft_horizons(kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]) -> tuple[Double, Double]:
+def _soft_horizons(kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]) -> tuple[Float64, Float64]:
     """Return mean and variance of the horizon over each node's box and all cells of a kind, (AZIMUTHS, nodes)."""
     piece, size = kind.piece, grid.shape[-1]
     of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))

@@ -17,12 +17,14 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
 from pipeline.analytic.soft_nodes.nodes import LANES, LEVELS
-from pipeline.compiled.arrays import Float32 as Single
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
-from pipeline.compiled.float32 import absorbed
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
+from pipeline.truth.scattering.slab_float32 import reflection
 
 SUMS: Final = 10
 """Sums of a family."""
@@ -44,7 +46,6 @@ Ten = tuple[
 ]  # fmt: skip
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
-_TINY = np.float32(1e-12)
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _LEVELS = np.float32(LEVELS)
@@ -105,7 +106,6 @@ def _node(
     lit: np.float32,
     weight: np.float32,
     square: np.float32,
-    rest: np.float32,
     scale: np.float32,
     thickness: np.float32,
     blend: np.float32,
@@ -121,36 +121,30 @@ def _node(
     wide = weight * inverse
     area = wide * cos_o
     diffuse = area * ((blend * cos_i + (_1 - blend) * d.iz) if facing_i > _0 else _0)
-    # The slab: cosines with the tangent are all that the flakes need.
-    ti, to = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
-    h = ti + to
-    e, f = along + across, along - across
-    h0, h1, h2, h3 = h - e, h - f, h + f, h + e
-    q0, q1 = square + rest * h0 * h0, square + rest * h1 * h1
-    q2, q3 = square + rest * h2 * h2, square + rest * h3 * h3
-    q0, q1, q2, q3 = q0 * q0, q1 * q1, q2 * q2, q3 * q3
+    along_i, along_o = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
+    h, e, f = along_i + along_o, along + across, along - across
+    q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
+    q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
     q01, q23 = q0 * q1, q2 * q3
-    sigma_i = np.sqrt(max(_1 - (_1 - square) * ti * ti, square))
-    sigma_o = np.sqrt(max(_1 - (_1 - square) * to * to, square))
-    crossed = sigma_i * cos_o + sigma_o * cos_i + _TINY
-    cosines = cos_i * cos_o
-    depth = thickness * crossed / (cosines + _TINY)
-    flakes = ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23 * crossed)
-    specular = wide * scale * flakes * cosines * absorbed(depth)
+    flakes = scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
+    # The product of all four may be as small as alpha^16: it is divided by before the cosines are.
+    specular = wide * reflection(
+        flakes, _1, sigma(along_i, square), sigma(along_o, square), cos_i, cos_o, thickness
+    )  # fmt: skip
     return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
 
 
 @fast_kernel
 def shade_fixed(
-    nodes: Single,
-    weight: Single,
-    low_i: Single,
-    high_i: Single,
-    sharpness_i: Single,
+    nodes: Float32,
+    weight: Float32,
+    low_i: Float32,
+    high_i: Float32,
+    sharpness_i: Float32,
     turn_i: np.float32,
-    low_o: Single,
-    high_o: Single,
-    sharpness_o: Single,
+    low_o: Float32,
+    high_o: Float32,
+    sharpness_o: Float32,
     turn_o: np.float32,
     d: Directions,
     alpha: np.float32,
@@ -162,7 +156,6 @@ def shade_fixed(
     `low`, `high`: mean horizons at the azimuths around a direction; `turn`: where between them it lies.
     """
     square = alpha * alpha
-    rest = (_1 - square) * d.size
     scale = _FLAKES * alpha * square
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
@@ -176,7 +169,7 @@ def shade_fixed(
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
             node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
                 d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
-                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, rest, scale, thickness, blend,
+                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, scale, thickness, blend,
             )  # fmt: skip
             doubt = lit * (_1 - lit) + seen * (_1 - seen)
             a += node_a
@@ -194,7 +187,7 @@ def shade_fixed(
 
 @fast_kernel
 def shade_placed(
-    nodes: Single,
+    nodes: Float32,
     cells: npt.NDArray[np.uint32],
     grid: npt.NDArray[np.uint8],
     low_i: np.uint32,
@@ -205,17 +198,16 @@ def shade_placed(
     turn_o: np.float32,
     sharpness: np.float32,
     d: Directions,
-    yarn: Single,
+    yarn: Float32,
     thickness: np.float32,
 ) -> Ten:
     """Return the sums over nodes placed by the query.
 
     `cells` is each node's cell of its grid at the first azimuth; `low`, `high`: what leads to those around a direction.
     """
-    radius, sin_t, cos_t, beta = yarn[RADIUS], yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA]
+    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     alpha, blend = yarn[ALPHA], yarn[BLEND]
     square = alpha * alpha
-    rest = (_1 - square) * d.size
     scale = _FLAKES * alpha * square
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
@@ -228,26 +220,17 @@ def shade_placed(
             seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
             lit = ramp(over_i)
 
-            # Normal and tangent, as in heightfield.surface_at; the tangent's change, as in `surface`.
-            sv, cv, turn = nodes[b, SIN, k], nodes[b, COS, k], nodes[b, TURN, k]
-            inner = turn / (_1 + radius * turn * cv)
-            su = min(max(nodes[b, ALONG, k] * inner, -nodes[b, LIMIT, k]), nodes[b, LIMIT, k])
-            cu = np.sqrt((_1 - su) * (_1 + su))
-            nx, ny, nz = beta * sv, beta * su * cv, cu * cv
-            n = _1 / np.sqrt(nx * nx + ny * ny + nz * nz)
-            tx, ty, tz = -cv * sin_t, cu * cos_t + su * sv * sin_t, beta * (cu * sv * sin_t - su * cos_t)
-            m = _1 / np.sqrt(tx * tx + ty * ty + tz * tz)
-            tx, ty, tz = tx * m, ty * m, tz * m
-            step_u = nodes[b, HALF_ALONG, k] * inner / cu * _GAUSS * m
-            step_v = nodes[b, HALF_V, k] * _GAUSS * m
-            uy, uz = cu * sv * sin_t - su * cos_t, -beta * (cu * cos_t + su * sv * sin_t)
-            vx, vy, vz = sv * sin_t, su * cv * sin_t, beta * cu * cv * sin_t
-            h = hx * tx + hy * ty + hz * tz
-            along = step_u * (hy * uy + hz * uz - h * (uy * ty + uz * tz))
-            across = step_v * (hx * vx + hy * vy + hz * vz - h * (vx * tx + vy * ty + vz * tz))
+            angles, inner = bend(
+                nodes[b, SIN, k], nodes[b, COS, k], radius, nodes[b, ALONG, k], nodes[b, TURN, k], nodes[b, LIMIT, k]
+            )
+            nx, ny, nz = normal(angles, fibre.beta)
+            t = tangent(angles, fibre)
+            by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
+            along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
+            across = nodes[b, HALF_V, k] * _GAUSS * by_v
             node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
-                d, nx * n, ny * n, nz * n, _1 / (nz * n), tx, ty, tz, along, across, seen, lit, nodes[b, WEIGHT, k],
-                square, rest, scale, thickness, blend,
+                d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[b, WEIGHT, k],
+                square, scale, thickness, blend,
             )  # fmt: skip
             doubt = lit * (_1 - lit) + seen * (_1 - seen)
             a += node_a
@@ -265,7 +248,7 @@ def shade_placed(
 
 @fast_kernel
 def shade_gaps(
-    weight: Single, low_o: Single, high_o: Single, sharpness_o: Single, turn_o: np.float32, oz: np.float32
+    weight: Float32, low_o: Float32, high_o: Float32, sharpness_o: Float32, turn_o: np.float32, oz: np.float32
 ) -> np.float32:
     """Return the area seen through gaps, of fixed nodes."""
     area = _0

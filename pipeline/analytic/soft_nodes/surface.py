@@ -10,9 +10,11 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from pipeline.analytic.gauss_rules import Double, Rule
+from pipeline.analytic.gauss_rules import Rule
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.compiled.arrays import Float64
+from pipeline.compiled.decorators import fast_kernel
 from pipeline.truth.geometry.heightfield import BETA, COS_TWIST, GAP, SIN_TWIST, WARP
 from pipeline.truth.geometry.pieces import Piece
 
@@ -22,11 +24,14 @@ ROWS: Final = 13
 LEVEL: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
 """The rows of a gap, and of what fills a block of lanes."""
 
+_AXES = np.eye(3)
+_GAUSS = 1.0 / math.sqrt(3.0)
+
 STEEPEST: Final = 0.999
 """Largest sine of an inclination."""
 
 
-def piece_rows(yarn: npt.NDArray[np.float64], piece: Piece, across: Rule, along: Rule) -> Double:
+def piece_rows(yarn: Float64, piece: Piece, across: Rule, along: Rule) -> Float64:
     """Return what nodes know of the surface, (ROWS, nodes); nodes across the yarn follow each other.
 
     Parameters
@@ -42,31 +47,44 @@ def piece_rows(yarn: npt.NDArray[np.float64], piece: Piece, across: Rule, along:
     if piece.family == GAP:
         return np.tile(LEVEL[:, None], lines * columns)
     own = yarn[piece.family]
-    radius, sin_t, cos_t, beta = piece.radius, own[SIN_TWIST], own[COS_TWIST], own[BETA]
+    radius = piece.radius
     turned = 1.0 if piece.family == WARP else -1.0  # y of the yarn's frame against the cell's axis
 
-    # Sines and cosines of the angles across (v) and along (u).
-    sv = np.clip((np.tile(across.places, lines) - 0.5) / radius, -1.0, 1.0)
-    cv = np.sqrt((1.0 - sv) * (1.0 + sv))
-    place = turned * (np.repeat(along.places, columns) - 0.5 + piece.offset)
-    curve = piece.sign * piece.curve / (1.0 + piece.sign * radius * piece.curve * cv)
+    # Sine of the angle across, place along and half box of each node.
+    sines = np.clip((np.tile(across.places, lines) - 0.5) / radius, -1.0, 1.0)
+    places = turned * (np.repeat(along.places, columns) - 0.5 + piece.offset)
+    half_across = 0.5 * np.tile(np.diff(across.borders), lines)
+    half_along = 0.5 * np.repeat(np.diff(along.borders), columns)
     bound = min(piece.steepest, STEEPEST)
-    su = np.clip(place * curve, -bound, bound)
-    cu = np.sqrt((1.0 - su) * (1.0 + su))
+    fibre = Fibre(float(own[SIN_TWIST]), float(own[COS_TWIST]), float(own[BETA]))
+    return _rows(
+        sines, places, half_across, half_along, float(radius), float(piece.sign * piece.curve), float(bound), fibre
+    )
 
-    normal = np.stack([beta * sv, beta * su * cv, cu * cv])
-    normal /= np.linalg.norm(normal, axis=0)
-    tangent = np.stack([-cv * sin_t, cu * cos_t + su * sv * sin_t, beta * (cu * sv * sin_t - su * cos_t)])
-    size = np.linalg.norm(tangent, axis=0)
-    tangent /= size
 
-    # Derivatives of the tangent by u and v, without what only stretches it, over half a box.
-    by_u = np.stack([np.zeros_like(su), cu * sv * sin_t - su * cos_t, -beta * (cu * cos_t + su * sv * sin_t)]) / size
-    by_v = np.stack([sv * sin_t, su * cv * sin_t, beta * cu * cv * sin_t]) / size
-    step_u = 0.5 * np.repeat(np.diff(along.borders), columns) * curve / cu
-    step_v = 0.5 * np.tile(np.diff(across.borders), lines) / (radius * np.maximum(cv, 1e-9))
-    changes = []
-    for derivative, step in ((by_u, step_u), (by_v, step_v)):
-        turning = derivative - tangent * (tangent * derivative).sum(axis=0)
-        changes.append(turning * (step / math.sqrt(3.0)))
-    return np.concatenate([normal, 1.0 / normal[2:3], tangent, *changes])
+@fast_kernel
+def _rows(
+    sines: Float64,
+    places: Float64,
+    half_across: Float64,
+    half_along: Float64,
+    radius: float,
+    curvature: float,
+    limit: float,
+    fibre: Fibre,
+) -> Float64:
+    """Return the rows of all nodes of a piece of yarn, (ROWS, nodes)."""
+    found = np.zeros((ROWS, len(sines)))
+    for k in range(len(sines)):
+        cos_v = math.sqrt((1.0 - sines[k]) * (1.0 + sines[k]))
+        angles, inner = bend(sines[k], cos_v, radius, places[k], curvature, limit)
+        found[0, k], found[1, k], found[2, k] = normal(angles, fibre.beta)
+        found[3, k] = 1.0 / found[2, k]
+        t = tangent(angles, fibre)
+        found[4, k], found[5, k], found[6, k] = t.x, t.y, t.z
+        step_u = _GAUSS * half_along[k] * inner / angles.cos_u
+        step_v = _GAUSS * half_across[k] / (radius * max(cos_v, 1e-9))
+        for axis in range(3):
+            by_u, by_v = turning(_AXES[axis, 0], _AXES[axis, 1], _AXES[axis, 2], t, angles, fibre)
+            found[7 + axis, k], found[10 + axis, k] = step_u * by_u, step_v * by_v
+    return found

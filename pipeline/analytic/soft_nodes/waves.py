@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import Rule
 from pipeline.analytic.soft_nodes.kinds import Kind
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.geometry.heightfield import WEFT
 
 MOST_WAVES: Final = 24
@@ -44,9 +44,9 @@ class Waves(NamedTuple):
         Deviation from which on what is missing is faint.
     """
 
-    periods: npt.NDArray[np.int64]
-    size: npt.NDArray[np.float32]
-    nodes: npt.NDArray[np.float32]
+    periods: Index
+    size: Float32
+    nodes: Float32
     enough_from: float
 
 

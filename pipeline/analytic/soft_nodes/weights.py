@@ -15,8 +15,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.kinds import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import KIND_FAMILY, LANES, LINES, RULE_ACROSS, RULE_ALONG, START
 from pipeline.analytic.soft_nodes.waves import HIGHEST, faintest
-from pipeline.compiled.arrays import Float32 as Single
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import WEFT
@@ -36,9 +35,9 @@ _FAINTEST = np.float32(faintest(1.0) ** 2)
 @fast_kernel
 def wave_weights(
     waves: Index,
-    size: Single,
-    nodes: Single,
-    evenly: Single,
+    size: Float32,
+    nodes: Float32,
+    evenly: Float32,
     x: np.float32,
     y: np.float32,
     deviation_x: np.float32,
@@ -47,8 +46,8 @@ def wave_weights(
     narrowest: np.float32,
     ends: np.float32,
     picks: np.float32,
-    turns: Single,
-    weight: Single,
+    turns: Float32,
+    weight: Float32,
 ) -> None:
     """Write the weights of all nodes as a sum of the waves that are not faint; `turns` is scratch."""
     last = _FAINTEST / (narrowest * narrowest)
@@ -86,13 +85,13 @@ def product_weights(
     kind_starts: npt.NDArray[np.uint32],
     cell_kinds: npt.NDArray[np.uint32],
     kinds: npt.NDArray[np.uint32],
-    density_x: Single,
-    density_y: Single,
+    density_x: Float32,
+    density_y: Float32,
     columns: npt.NDArray[np.uint32],
     rows: npt.NDArray[np.uint32],
     ends: int,
     share: np.float32,
-    weight: Single,
+    weight: Float32,
 ) -> None:
     """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a kind's touched cells."""
     for pick in rows:

@@ -1,7 +1,7 @@
-"""The flat loops over nodes in single precision that vector units run: visibility, the two slabs, borders.
+"""The flat loops over nodes in single precision: visibility, reflection, transmission, borders of shadows.
 
-The formulas are those of `patch`, `microflake` and `slab`; the half vector's products with the tangent are sums of
-those of wi and wo. Every array holds one number a node of a piece.
+The formulas are those of `scattering.point` and `scattering.microflake`; the layer is `scattering.slab_float32`. Every
+array holds one number a node of a piece. The loops have no branch and no call left, so that vector units run them.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import fast_kernel
-from pipeline.compiled.float32 import absorbed, remaining
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 SMOOTH: Final = np.float32(0.0005)
 """Squared error of a node's share by what curves within it, relative to its square."""
@@ -23,8 +23,6 @@ _EDGE_JUMP: Final = np.float32(0.1)
 _0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 _JUMP = np.float32(3.0)
 _TINY = np.float32(1e-30)
-_ALIKE = np.float32(1e-8)  # no light is lost in products with it, as it is with 1e-30
-_GRAZING = np.float32(1e-6)
 
 
 @fast_kernel
@@ -131,6 +129,21 @@ def _crossing(
     return (share if crossed else _0), (doubt if crossed else _0)
 
 
+@inlined_fast_kernel
+def _products(
+    wx: np.float32, wy: np.float32, wz: np.float32, tx: np.float32, ty: np.float32, tz: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Return w x t and w.t."""
+    return wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx, wx * tx + wy * ty + wz * tz
+
+
+@inlined_fast_kernel
+def _sigma(x: np.float32, y: np.float32, z: np.float32, along: np.float32, square: np.float32) -> np.float32:
+    """Return the projected area of the flakes from w x t, w.t and alpha^2."""
+    area: np.float32 = np.sqrt(x * x + y * y + z * z + square * along * along)
+    return area
+
+
 @fast_kernel
 def reflected(
     nx: Float32,
@@ -161,21 +174,14 @@ def reflected(
     for k in range(len(lit)):
         cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
         cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
-        # Cross products with the tangent; the half vector's are sums of the two.
-        ax, ay, az = iy * tz[k] - iz * ty[k], iz * tx[k] - ix * tz[k], ix * ty[k] - iy * tx[k]
-        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
-        along_i = ix * tx[k] + iy * ty[k] + iz * tz[k]
-        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
-        sigma_i = np.sqrt(ax * ax + ay * ay + az * az + square * along_i * along_i)
-        sigma_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o)
+        # The half vector's products with the tangent are sums of those of wi and wo.
+        ax, ay, az, along_i = _products(ix, iy, iz, tx[k], ty[k], tz[k])
+        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
         vx, vy, vz, along = ax + bx, ay + by, az + bz, along_i + along_o
         q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
-        crossed = sigma_i * cos_o + sigma_o * cos_i
-        # One division serves 1 / (cos_i cos_o) and 1 / (q^2 crossed).
-        cosines, spread = cos_i * cos_o, q * q * crossed
-        both = _1 / (cosines * spread + _TINY)
-        depth = thickness * crossed * spread * both
-        value = lit[k] * scale * inverse[k] * cosines * cosines * both * absorbed(depth)
+        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, square), _sigma(bx, by, bz, along_o, square)
+        flakes = lit[k] * scale * inverse[k]
+        value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, thickness)
         speculars[k] += value
         total += value
     return total
@@ -208,18 +214,13 @@ def transmitted(
     for k in range(len(lit)):
         cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
         cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
-        ax, ay, az = iy * tz[k] - iz * ty[k], iz * tx[k] - ix * tz[k], ix * ty[k] - iy * tx[k]
-        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
-        along_i = ix * tx[k] + iy * ty[k] + iz * tz[k]
-        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
-        lambda_i = np.sqrt(ax * ax + ay * ay + az * az + square * along_i * along_i) / max(cos_i, _GRAZING)
-        lambda_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o) / max(cos_o, _GRAZING)
+        ax, ay, az, along_i = _products(ix, iy, iz, tx[k], ty[k], tz[k])
+        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
         vx, vy, vz, along = bx - ax, by - ay, bz - az, along_o - along_i
         q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
-        apart = max(thickness * abs(lambda_i - lambda_o), _ALIKE)
-        through = remaining(thickness * min(lambda_i, lambda_o)) * absorbed(apart) / apart
-        value = lit[k] * scale * inverse[k] * thickness * through / (q * q + _TINY)
-        value = value if cos_i > _0 and cos_o > _0 else _0
+        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, square), _sigma(bx, by, bz, along_o, square)
+        flakes = lit[k] * scale * inverse[k]
+        value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, thickness)
         speculars[k] += value
         total += value
     return total
@@ -243,9 +244,7 @@ def crossing(
     """Return the sum of what crosses the layer unscattered, exp(-T Lambda), from each node's share of the area."""
     total = _0
     for k in range(len(areas)):
-        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _GRAZING)
-        bx, by, bz = oy * tz[k] - oz * ty[k], oz * tx[k] - ox * tz[k], ox * ty[k] - oy * tx[k]
-        along_o = ox * tx[k] + oy * ty[k] + oz * tz[k]
-        sigma_o = np.sqrt(bx * bx + by * by + bz * bz + square * along_o * along_o)
-        total += areas[k] * remaining(thickness * sigma_o / cos_o)
+        cos_o = ox * nx[k] + oy * ny[k] + oz * nz[k]
+        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
+        total += areas[k] * unscattered(_sigma(bx, by, bz, along_o, square), cos_o, thickness)
     return total
