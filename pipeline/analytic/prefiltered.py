@@ -73,7 +73,7 @@ class PrefilteredMaps:
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     texels_per_yarn : int
         Texels of the finest level along a yarn spacing, at least.
     """

@@ -44,7 +44,7 @@ from pipeline.analytic.horizon_points.shading import (
     WEIGHT,
     X,
     Y,
-    fill_lanes,
+    fill_points,
     gather,
     plain_sum,
     query_rows,
@@ -66,17 +66,17 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _POINTS = COARSE_LINE.points
 
 
-class GaussQuadrature:
+class GaussNodesTable:
     """A fabric's nodes, tabulated once.
 
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     across, along : int
         Nodes across a yarn and along a cell.
     shadows, soft : bool
-        Whether anything hides anything, and whether softly.
+        Whether points hide one another, and whether by ramps instead of steps.
     grid, azimuths : int
         Resolution of the horizon map.
     """
@@ -130,7 +130,7 @@ def _answer(
     ends, picks = table.repeat[0], table.repeat[1]
     nodes = table.grid * table.grid
     flat = table.pieces.reshape(table.pieces.size)
-    wide, own_weight = fixed.lanes.copy(), np.zeros(count, np.float32)
+    wide, own_weight = fixed.points.copy(), np.zeros(count, np.float32)
     values, shared = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     kinds, most = fixed.positions.shape
     room = BANDS * fixed.own_positions.shape[1] ** 2
@@ -150,15 +150,15 @@ def _answer(
     mean, steepness, evenly = fixed.mean, fixed.steepness, fixed.evenly
     azimuths, sharpness = table.azimuths, np.float32(1.0 if soft else 1e9)
     for row in range(rows):
-        dx, dy, oblique = deviation_x[row], deviation_y[row], correlation[row]
+        dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
         # Narrow footprints that are not round count as round ones of the same area.
-        s = dx if dx == dy and oblique == _0 else np.sqrt(dx * dy * np.sqrt(_1 - oblique * oblique))
+        s = dx if dx == dy and rho == _0 else np.sqrt(dx * dy * np.sqrt(_1 - rho * rho))
         x = np.float32(u[row] - ends * np.floor(np.float64(u[row]) / ends))
         y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
         if s >= np.float32(NARROW):
             weight = own_weight
-            blur, line_x = np.sqrt(_1 - abs(oblique)), np.sqrt(abs(oblique)) * dx
-            line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+            blur, line_x = np.sqrt(_1 - abs(rho)), np.sqrt(abs(rho)) * dx
+            line_y = np.copysign(np.sqrt(abs(rho)) * dy, rho)
             # Of a footprint that is not round an axis may be narrower than the nodes are apart.
             blur_x, blur_y = max(blur * dx, finest), max(blur * dy, finest)
             even_x, even_y = blur_x >= np.float32(EVENLY * ends), blur_y >= np.float32(EVENLY * picks)
@@ -166,7 +166,7 @@ def _answer(
                 weight = evenly
             else:
                 weight[:] = _0
-                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                for point in range(line_points(rho, COARSE_LINE, line_places, line_shares)):
                     z, share = line_places[point], line_shares[point]
                     _densities(positions, weights, x + z * line_x, blur_x, even_x, of_x, touched_x, cells)
                     _densities(positions, weights, y + z * line_y, blur_y, even_y, of_y, touched_y, cells)
@@ -198,20 +198,20 @@ def _answer(
             total_weight = plain_sum(weight, count)
             area, a, b, c, d = gather(count, 0, areas, diffuse, specular, warpness, weftness)
         else:
-            lanes = narrow
-            total = place_nodes(table, fixed, x, y, s, along, line, lanes)
-            lanes[STEEPNESS, :total] = sharpness_of_points(s) if soft else np.float32(1e9)
+            points = narrow
+            total = place_nodes(table, fixed, x, y, s, along, line, points)
+            points[STEEPNESS, :total] = sharpness_of_points(s) if soft else np.float32(1e9)
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, 0)
-            fill_lanes(lanes, places, values, shared, 1, total)
+            fill_points(points, places, values, shared, 1, total)
             locate(
-                total, lanes[X], lanes[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top, flat,
-                table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], lanes[SINE], lanes[DISTANCE],
-                lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], places[NODE],
+                total, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
+                flat, table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE], points[DISTANCE],
+                points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
             )  # fmt: skip
-            shade_all(table, total, lanes, places, shadows)
-            total_weight = plain_sum(lanes[WEIGHT], total)
+            shade_all(table, total, points, places, shadows)
+            total_weight = plain_sum(points[WEIGHT], total)
             area, a, b, c, d = gather(
-                total, 0, lanes[AREA], lanes[DIFFUSE], lanes[SPECULAR], lanes[WARPNESS], lanes[WEFTNESS]
+                total, 0, points[AREA], points[DIFFUSE], points[SPECULAR], points[WARPNESS], points[WEFTNESS]
             )
         if area > np.float32(HIDDEN_SHARE) * wo[row, 2] * total_weight:
             inverse = _1 / area

@@ -35,7 +35,7 @@ def place_nodes(
     s: np.float32,
     along: int,
     line: Float32,
-    lanes: Float32,
+    points: Float32,
 ) -> int:
     """Place nodes in what a narrow footprint covers of every piece; return how many."""
     ends, picks = table.repeat[0], table.repeat[1]
@@ -70,19 +70,19 @@ def place_nodes(
                         family = WEFT
                     nx = across if family == WARP else along
                     ny = across if family == WEFT else along
-                    if total + nx * ny > lanes.shape[1]:
+                    if total + nx * ny > points.shape[1]:
                         return total
                     _axis(fixed, x - low_end, s, x0, x1, warp_radius, family == WARP, nx, line[0], line[1])
                     _axis(fixed, y - low_pick, s, y0, y1, weft_radius, family == WEFT, ny, line[2], line[3])
                     half_x, half_y = _HALF * (x1 - x0), _HALF * (y1 - y0)
                     for j in range(ny):
                         for i in range(nx):
-                            lanes[X, total] = line[0, i] + np.float32(end)
-                            lanes[Y, total] = line[2, j] + np.float32(pick)
-                            lanes[WEIGHT, total] = line[1, i] * line[3, j]
+                            points[X, total] = line[0, i] + np.float32(end)
+                            points[Y, total] = line[2, j] + np.float32(pick)
+                            points[WEIGHT, total] = line[1, i] * line[3, j]
                             step_x, step_y = half_x * _THIRD / np.float32(nx), half_y * _THIRD / np.float32(ny)
-                            lanes[STEP_V, total] = step_y / weft_radius if family == WEFT else step_x / warp_radius
-                            lanes[STEP_Y, total] = step_x if family == WEFT else step_y
+                            points[STEP_V, total] = step_y / weft_radius if family == WEFT else step_x / warp_radius
+                            points[STEP_Y, total] = step_x if family == WEFT else step_y
                             total += 1
     return total
 

@@ -41,7 +41,7 @@ class GaussNodes(NamedTuple):
 
     Attributes
     ----------
-    lanes : float32 (ROWS, N)
+    points : float32 (ROWS, N)
         What `locate` finds at the nodes, and half the extents of their boxes; other rows are the query's.
     mean, steepness : float32 (azimuths, N)
         Mean sine of the horizon's elevation over the node's box, and the ramp's steepness.
@@ -57,7 +57,7 @@ class GaussNodes(NamedTuple):
         The rule on [-1, 1], across and along.
     """
 
-    lanes: Float32
+    points: Float32
     mean: Float32
     steepness: Float32
     evenly: Float32
@@ -95,18 +95,18 @@ def gauss_nodes(field: HeightField, table: HorizonMap, across: int, along: int) 
     xs, ys, steps_v, steps_y, evenly, mean, spread = (
         np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)
     )
-    lanes, places = np.zeros((ROWS, first), np.float32), np.zeros((INTEGERS, first), np.int32)
-    lanes[X], lanes[Y] = xs, ys
+    points, places = np.zeros((ROWS, first), np.float32), np.zeros((INTEGERS, first), np.int32)
+    points[X], points[Y] = xs, ys
     locate(
-        first, lanes[X], lanes[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
-        table.pieces.ravel(), table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], lanes[SINE],
-        lanes[DISTANCE], lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], places[NODE],
+        first, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
+        table.pieces.ravel(), table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
+        points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
     )  # fmt: skip
-    lanes[STEP_V], lanes[STEP_Y] = steps_v, steps_y
+    points[STEP_V], points[STEP_Y] = steps_v, steps_y
     own = [np.polynomial.legendre.leggauss(count) for count in (across, along)]
     most = max(across, along)
     return GaussNodes(
-        lanes=lanes,
+        points=points,
         mean=np.ascontiguousarray(mean, np.float32),
         steepness=np.ascontiguousarray(1.0 / (math.sqrt(12.0) * np.maximum(spread, _LEAST)), np.float32),
         evenly=evenly.astype(np.float32),

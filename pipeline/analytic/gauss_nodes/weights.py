@@ -1,7 +1,7 @@
 """Which share of a wide footprint falls on each fixed node.
 
 The weight of a node is the Gaussian there, summed over all cells alike and over all images of the repeat: products of
-one sum an axis, or a mixture of these where a footprint lies at an angle (oblique).
+one sum an axis, or a mixture of these for a rotated footprint (pipeline.truth.footprint.mixture).
 """
 
 from __future__ import annotations

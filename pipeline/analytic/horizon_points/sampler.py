@@ -1,4 +1,4 @@
-"""Point sampling as fast as one core allows: shadows from a horizon map, single precision, points as lanes.
+"""Point sampling in single precision, with shadows from a horizon map.
 
 Points are independent random ones or the R2 sequence with one random shift a query [Roberts2018R2]. An axis of the
 footprint narrower than `EVENLY` repeats is drawn from the Gaussian; wider, it is taken evenly over the repeat, whose
@@ -12,11 +12,11 @@ import numpy as np
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
 from pipeline.analytic.horizon_points.shading import (
     AREA,
+    BATCH,
     CURVATURE,
     DIFFUSE,
     DISTANCE,
     INTEGERS,
-    LANES,
     LIMIT,
     NODE,
     ROWS,
@@ -28,7 +28,7 @@ from pipeline.analytic.horizon_points.shading import (
     WEIGHT,
     X,
     Y,
-    fill_lanes,
+    fill_points,
     gather,
     query_rows,
     shade_all,
@@ -59,7 +59,7 @@ class HorizonSampler:
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     grid, azimuths : int
         Nodes of the map a piece of yarn and side, and directions.
     """
@@ -96,15 +96,15 @@ def _sample(
 ) -> Float32:
     rows = len(u)
     result = np.zeros((rows, 4), np.float32)
-    at_once = max(1, LANES // count)
-    lanes, places = np.zeros((ROWS, at_once * count), np.float32), np.zeros((INTEGERS, at_once * count), np.int32)
-    lanes[WEIGHT], lanes[STEEPNESS] = _1, _STEP
+    at_once = max(1, BATCH // count)
+    points, places = np.zeros((ROWS, at_once * count), np.float32), np.zeros((INTEGERS, at_once * count), np.int32)
+    points[WEIGHT], points[STEEPNESS] = _1, _STEP
     ends, picks = table.repeat[0], table.repeat[1]
     nodes = table.grid * table.grid
     flat = table.pieces.reshape(table.pieces.size)
     values, shared = np.zeros((9, at_once), np.float32), np.zeros((4, at_once), np.int32)
-    at_x, at_y, area, diffuse, specular = lanes[X], lanes[Y], lanes[AREA], lanes[DIFFUSE], lanes[SPECULAR]
-    warpness, weftness, azimuths = lanes[WARPNESS], lanes[WEFTNESS], table.azimuths
+    at_x, at_y, area, diffuse, specular = points[X], points[Y], points[AREA], points[DIFFUSE], points[SPECULAR]
+    warpness, weftness, azimuths = points[WARPNESS], points[WEFTNESS], table.azimuths
     for begin in range(0, rows, at_once):
         end = min(begin + at_once, rows)
         for row in range(begin, end):
@@ -113,23 +113,23 @@ def _sample(
             x = np.float32(u[row] - ends * np.floor(np.float64(u[row]) / ends))
             y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
             seeds = np.uint32(key & _MASK), np.uint32(key >> np.uint64(32))
-            dx, dy, oblique = deviation_x[row], deviation_y[row], correlation[row]
-            if oblique == _0:
+            dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
+            if rho == _0:
                 _place(at_x, first, count, x, dx, np.float32(ends), seeds[0], _R2_FIRST, r2)
                 _place(at_y, first, count, y, dy, np.float32(picks), seeds[1], _R2_SECOND, r2)
             else:
-                _place_obliquely(
-                    at_x, at_y, first, count, x, y, dx, dy, oblique, np.float32(ends), np.float32(picks), seeds, r2
+                _place_rotated(
+                    at_x, at_y, first, count, x, y, dx, dy, rho, np.float32(ends), np.float32(picks), seeds, r2
                 )
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, row - begin)
-        fill_lanes(lanes, places, values, shared, end - begin, count)
+        fill_points(points, places, values, shared, end - begin, count)
         total = (end - begin) * count
         locate(
-            total, lanes[X], lanes[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top, flat,
-            table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], lanes[SINE], lanes[DISTANCE],
-            lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], places[NODE],
+            total, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top, flat,
+            table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE], points[DISTANCE],
+            points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
         )  # fmt: skip
-        shade_all(table, total, lanes, places, True)
+        shade_all(table, total, points, places, True)
         for row in range(begin, end):
             a, s_warp, s_weft, c_warp, c_weft = gather(
                 count, (row - begin) * count, area, diffuse, specular, warpness, weftness
@@ -163,7 +163,7 @@ def _place(
 
 
 @fast_kernel
-def _place_obliquely(
+def _place_rotated(
     out_x: Float32,
     out_y: Float32,
     first: int,

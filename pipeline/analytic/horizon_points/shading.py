@@ -1,8 +1,8 @@
-"""Shading of many points at once, in single precision and without branches: surface, horizons, both slabs.
+"""Shading of many points at once, in single precision and without branches.
 
-A point is a lane: all loops are flat, over as many lanes as whole queries fill, so that two points a query and two
-hundred cost the same each. The formulas are those of heightfield, patch, microflake and slab; the flakes need cosines
-with the tangent only, since |w x t|^2 = 1 - (w.t)^2.
+All loops are flat and run over the points of whole queries, so that a point costs the same whether a query has two of
+them or two hundred. The formulas are those of pipeline.truth.scattering.point; surface, flakes and layer are those of
+torus_frame, flakes_float32 and slab_float32.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
 from pipeline.truth.scattering.slab_float32 import reflection
 
-LANES: Final = 2048
+BATCH: Final = 2048
 """Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""
 
 ROWS: Final = 26
 """Rows of the scratch that points are passed in; named below."""
 
-# Written by who places the points: position in the repeat and weight; directions of the query, squared half vector's
-# inverse, where between two azimuths they lie. Then what `locate` finds, and the shares that `shade` writes.
+# Inputs: position in the repeat and weight; directions of the query, 1 / |wi + wo|^2, where between two azimuths they
+# lie. Then the results of `locate`, and the shares that `shade` writes.
 (X, Y, WEIGHT, IX, IY, IZ, OX, OY, OZ, SIZE, TURN_I, TURN_O, SINE, DISTANCE, CURVATURE, LIMIT, WARPNESS, WEFTNESS,
  SEEN, BOTH, STEP_V, STEP_Y, STEEPNESS, AREA, DIFFUSE, SPECULAR) = range(ROWS)  # fmt: skip
 
@@ -48,7 +48,7 @@ _EIGHTH_PI = np.float32(1.0 / (8.0 * math.pi))  # a quarter of the density's 1 /
 def query_rows(
     wi: Float32, wo: Float32, azimuths: int, nodes: int, values: Float32, rows: npt.NDArray[np.int32], at: int
 ) -> None:
-    """Write what a query's lanes share to column `at`: nine numbers from IX on, and four rows from I0 on.
+    """Write the values that all points of a query share to column `at`: nine from IX on, and four from I0 on.
 
     `nodes` is the number of nodes a block.
     """
@@ -64,20 +64,20 @@ def query_rows(
 
 
 @kernel
-def fill_lanes(
-    lanes: Float32,
+def fill_points(
+    points: Float32,
     places: npt.NDArray[np.int32],
     values: Float32,
     rows: npt.NDArray[np.int32],
     queries: int,
     count: int,
 ) -> None:
-    """Copy what queries share to their `count` lanes each.
+    """Copy the values of each query to its `count` points.
 
-    Row by row, for a slice of every row and query would cost more than a query of few points.
+    Row by row: a slice of every row and query would cost more time than a query of few points.
     """
     for r in range(9):
-        _repeat(values[r], queries, count, lanes[IX + r])
+        _repeat(values[r], queries, count, points[IX + r])
     for r in range(4):
         _repeat(rows[r], queries, count, places[I0 + r])
 
@@ -101,9 +101,9 @@ def uncover(
     seen: Float32,
     both: Float32,
 ) -> None:
-    """Write how far points are seen, and seen and lit: ramps of a given steepness, in sines of elevation, from 0 to 1.
+    """Write the visibility of points to the viewer, and to viewer and light: ramps in the sine of elevation, 0 to 1.
 
-    A loop of its own: no vector unit may store while it looks up places that it does not know beforehand.
+    A loop of its own: look-ups at computed places keep a loop from the vector units.
     """
     nodes, low_i, high_i, low_o, high_o = places[NODE], places[I0], places[I1], places[O0], places[O1]
     for k in range(count):
@@ -190,20 +190,20 @@ def shade(
 
 
 @kernel
-def shade_all(table: HorizonMap, count: int, lanes: Float32, places: npt.NDArray[np.int32], shadows: bool) -> None:
-    """Write the shares of `count` located lanes; without `shadows` nothing hides them."""
+def shade_all(table: HorizonMap, count: int, points: Float32, places: npt.NDArray[np.int32], shadows: bool) -> None:
+    """Write the shares of `count` located points, without `shadows` all of them visible."""
     if shadows:
         uncover(
-            count, places, table.horizon, lanes[IZ], lanes[OZ], lanes[TURN_I], lanes[TURN_O], lanes[STEEPNESS],
-            lanes[SEEN], lanes[BOTH],
+            count, places, table.horizon, points[IZ], points[OZ], points[TURN_I], points[TURN_O], points[STEEPNESS],
+            points[SEEN], points[BOTH],
         )  # fmt: skip
     else:
-        lanes[SEEN, :count], lanes[BOTH, :count] = _1, _1
+        points[SEEN, :count], points[BOTH, :count] = _1, _1
     shade(
-        count, lanes[WEIGHT], lanes[IX], lanes[IY], lanes[IZ], lanes[OX], lanes[OY], lanes[OZ], lanes[SIZE],
-        lanes[SINE], lanes[DISTANCE], lanes[CURVATURE], lanes[LIMIT], lanes[WARPNESS], lanes[WEFTNESS], lanes[SEEN],
-        lanes[BOTH], lanes[STEP_V], lanes[STEP_Y], table.yarn[0], table.yarn[1], table.thickness,
-        lanes[AREA], lanes[DIFFUSE], lanes[SPECULAR],
+        count, points[WEIGHT], points[IX], points[IY], points[IZ], points[OX], points[OY], points[OZ], points[SIZE],
+        points[SINE], points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS],
+        points[SEEN], points[BOTH], points[STEP_V], points[STEP_Y], table.yarn[0], table.yarn[1], table.thickness,
+        points[AREA], points[DIFFUSE], points[SPECULAR],
     )  # fmt: skip
 
 
@@ -217,7 +217,7 @@ def gather(
     warpness: Float32,
     weftness: Float32,
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """Return the sums of area and of the four components over `count` lanes from `first` on."""
+    """Return the sums of area and of the four components over `count` points from `first` on."""
     a, s_warp, s_weft, c_warp, c_weft = _0, _0, _0, _0, _0
     last = first + count
     area, diffuse, specular = area[first:last], diffuse[first:last], specular[first:last]

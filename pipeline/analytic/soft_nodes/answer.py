@@ -1,14 +1,14 @@
-"""The sums of every query: fixed nodes for a wide footprint, nodes placed by the query for a narrow one.
+"""Sums over soft nodes for each query: fixed nodes for a wide footprint, nodes placed in a narrow one.
 
 deviations                           weights
 both >= `Table.uniform`              the cloth evenly
 both >= `Table.waves_from`           waves
 the narrower one < `NARROW`,
-    the wider one < `LONG`           placed nodes
+    the wider one < `LONG`           nodes placed in the footprint
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
 
-Deviations are those of a footprint's own axes where they are compared. At an angle to the yarns densities are a mixture
-(oblique), waves are exact, and placed nodes take a footprint along the yarns of the same area.
+Deviations are compared along a footprint's own axes. For a rotated footprint densities are a mixture
+(pipeline.truth.footprint.mixture), waves are exact, and nodes are placed in a footprint along the yarns of equal area.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pipeline.analytic.axis_densities import NARROW, axis_densities
 from pipeline.analytic.soft_horizons import sharpness_of_points
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
 from pipeline.analytic.soft_nodes.footprint_nodes import LINE_ROWS, MOST_ACROSS, fill_block, gap_area, place_nodes
-from pipeline.analytic.soft_nodes.kinds import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, LANES, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
-from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_gaps, shade_placed
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK, BLOCK_NODES, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
+from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_footprint, shade_gaps
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.compiled.arrays import Float32
@@ -33,8 +33,9 @@ from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_ax
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
 
 LONG: Final = 0.75
-"""Largest deviation along the wider axis for which a footprint narrow along the other places its own nodes: these are
-counted."""
+"""Largest deviation of the wider axis at which nodes are placed in a footprint that is narrow along the other axis.
+
+It bounds their number."""
 
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; a narrower one is taken as this."""
@@ -83,18 +84,18 @@ def sum_queries(
     per_azimuth, per_grid = size * size, AZIMUTHS * size * size
     grid = table.grid.reshape(table.grid.size)
 
-    # Scratch: weights of fixed nodes, and placed nodes of both families.
-    weight = np.zeros((starts[3], LANES), np.float32)
-    lines = weight.reshape(starts[3] * LANES // COLUMNS, COLUMNS)
+    # Scratch: weights of fixed nodes, and nodes placed in the footprint, of both families.
+    weight = np.zeros((starts[3], BLOCK_NODES), np.float32)
+    lines = weight.reshape(starts[3] * BLOCK_NODES // COLUMNS, COLUMNS)
     turns = np.zeros((TURN_ROWS, HIGHEST + 1), np.float32)
     density_x = np.zeros((ends, len(table.places), COLUMNS), np.float32)
     density_y = np.zeros((picks, len(table.places), COLUMNS), np.float32)
     touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
     columns, rows = np.zeros(ends, np.uint32), np.zeros(picks, np.uint32)
-    most = (_MOST_NODES + LANES - 1) // LANES
-    placed = np.zeros((2, most, ROWS, LANES), np.float32)
-    cells = np.zeros((2, most, LANES), np.uint32)
-    flat_cells = cells.reshape(2, most * LANES)
+    most = (_MOST_NODES + BLOCK_NODES - 1) // BLOCK_NODES
+    own_nodes = np.zeros((2, most, ROWS, BLOCK_NODES), np.float32)
+    cells = np.zeros((2, most, BLOCK_NODES), np.uint32)
+    flat_cells = cells.reshape(2, most * BLOCK_NODES)
     line = np.zeros((LINE_ROWS, 8), np.float32)
     stops = np.zeros(2, np.int64)
     line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
@@ -106,10 +107,10 @@ def sum_queries(
         # Reduced in double precision: single would lose the place of a far centre within the repeat.
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
-        dx, dy, oblique = deviation_x[n], deviation_y[n], correlation[n]
+        dx, dy, rho = deviation_x[n], deviation_y[n], correlation[n]
         narrowest, near_x, near_y = min(dx, dy), dx, dy
-        if oblique != _0:
-            narrowest, blur = np.float32(narrow_axis(dx, dy, oblique)), np.sqrt(np.sqrt(_1 - oblique * oblique))
+        if rho != _0:
+            narrowest, blur = np.float32(narrow_axis(dx, dy, rho)), np.sqrt(np.sqrt(_1 - rho * rho))
             near_x, near_y = blur * dx, blur * dy
         if min(near_x, near_y) >= NARROW or max(near_x, near_y) >= LONG:
             shares = weight
@@ -118,17 +119,17 @@ def sum_queries(
             elif narrowest >= table.waves_from:
                 wave_weights(
                     table.waves, table.wave_size, table.wave_nodes, evenly, np.float32(x), np.float32(y), dx, dy,
-                    oblique, narrowest, np.float32(ends), np.float32(picks), turns, weight,
+                    rho, narrowest, np.float32(ends), np.float32(picks), turns, weight,
                 )  # fmt: skip
             else:
                 # Beyond `uniform` an axis is even; the images of a huge footprint are not to be counted.
-                blur = np.sqrt(_1 - abs(oblique))
+                blur = np.sqrt(_1 - abs(rho))
                 widest_x = np.float32(min(max(blur * dx, RESOLVED), max(table.uniform, LONG)))
                 widest_y = np.float32(min(max(blur * dy, RESOLVED), max(table.uniform, LONG)))
-                line_x = np.sqrt(abs(oblique)) * dx
-                line_y = np.copysign(np.sqrt(abs(oblique)) * dy, oblique)
+                line_x = np.sqrt(abs(rho)) * dx
+                line_y = np.copysign(np.sqrt(abs(rho)) * dy, rho)
                 lines[:, :] = _0
-                for point in range(line_points(oblique, COARSE_LINE, line_places, line_shares)):
+                for point in range(line_points(rho, COARSE_LINE, line_places, line_shares)):
                     across = axis_densities(
                         table.places, table.weights, COLUMNS, np.float32(x + line_places[point] * line_x), widest_x,
                         np.float32(REACH), density_x, touched_x, columns,
@@ -138,7 +139,7 @@ def sum_queries(
                         np.float32(REACH), density_y, touched_y, rows,
                     )  # fmt: skip
                     product_weights(
-                        table.kind_starts, table.cell_kinds, table.kinds, density_x, density_y, columns[:across],
+                        table.group_starts, table.cell_groups, table.groups, density_x, density_y, columns[:across],
                         rows[:along], ends, line_shares[point], lines,
                     )  # fmt: skip
             near_i, near_o = (high_i if turn_i > _HALF else low_i), (high_o if turn_o > _HALF else low_o)
@@ -159,7 +160,7 @@ def sum_queries(
                 )
             continue
 
-        # Place nodes in every piece touched; a footprint at an angle counts as one of its area along the axes.
+        # Place nodes in every piece touched; a rotated footprint counts as one along the axes of the same area.
         dx, dy = near_x, near_y
         stops[:] = 0
         sharp = sharpness_of_points(max(dx, dy))
@@ -183,15 +184,15 @@ def sum_queries(
                         stops[family] = place_nodes(
                             bounds[p], first, size, yarn[family, RADIUS], family, np.float32(x - column),
                             np.float32(y - row), dx, dy, np.float32(x_low), np.float32(x_high), np.float32(y_low),
-                            np.float32(y_high), placed[family], flat_cells[family], stops[family], line,
+                            np.float32(y_high), own_nodes[family], flat_cells[family], stops[family], line,
                         )  # fmt: skip
         for family in range(2):
             if stops[family] == 0:
                 continue
-            blocks = fill_block(placed[family], flat_cells[family], stops[family])
+            blocks = fill_block(own_nodes[family], flat_cells[family], stops[family])
             d = directions(ix, iy, iz, ox, oy, oz, family)
-            found = shade_placed(
-                placed[family, :blocks], cells[family, :blocks], grid, np.uint32(low_i * per_azimuth),
+            found = shade_footprint(
+                own_nodes[family, :blocks], cells[family, :blocks], grid, np.uint32(low_i * per_azimuth),
                 np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
                 np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
             )  # fmt: skip

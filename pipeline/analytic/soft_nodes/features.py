@@ -164,7 +164,7 @@ def read_queries(table: Table, queries: Queries) -> Reading:
     table : Table
         The cloth.
     queries : Queries
-        Footprints of any kind.
+        Footprints of any shape.
     """
     # A thousandth of a yarn is a point: smaller footprints would fall between the digits of a place.
     footprints = deviations(queries, _SMALLEST)

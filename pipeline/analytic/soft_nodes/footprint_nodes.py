@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import above, ramp
-from pipeline.analytic.soft_nodes.nodes import BOUND, CURVE, LANES, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, BOUND, CURVE, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
@@ -93,7 +93,7 @@ def place_nodes(
         The footprint, from the corner of the cell.
     x_low, x_high, y_low, y_high : float32
         What of the piece it covers.
-    nodes, cells : float32 (blocks, ROWS, LANES), uint32 (blocks * LANES,)
+    nodes, cells : float32 (blocks, ROWS, BLOCK_NODES), uint32 (blocks * BLOCK_NODES,)
         Written.
     line : float32 (LINE_ROWS, 8)
         Scratch.
@@ -139,7 +139,7 @@ def place_nodes(
         half_along = half_b * _GAUSS_WEIGHTS[along, j] * _HALF
         cell = first_cell + int(line[6, j]) * step_b
         for i in range(across):
-            block, lane = nodes[k // LANES], k % LANES
+            block, lane = nodes[k // BLOCK_NODES], k % BLOCK_NODES
             block[SIN, lane], block[COS, lane], block[ALONG, lane] = line[0, i], line[1, i], position
             block[HALF_V, lane], block[HALF_ALONG, lane] = half_v * _GAUSS_WEIGHTS[across, i] * _HALF, half_along
             block[WEIGHT, lane] = line[5, j] * line[2, i]
@@ -151,10 +151,10 @@ def place_nodes(
 
 @kernel
 def fill_block(nodes: Float32, cells: npt.NDArray[np.uint32], start: int) -> int:
-    """Fill the last block of lanes with nodes that weigh nothing; return the blocks."""
-    blocks = (start + LANES - 1) // LANES
-    for k in range(start, blocks * LANES):
-        block, lane = nodes[k // LANES], k % LANES
+    """Fill the last block with nodes that weigh nothing; return the blocks."""
+    blocks = (start + BLOCK_NODES - 1) // BLOCK_NODES
+    for k in range(start, blocks * BLOCK_NODES):
+        block, lane = nodes[k // BLOCK_NODES], k % BLOCK_NODES
         block[:, lane] = _0
         block[COS, lane] = _1
         cells[k] = 0

@@ -1,12 +1,12 @@
-"""What a renderer keeps of a cloth to answer by sums: fixed nodes for wide footprints, horizons for narrow ones.
+"""The table of a cloth: fixed nodes for wide footprints, grids of horizons for narrow ones.
 
-    wide     The nodes of every kind are fixed. A node knows mean and spread of its horizon for some azimuths, taken
-             over the box that it stands for and over all cells of its kind: what hides it is a ramp, not a step.
-    narrow   Nodes are placed by the query, in footprint and piece; horizons are read from a grid of the piece.
+    wide     The nodes of every group are fixed. A node has the mean and spread of its horizon for some azimuths, over
+             the box of the node and over all cells of its group: its visibility is a ramp, not a step.
+    narrow   Nodes are placed in footprint and piece; horizons are read from a grid of the piece.
 
-Nodes come in blocks of LANES, what vector units take at a time. Horizons are sines of elevation, compared with the z of
-a direction; azimuths are even in the diamond angle, which needs no arc tangent. Grids hold 8 bits a value, and are the
-coarser the more different pieces there are, so that a table stays near a megabyte.
+Nodes come in blocks of BLOCK_NODES, the width of vector units. Horizons are sines of elevation, compared with the z of
+a direction; azimuths are even in the diamond angle, which needs no arc tangent. Grids hold 8 bits a value; the more
+different pieces there are, the coarser they are, so that a table stays near a megabyte.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
 from pipeline.analytic.soft_horizons import over_boxes
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
-from pipeline.analytic.soft_nodes.kinds import COLUMNS, Kind, gather
+from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index
@@ -31,7 +31,7 @@ from pipeline.truth.geometry.symmetry import longest_period, orbits
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
-LANES: Final = 16
+BLOCK_NODES: Final = 16
 """Numbers in single precision that the widest vector units take at a time."""
 
 LEVELS: Final = 255.0
@@ -42,8 +42,8 @@ _GRID_BYTES = 1 << 20
 _EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
 _SHARPEST = 0.02  # least spread of a horizon
 
-# Columns of `Table.kinds`.
-START, LINES, RULE_ALONG, RULE_ACROSS, KIND_FAMILY = range(5)
+# Columns of `Table.groups`.
+START, LINES, RULE_ALONG, RULE_ACROSS, GROUP_FAMILY = range(5)
 # Columns of `Table.pieces` and of `Table.bounds`.
 FAMILY, BLOCK = range(2)
 X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
@@ -66,21 +66,21 @@ class Table(NamedTuple):
         Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves say its weights.
     starts : int64 (4,)
         First block of the nodes on warps, on wefts, in gaps; their end.
-    nodes : float32 (B, ROWS, LANES)
+    nodes : float32 (B, ROWS, BLOCK_NODES)
         See `surface`.
-    evenly : float32 (B, LANES)
+    evenly : float32 (B, BLOCK_NODES)
         Share of the cloth's area that a node stands for.
-    mean, sharpness : float32 (AZIMUTHS, B, LANES)
+    mean, sharpness : float32 (AZIMUTHS, B, BLOCK_NODES)
         Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
-    kinds : uint32 (K, 5)
+    groups : uint32 (K, 5)
         First node, lines of nodes, rules along and across, family.
-    kind_starts, cell_kinds : uint32
-        The kinds in cell c = pick ends + end are cell_kinds[kind_starts[c] : kind_starts[c + 1]].
+    group_starts, cell_groups : uint32
+        The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]].
     places, weights : float32 (R, COLUMNS)
         Rules; shorter ones are filled with weights of 0.
     waves : int64 (H, 2)
     wave_size : float32 (H,)
-    wave_nodes : float32 (H, B, 2, LANES)
+    wave_nodes : float32 (H, B, 2, BLOCK_NODES)
         See `waves`.
     piece_starts : int64
         The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
@@ -103,9 +103,9 @@ class Table(NamedTuple):
     evenly: Float32
     mean: Float32
     sharpness: Float32
-    kinds: npt.NDArray[np.uint32]
-    kind_starts: npt.NDArray[np.uint32]
-    cell_kinds: npt.NDArray[np.uint32]
+    groups: npt.NDArray[np.uint32]
+    group_starts: npt.NDArray[np.uint32]
+    cell_groups: npt.NDArray[np.uint32]
     places: Float32
     weights: Float32
     waves: Index
@@ -132,48 +132,48 @@ def tabulate(fabric: Fabric) -> Table:
     first_of = {cell: orbit[0] for orbit in orbits(front) for cell in orbit}
     blocks: dict[tuple[tuple[int, int], int], int] = {}
     samples: list[tuple[int, int, Piece]] = []
-    placed, piece_starts = [], [0]
+    located, piece_starts = [], [0]
     for pick, end in np.ndindex(picks, ends):
         for index, piece in enumerate(cell_pieces(front, pick, end)):
             key = (first_of[pick, end], index)
             if key not in blocks:
                 blocks[key] = len(blocks)
                 samples.append((*key[0], piece))
-            placed.append(((end, pick), piece, blocks[key]))
-        piece_starts.append(len(placed))
+            located.append(((end, pick), piece, blocks[key]))
+        piece_starts.append(len(located))
     size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
     grid = _horizon_grids(front, model.back, samples, size)
 
-    # The nodes of every kind, each family in whole blocks.
-    kinds = gather(placed)
-    rules = [_rules(kind) for kind in kinds]
+    # The nodes of every group, each family in whole blocks.
+    groups = gather(located)
+    rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
     for family in (WARP, WEFT, GAP):
-        starts.append(stop // LANES)
-        for kind in kinds:
-            if kind.piece.family == family:
+        starts.append(stop // BLOCK_NODES)
+        for group in groups:
+            if group.piece.family == family:
                 first_nodes.append(stop)
-                stop += kind.nodes
-        stop += -stop % LANES
-    starts.append(stop // LANES)
+                stop += group.nodes
+        stop += -stop % BLOCK_NODES
+    starts.append(stop // BLOCK_NODES)
     nodes = np.tile(LEVEL[:, None], stop)
     evenly, mean = np.zeros(stop), np.zeros((AZIMUTHS, stop))
     variance = np.ones((AZIMUTHS, stop))
-    for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True):
-        lanes = (start + np.arange(kind.nodes)).reshape(kind.lines, COLUMNS)[:, : len(across.places)].ravel()
-        nodes[:, lanes] = piece_rows(front.yarn, kind.piece, across, along)
-        evenly[lanes] = np.outer(along.weights, across.weights).ravel() * len(kind.cells) / (ends * picks)
-        mean[:, lanes], variance[:, lanes] = _soft_horizons(kind, across, along, grid)
+    for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
+        lanes = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
+        nodes[:, lanes] = piece_rows(front.yarn, group.piece, across, along)
+        evenly[lanes] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
+        mean[:, lanes], variance[:, lanes] = _soft_horizons(group, across, along, grid)
     used = list({id(one): one for pair in rules for one in pair}.values())
     number = {id(one): index for index, one in enumerate(used)}
-    waves = tabulate_waves(kinds, rules, first_nodes, stop, (ends, picks))
-    cell_kinds: list[list[int]] = [[] for _ in range(ends * picks)]
-    for index, kind in enumerate(kinds):
-        for end, pick in kind.cells:
-            cell_kinds[pick * ends + end].append(index)
+    waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
+    cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
+    for index, group in enumerate(groups):
+        for end, pick in group.cells:
+            cell_groups[pick * ends + end].append(index)
 
-    def lanes_of(values: Float64) -> Float32:
-        return np.ascontiguousarray(values.reshape(*values.shape[:-1], -1, LANES), np.float32)
+    def in_blocks(values: Float64) -> Float32:
+        return np.ascontiguousarray(values.reshape(*values.shape[:-1], -1, BLOCK_NODES), np.float32)
 
     return Table(
         repeat=np.array([ends, picks], np.int64),
@@ -183,36 +183,36 @@ def tabulate(fabric: Fabric) -> Table:
         uniform=_EVEN * longest_period(front),
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
-        nodes=np.ascontiguousarray(lanes_of(nodes).transpose(1, 0, 2)),
-        evenly=lanes_of(evenly),
-        mean=lanes_of(mean),
-        sharpness=lanes_of(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2))),
-        kinds=np.array(
+        nodes=np.ascontiguousarray(in_blocks(nodes).transpose(1, 0, 2)),
+        evenly=in_blocks(evenly),
+        mean=in_blocks(mean),
+        sharpness=in_blocks(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2))),
+        groups=np.array(
             [
-                (start, kind.lines, number[id(along)], number[id(across)], kind.piece.family)
-                for kind, (across, along), start in zip(kinds, rules, first_nodes, strict=True)
+                (start, group.lines, number[id(along)], number[id(across)], group.piece.family)
+                for group, (across, along), start in zip(groups, rules, first_nodes, strict=True)
             ],
             np.uint32,
         ),
-        kind_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_kinds])]).astype(np.uint32),
-        cell_kinds=np.array([index for found in cell_kinds for index in found], np.uint32),
+        group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
+        cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
         places=_filled([one.places for one in used], edge=True),
         weights=_filled([one.weights for one in used], edge=False),
         waves=waves.periods,
         wave_size=waves.size,
-        wave_nodes=np.ascontiguousarray(waves.nodes.reshape(len(waves.size), 2, -1, LANES).transpose(0, 2, 1, 3)),
+        wave_nodes=np.ascontiguousarray(waves.nodes.reshape(len(waves.size), 2, -1, BLOCK_NODES).transpose(0, 2, 1, 3)),
         piece_starts=np.array(piece_starts, np.int64),
-        pieces=np.array([(piece.family, block) for _, piece, block in placed], np.int64),
-        bounds=np.array([_bounds(piece) for _, piece, _ in placed], np.float32),
+        pieces=np.array([(piece.family, block) for _, piece, block in located], np.int64),
+        bounds=np.array([_bounds(piece) for _, piece, _ in located], np.float32),
         grid=grid,
     )
 
 
-def _rules(kind: Kind) -> tuple[Rule, Rule]:
-    """Return the nodes of a kind across and along."""
-    piece = kind.piece
-    columns = kind.lines if piece.family == GAP else COLUMNS
-    return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, kind.lines, 0.0)
+def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
+    """Return the nodes of a group across and along."""
+    piece = group.piece
+    columns = group.lines if piece.family == GAP else COLUMNS
+    return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, group.lines, 0.0)
 
 
 def _bounds(piece: Piece) -> tuple[float, ...]:
@@ -253,12 +253,14 @@ def _horizon_grids(
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
 
 
-def _soft_horizons(kind: Kind, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]) -> tuple[Float64, Float64]:
-    """Return mean and variance of the horizon over each node's box and all cells of a kind, (AZIMUTHS, nodes)."""
-    piece, size = kind.piece, grid.shape[-1]
+def _soft_horizons(
+    group: PieceGroup, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]
+) -> tuple[Float64, Float64]:
+    """Return mean and variance of the horizon over each node's box and all cells of a group, (AZIMUTHS, nodes)."""
+    piece, size = group.piece, grid.shape[-1]
     of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
     of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
-    blocks, counts = np.unique(kind.blocks, return_counts=True)
+    blocks, counts = np.unique(group.blocks, return_counts=True)
     values = grid[blocks] / LEVELS
     if piece.family == WEFT:
         values = values.transpose(0, 1, 3, 2)

@@ -1,12 +1,12 @@
-"""The point model over blocks of lanes, soft shadows included; the innermost loops of the sums.
+"""The point model over blocks of nodes with soft shadows: the innermost loops.
 
-The formulas are those of `patch`, `microflake` and `slab`, written with cosines only. What differs: a horizon is a
-ramp (soft_horizons), and a highlight has four places in a node's box.
+The formulas are those of pipeline.truth.scattering.point; surface, flakes and layer are those of torus_frame,
+flakes_float32 and slab_float32. Two things differ: a horizon is a ramp (soft_horizons), and a highlight has four places
+in a node's box.
 
-Of each family come ten sums, each a share of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and
-lit; BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR, the same with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, how much
-of the bare ones lies within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen and lit without shadows: more light no model
-that keeps energy may return (features).
+Each family has ten sums, as shares of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and lit;
+BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, the part of the bare
+ones within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen, and lit without shadows: an upper bound of energy (features).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
-from pipeline.analytic.soft_nodes.nodes import LANES, LEVELS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
@@ -33,7 +33,7 @@ AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, 
 OPEN_DIFFUSE, OPEN_SPECULAR = 8, 9
 
 ROWS: Final = 8
-"""Rows of a block of placed nodes."""
+"""Rows of a block of nodes placed in a footprint."""
 
 SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(ROWS)
 """Sine and cosine of v; position along the yarn from its float's middle; half boxes across and along; weight; curve,
@@ -160,7 +160,7 @@ def shade_fixed(
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
-        for k in range(LANES):
+        for k in range(BLOCK_NODES):
             over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
             over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
             seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
@@ -186,7 +186,7 @@ def shade_fixed(
 
 
 @fast_kernel
-def shade_placed(
+def shade_footprint(
     nodes: Float32,
     cells: npt.NDArray[np.uint32],
     grid: npt.NDArray[np.uint8],
@@ -201,7 +201,7 @@ def shade_placed(
     yarn: Float32,
     thickness: np.float32,
 ) -> Ten:
-    """Return the sums over nodes placed by the query.
+    """Return the sums over nodes placed in a footprint.
 
     `cells` is each node's cell of its grid at the first azimuth; `low`, `high`: what leads to those around a direction.
     """
@@ -213,7 +213,7 @@ def shade_placed(
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(cells)):
-        for k in range(LANES):
+        for k in range(BLOCK_NODES):
             at = cells[b, k]
             over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
             over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
@@ -253,6 +253,6 @@ def shade_gaps(
     """Return the area seen through gaps, of fixed nodes."""
     area = _0
     for b in range(len(weight)):
-        for k in range(LANES):
+        for k in range(BLOCK_NODES):
             area += weight[b, k] * ramp(above(oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k]))
     return area * oz

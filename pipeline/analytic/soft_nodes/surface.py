@@ -1,4 +1,4 @@
-"""The surface at the nodes of a kind: normal, tangent, and by how much the tangent turns within a node's box.
+"""The surface at the nodes of a group: normal, tangent, and by how much the tangent turns within a node's box.
 
 A highlight may be narrower than a box. The tangent's change over half a box, along and across the yarn, gives it four
 places there, at the points of the Gauss rule (1 / sqrt 3 of half a box). Everything is in the frame of the yarn.
@@ -22,7 +22,7 @@ ROWS: Final = 13
 """Normal (3), 1 / n_z, tangent (3), its change along (3) and across (3)."""
 
 LEVEL: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
-"""The rows of a gap, and of what fills a block of lanes."""
+"""The rows of a gap, and of the nodes that fill up a block."""
 
 _AXES = np.eye(3)
 _GAUSS = 1.0 / math.sqrt(3.0)

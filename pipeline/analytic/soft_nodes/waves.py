@@ -1,7 +1,7 @@
 """Waves: the weights of all nodes under a wide Gaussian as a sum over the longest waves of the cloth.
 
-The cells of a kind form a lattice; a Gaussian of deviation s damps its wave of wave vector k by exp(-2 pi^2 s^2 k^2).
-From some deviation on, the few longest waves that the cloth's kinds tell apart are all that is left:
+The cells of a group form a lattice; a Gaussian of deviation s damps its wave of wave vector k by exp(-2 pi^2 s^2 k^2).
+From some deviation on, the few longest waves that the cloth's groups tell apart are all that is left:
 
     weight(node) = evenly(node) (1 + sum 2 damping mean over its cells of cos(2 pi k (centre - place)))
 """
@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.gauss_rules import Rule
-from pipeline.analytic.soft_nodes.kinds import Kind
+from pipeline.analytic.soft_nodes.groups import PieceGroup
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.geometry.heightfield import WEFT
 
@@ -26,7 +26,7 @@ HIGHEST: Final = 10
 """Largest number of periods in a repeat, along x and along y."""
 
 _FAINT = 0.01  # damping below which a wave is left out
-_ABSENT = 1e-6  # amplitude of a wave that cancels over the cells of every kind
+_ABSENT = 1e-6  # amplitude of a wave that cancels over the cells of every group
 
 
 class Waves(NamedTuple):
@@ -39,7 +39,7 @@ class Waves(NamedTuple):
     size : float32 (H,)
         Squared wave number, 1/yarn spacings^2.
     nodes : float32 (H, 2, nodes)
-        Twice the cosine and the sine at the nodes, mean over all cells of a kind.
+        Twice the cosine and the sine at the nodes, mean over all cells of a group.
     enough_from : float
         Deviation from which on what is missing is faint.
     """
@@ -56,7 +56,7 @@ def faintest(deviation: float) -> float:
 
 
 def tabulate_waves(
-    kinds: Sequence[Kind],
+    groups: Sequence[PieceGroup],
     rules: Sequence[tuple[Rule, Rule]],
     starts: Sequence[int],
     nodes: int,
@@ -66,10 +66,10 @@ def tabulate_waves(
 
     Parameters
     ----------
-    kinds, rules, starts
+    groups, rules, starts
         Kinds, their rules across and along, and the first node of each.
     nodes : int
-        Nodes of all kinds and of what fills their blocks.
+        Nodes of all groups and of what fills their blocks.
     repeat : (ends, picks)
         Extent of the repeat.
     """
@@ -84,16 +84,16 @@ def tabulate_waves(
         if size >= beyond:
             break
         wave = np.zeros(nodes, np.complex128)
-        for kind, (across, along), start in zip(kinds, rules, starts, strict=True):
-            x, y = (along, across) if kind.piece.family == WEFT else (across, along)
-            cells = np.array(kind.cells, np.float64)
+        for group, (across, along), start in zip(groups, rules, starts, strict=True):
+            x, y = (along, across) if group.piece.family == WEFT else (across, along)
+            cells = np.array(group.cells, np.float64)
             mean = np.exp(2j * np.pi * (m * cells[:, 0] / ends + n * cells[:, 1] / picks)).mean()
             at_x, at_y = np.exp(2j * np.pi * m * x.places / ends), np.exp(2j * np.pi * n * y.places / picks)
-            product = np.outer(at_x, at_y) if kind.piece.family == WEFT else np.outer(at_y, at_x)
+            product = np.outer(at_x, at_y) if group.piece.family == WEFT else np.outer(at_y, at_x)
             # A line of nodes may be longer than the rule across; the rest of it weighs nothing.
-            lines = np.zeros((kind.lines, kind.nodes // kind.lines), np.complex128)
+            lines = np.zeros((group.lines, group.nodes // group.lines), np.complex128)
             lines[:, : product.shape[1]] = mean * product
-            wave[start : start + kind.nodes] = lines.ravel()
+            wave[start : start + group.nodes] = lines.ravel()
         if np.abs(wave).max() < _ABSENT:
             continue
         if len(periods) == MOST_WAVES:

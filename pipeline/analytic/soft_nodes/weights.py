@@ -1,7 +1,7 @@
-"""Which share of a wide footprint falls on each fixed node: a sum of waves, or of the Gaussian over all its images.
+"""Weights of the fixed nodes under a wide footprint: a sum of waves, or of the Gaussian over all its images.
 
-A Gaussian along the axes is a product: one outer product of densities (axis_densities) for every touched cell and kind.
-One at an angle is a mixture of these (oblique); waves know any.
+A Gaussian along the axes is a product: one outer product of densities (axis_densities) for every touched cell and
+group. A rotated one is a mixture of these (pipeline.truth.footprint.mixture); waves take any Gaussian.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.kinds import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import KIND_FAMILY, LANES, LINES, RULE_ACROSS, RULE_ALONG, START
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, GROUP_FAMILY, LINES, RULE_ACROSS, RULE_ALONG, START
 from pipeline.analytic.soft_nodes.waves import HIGHEST, faintest
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.compiled.decorators import fast_kernel
@@ -62,7 +62,7 @@ def wave_weights(
             p, q = turns[2 * axis, m], turns[2 * axis + 1, m]
             turns[2 * axis, m + 1], turns[2 * axis + 1, m + 1] = p * cosine - q * sine, p * sine + q * cosine
     for b in range(len(weight)):
-        for k in range(LANES):
+        for k in range(BLOCK_NODES):
             weight[b, k] = _1
     for h in range(count):
         m, n = waves[h, 0], waves[h, 1]
@@ -73,18 +73,18 @@ def wave_weights(
         cosine, sine = damping * (cos_x * cos_y - sin_x * sin_y), damping * (sin_x * cos_y + cos_x * sin_y)
         values = nodes[h]
         for b in range(len(weight)):
-            for k in range(LANES):
+            for k in range(BLOCK_NODES):
                 weight[b, k] += cosine * values[b, 0, k] + sine * values[b, 1, k]
     for b in range(len(weight)):
-        for k in range(LANES):
+        for k in range(BLOCK_NODES):
             weight[b, k] = max(weight[b, k], _0) * evenly[b, k]
 
 
 @fast_kernel
 def product_weights(
-    kind_starts: npt.NDArray[np.uint32],
-    cell_kinds: npt.NDArray[np.uint32],
-    kinds: npt.NDArray[np.uint32],
+    group_starts: npt.NDArray[np.uint32],
+    cell_groups: npt.NDArray[np.uint32],
+    groups: npt.NDArray[np.uint32],
     density_x: Float32,
     density_y: Float32,
     columns: npt.NDArray[np.uint32],
@@ -93,18 +93,18 @@ def product_weights(
     share: np.float32,
     weight: Float32,
 ) -> None:
-    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a kind's touched cells."""
+    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a group's touched cells."""
     for pick in rows:
         for end in columns:
             cell = pick * np.uint32(ends) + end
-            for c in range(kind_starts[cell], kind_starts[cell + np.uint32(1)]):
-                kind = kinds[cell_kinds[np.uint32(c)]]
-                if kind[KIND_FAMILY] == WEFT:
-                    along, across = density_x[end, kind[RULE_ALONG]], density_y[pick, kind[RULE_ACROSS]]
+            for c in range(group_starts[cell], group_starts[cell + np.uint32(1)]):
+                group = groups[cell_groups[np.uint32(c)]]
+                if group[GROUP_FAMILY] == WEFT:
+                    along, across = density_x[end, group[RULE_ALONG]], density_y[pick, group[RULE_ACROSS]]
                 else:
-                    along, across = density_y[pick, kind[RULE_ALONG]], density_x[end, kind[RULE_ACROSS]]
-                start = kind[START] // np.uint32(COLUMNS)
-                for j in range(kind[LINES]):
+                    along, across = density_y[pick, group[RULE_ALONG]], density_x[end, group[RULE_ACROSS]]
+                start = group[START] // np.uint32(COLUMNS)
+                for j in range(group[LINES]):
                     factor = share * along[j]
                     for k in range(COLUMNS):
                         weight[start + j, k] += factor * across[k]

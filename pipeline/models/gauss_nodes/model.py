@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.gauss_nodes.answer import GaussQuadrature
+from pipeline.analytic.gauss_nodes.answer import GaussNodesTable
 from pipeline.models.gauss_nodes.options import GaussNodesOptions
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
@@ -54,9 +54,9 @@ class GaussNodes:
         """Return the bytes of nodes and horizons."""
         return self._rules.of(fabric).bytes_stored()
 
-    def _tabulate(self, fabric: Fabric) -> GaussQuadrature:
+    def _tabulate(self, fabric: Fabric) -> GaussNodesTable:
         options = self._options
-        return GaussQuadrature(
+        return GaussNodesTable(
             fabric,
             self._nodes,
             max(2, round(options.along * self._nodes)),

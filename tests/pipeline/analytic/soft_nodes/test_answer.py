@@ -95,8 +95,8 @@ def test_footprints_along_the_axes():
 def test_footprints_at_an_angle(name, bound):
     """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
     fabric = load_fabric(name)
-    kinds = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
-    queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
+    groups = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
+    queries = draw_queries(groups, fabric.weave.repeat, 9, 0, 96)
     assert np.abs(deviations(queries)[2]).max() > 0.7
     table, truth = tabulate(fabric), estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
     size = np.sqrt(queries.sigma * queries.sigma_minor)
@@ -134,7 +134,7 @@ def test_extremes_stay_finite_and_not_negative(width):
 
 @pytest.mark.parametrize("side", [7, 12])
 def test_irregular_drafts_of_many_floats(side):
-    """Merged kinds: wide footprints within 4 %."""
+    """Merged groups: wide footprints within 4 %."""
     random = np.random.default_rng(side)
     rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
     fabric = cloth("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, LANES, LEVELS, tabulate
+from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, tabulate
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -28,7 +28,7 @@ def test_tables_stay_small(fabric, most):
     table = tabulate(fabric)
     assert table.nbytes < most
     assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
-    assert table.evenly.size <= 256 + 128 + 3 * LANES
+    assert table.evenly.size <= 256 + 128 + 3 * BLOCK_NODES
 
 
 def test_horizons_of_narrow_and_wide_footprints_agree():

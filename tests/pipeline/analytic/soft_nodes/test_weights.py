@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.axis_densities import axis_densities
-from pipeline.analytic.soft_nodes.kinds import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import LANES, tabulate
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, tabulate
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.truth.footprint.mixture import narrow_axis
@@ -14,7 +14,7 @@ from weaves.fabric import load_fabric
 
 def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
     """Return the weights by products; those of an ellipse at an angle from 401 points of its line."""
-    weight = np.zeros((table.starts[3] * LANES // COLUMNS, COLUMNS), np.float32)
+    weight = np.zeros((table.starts[3] * BLOCK_NODES // COLUMNS, COLUMNS), np.float32)
     blur, line = np.sqrt(1.0 - abs(correlation)), np.sqrt(abs(correlation))
     places = np.linspace(-4.0, 4.0, 401) if correlation else np.zeros(1)
     shares = np.exp(-0.5 * places**2) / np.exp(-0.5 * places**2).sum()
@@ -23,7 +23,7 @@ def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
     )  # fmt: skip
     for place, share in zip(places, shares, strict=True):
         _add_product(table, x + place * shift_x, y + place * shift_y, deviation_x, deviation_y, share, weight)
-    return weight.reshape(-1, LANES) / (2.0 * np.pi * deviation_x * deviation_y)
+    return weight.reshape(-1, BLOCK_NODES) / (2.0 * np.pi * deviation_x * deviation_y)
 
 
 def _add_product(table, x, y, deviation_x, deviation_y, share, weight):
@@ -39,7 +39,7 @@ def _add_product(table, x, y, deviation_x, deviation_y, share, weight):
         found.append((density, listed[:count]))
     (of_x, columns), (of_y, rows) = found
     product_weights(
-        table.kind_starts, table.cell_kinds, table.kinds, of_x, of_y, columns, rows, ends, np.float32(share), weight
+        table.group_starts, table.cell_groups, table.groups, of_x, of_y, columns, rows, ends, np.float32(share), weight
     )
 
 

@@ -1,8 +1,8 @@
-"""Kinds: which pieces of a repeat lie so much alike that they share nodes.
+"""Groups of like pieces: the pieces of a repeat that share nodes.
 
-Pieces of one shape that lie alike on floats of one length are one kind. A draft of many different floats has more kinds
-than are worth their time: then the two most alike are merged, again and again (Ward's distance between their
-inclinations), until the nodes of all kinds are few enough.
+Pieces of one shape that lie alike on floats of one length form a group. A draft of many different floats has too many
+groups: then the two most alike are merged, again and again (Ward's distance between their inclinations), until the
+nodes of all groups are few enough.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER
 from pipeline.truth.geometry.pieces import Piece
 
 MOST_NODES: Final = {TOP: 256, UNDER: 128}
-"""Nodes of all kinds on top, and of all beneath, above which kinds are merged."""
+"""Nodes of all groups on top, and of all beneath, above which groups are merged."""
 
 COLUMNS: Final = 8
 """Nodes across a yarn: a line of them is half of what the vector units take at a time."""
@@ -27,7 +27,7 @@ _STRIP = 3.0  # nodes a yarn spacing along what shows beneath, and along gaps
 Cell = tuple[int, int]
 
 
-class Kind(NamedTuple):
+class PieceGroup(NamedTuple):
     """Pieces that share nodes.
 
     Attributes
@@ -53,48 +53,48 @@ class Kind(NamedTuple):
 
     @property
     def nodes(self) -> int:
-        """Nodes of the kind."""
+        """Nodes of the group."""
         return COLUMNS * self.lines
 
 
-def gather(pieces: Sequence[tuple[Cell, Piece, int]]) -> list[Kind]:
-    """Return the kinds of pieces, given with their cell (end, pick) and the name of their horizons; warps first."""
-    alike: dict[tuple[float | int, ...], Kind] = {}
+def gather(pieces: Sequence[tuple[Cell, Piece, int]]) -> list[PieceGroup]:
+    """Return the groups of pieces, given with their cell (end, pick) and the name of their horizons; warps first."""
+    alike: dict[tuple[float | int, ...], PieceGroup] = {}
     for cell, piece, block in pieces:
         numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
-        kind = alike.setdefault((piece.family, piece.side, *(round(n, 6) for n in numbers)), Kind(piece, [], []))
-        kind.cells.append(cell)
-        kind.blocks.append(block)
-    kinds: list[Kind] = []
+        group = alike.setdefault((piece.family, piece.side, *(round(n, 6) for n in numbers)), PieceGroup(piece, [], []))
+        group.cells.append(cell)
+        group.blocks.append(block)
+    groups: list[PieceGroup] = []
     for side, most in MOST_NODES.items():
-        kinds += _merged([kind for kind in alike.values() if kind.piece.side == side], most)
-    return sorted(kinds, key=lambda kind: kind.piece.family)
+        groups += _merged([group for group in alike.values() if group.piece.side == side], most)
+    return sorted(groups, key=lambda group: group.piece.family)
 
 
-def _merged(kinds: list[Kind], most: int) -> list[Kind]:
-    """Merge the two kinds most alike until all have together at most `most` nodes, or nothing is left to merge."""
-    kinds = list(kinds)
-    while sum(kind.nodes for kind in kinds) > most:
+def _merged(groups: list[PieceGroup], most: int) -> list[PieceGroup]:
+    """Merge the two groups most alike until all have together at most `most` nodes, or nothing is left to merge."""
+    groups = list(groups)
+    while sum(group.nodes for group in groups) > most:
         pairs = [
             (_distance(first, second), i, j)
-            for j, second in enumerate(kinds)
-            for i, first in enumerate(kinds[:j])
+            for j, second in enumerate(groups)
+            for i, first in enumerate(groups[:j])
             if _mergeable(first, second)
         ]
         if not pairs:
             break
         _, i, j = min(pairs)
-        second = kinds.pop(j)
-        kinds[i] = _together(kinds[i], second)
-    return kinds
+        second = groups.pop(j)
+        groups[i] = _together(groups[i], second)
+    return groups
 
 
-def _mergeable(first: Kind, second: Kind) -> bool:
+def _mergeable(first: PieceGroup, second: PieceGroup) -> bool:
     one, other = first.piece, second.piece
     return one[:4] == other[:4] and first.lines == second.lines and one.family != GAP
 
 
-def _distance(first: Kind, second: Kind) -> float:
+def _distance(first: PieceGroup, second: PieceGroup) -> float:
     """Return by how much merging raises the sum over cells of the squared error of the inclination."""
     sizes = len(first.cells), len(second.cells)
     middle = first.piece.offset * first.piece.curve - second.piece.offset * second.piece.curve
@@ -102,8 +102,8 @@ def _distance(first: Kind, second: Kind) -> float:
     return sizes[0] * sizes[1] / sum(sizes) * (middle**2 + curve**2 / 12.0)
 
 
-def _together(first: Kind, second: Kind) -> Kind:
-    """Return two kinds as one of their mean inclination."""
+def _together(first: PieceGroup, second: PieceGroup) -> PieceGroup:
+    """Return two groups as one of their mean inclination."""
     cells = first.cells + second.cells
     share = len(first.cells) / len(cells)
 
@@ -115,4 +115,4 @@ def _together(first: Kind, second: Kind) -> Kind:
     middle = mean(one.offset * one.curve, other.offset * other.curve)
     # The length only tells where the arc of a yarn beneath ends.
     piece = one._replace(offset=middle / curve if curve else 0.0, curve=curve, half=max(one.half, other.half))
-    return Kind(piece, cells, first.blocks + second.blocks)
+    return PieceGroup(piece, cells, first.blocks + second.blocks)

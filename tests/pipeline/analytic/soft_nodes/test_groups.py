@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.kinds import MOST_NODES, gather
+from pipeline.analytic.soft_nodes.groups import MOST_NODES, gather
 from pipeline.truth.geometry.heightfield import TOP, height_field
 from pipeline.truth.geometry.pieces import cell_pieces
 from weaves.draft import Matrix
@@ -22,22 +22,22 @@ def placed(fabric):
     return [(cell, piece, 0) for cell in cells for piece in cell_pieces(field, cell[1], cell[0])]
 
 
-@pytest.mark.parametrize(("name", "kinds"), [("polyester_lining", 2), ("cotton_twill", 4), ("satin_8", 8)])
-def test_regular_weaves_have_few_kinds(name, kinds):
-    assert len(gather(placed(load_fabric(name)))) == kinds
+@pytest.mark.parametrize(("name", "groups"), [("polyester_lining", 2), ("cotton_twill", 4), ("satin_8", 8)])
+def test_regular_weaves_have_few_groups(name, groups):
+    assert len(gather(placed(load_fabric(name)))) == groups
 
 
 @pytest.mark.parametrize("side", [8, 16])
 def test_many_different_floats_are_merged_and_no_cell_is_lost(side):
     pieces = placed(irregular(side))
-    kinds = gather(pieces)
-    assert sum(kind.nodes for kind in kinds if kind.piece.side == TOP) <= MOST_NODES[TOP]
-    assert sorted(cell for kind in kinds for cell in kind.cells) == sorted(cell for cell, _, _ in pieces)
+    groups = gather(pieces)
+    assert sum(group.nodes for group in groups if group.piece.side == TOP) <= MOST_NODES[TOP]
+    assert sorted(cell for group in groups for cell in group.cells) == sorted(cell for cell, _, _ in pieces)
 
     # What is merged keeps the mean inclination of its cells.
     for family in (0, 1):
         own = [piece for _, piece, _ in pieces if piece.family == family]
         expected = np.mean([piece.offset * piece.curve for piece in own])
-        merged = [kind for kind in kinds if kind.piece.family == family]
-        found = sum(len(kind.cells) * kind.piece.offset * kind.piece.curve for kind in merged) / len(own)
+        merged = [group for group in groups if group.piece.family == family]
+        found = sum(len(group.cells) * group.piece.offset * group.piece.curve for group in merged) / len(own)
         assert found == pytest.approx(expected, abs=1e-9)

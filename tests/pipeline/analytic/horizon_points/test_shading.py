@@ -1,0 +1,76 @@
+"""Points shaded in single precision against the point model in double precision, point by point, shadows off."""
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.horizon_points.horizon_map import horizon_map, locate
+from pipeline.analytic.horizon_points.shading import (
+    AREA,
+    CURVATURE,
+    DIFFUSE,
+    DISTANCE,
+    INTEGERS,
+    LIMIT,
+    NODE,
+    ROWS,
+    SINE,
+    SPECULAR,
+    WARPNESS,
+    WEFTNESS,
+    WEIGHT,
+    X,
+    Y,
+    fill_points,
+    query_rows,
+    shade_all,
+)
+from pipeline.truth.geometry.heightfield import height_field
+from weaves.fabric import load_fabric
+
+COUNT = 1500
+
+RTOL = 1e-4
+"""Some forty roundings of 6e-8, and ten times that where a highlight's narrow denominator is a small difference."""
+
+
+def cloth(name, **changes):
+    fabric = load_fabric(name)
+    yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
+    return fabric.model_copy(update={**yarns, "optical_thickness": 0.4})
+
+
+@pytest.mark.parametrize(
+    "fabric",
+    [cloth("denim", relief=1.2, twist=30.0), cloth("silk_charmeuse"), cloth("cotton_twill", width=0.7)],
+    ids=["twist and relief", "lustrous", "gaps"],
+)
+@pytest.mark.parametrize(
+    ("wi", "wo"), [((0.3, -0.4, 0.866), (0.1, 0.6, 0.794)), ((-0.7, 0.3, 0.648), (-0.6, 0.5, 0.6245))]
+)
+def test_every_point_is_the_point_model(point_shares, fabric, wi, wo):
+    """No box around a point: a highlight has one place there."""
+    wi, wo = (np.array(w, np.float32) / np.float32(np.linalg.norm(w)) for w in (wi, wo))
+    ends, picks = fabric.weave.repeat
+    field = height_field(fabric)
+    table = horizon_map(field, field, 4, 8)
+    random = np.random.default_rng(6)
+    points, places = np.zeros((ROWS, COUNT), np.float32), np.zeros((INTEGERS, COUNT), np.int32)
+    points[X], points[Y], points[WEIGHT] = random.random(COUNT) * ends, random.random(COUNT) * picks, 1.0
+    values, rows = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
+    query_rows(wi, wo, table.azimuths, table.grid**2, values, rows, 0)
+    fill_points(points, places, values, rows, 1, COUNT)
+    locate(
+        COUNT, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
+        table.pieces.ravel(), table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
+        points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
+    )  # fmt: skip
+    shade_all(table, COUNT, points, places, False)
+
+    area, specular, diffuse = point_shares(fabric, points[X], points[Y], wi, wo)
+    family = np.where(points[WARPNESS] > 0, 0, np.where(points[WEFTNESS] > 0, 1, 2))
+    assert (area[np.arange(COUNT), family] > 0).mean() > 0.5
+    # Next to the edge of a yarn a point's own rounding turns the normal by more than the tolerance.
+    inner = np.abs(points[SINE]) < 0.98
+    for row, expected in ((AREA, area), (SPECULAR, specular), (DIFFUSE, diffuse)):
+        expected = expected.sum(axis=1)
+        np.testing.assert_allclose(points[row][inner], expected[inner], rtol=RTOL, atol=1e-6 * expected.max())
