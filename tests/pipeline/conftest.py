@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.geometry.heightfield import GAP, height_field
-from pipeline.truth.scattering.point import Choices, point_share, scene
+from pipeline.truth.scattering.point import Choices, directions_of, point_share
 
 ALONE = Choices(macro=False, linear=False, shadows=False)
 
@@ -18,7 +18,7 @@ def _shares(fabric, x, y, wi, wo):
     found = np.zeros((3, len(x), 3))
     for k, at in enumerate(zip(np.asarray(x, np.float64), np.asarray(y, np.float64), strict=True)):
         i, o = (np.broadcast_to(w, (len(x), 3))[k].astype(np.float64) for w in (wi, wo))
-        family, area, specular, diffuse, _ = point_share(front, front, *at, scene(*i, *o, 0.0), ALONE)
+        family, area, specular, diffuse, _ = point_share(front, front, *at, directions_of(*i, *o, 0.0), ALONE)
         found[:, k, family] = area, specular, diffuse
     assert not found[1:, :, GAP].any()
     return found

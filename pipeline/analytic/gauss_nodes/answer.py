@@ -205,8 +205,8 @@ def _answer(
             fill_points(points, places, values, shared, 1, total)
             locate(
                 total, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
-                flat, table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE], points[DISTANCE],
-                points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
+                flat, table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
+                points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
             )  # fmt: skip
             shade_all(table, total, points, places, shadows)
             total_weight = plain_sum(points[WEIGHT], total)

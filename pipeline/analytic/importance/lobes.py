@@ -61,7 +61,13 @@ class Lobes(NamedTuple):
 
 @kernel
 def find_lobes(
-    model: ClothSide, columns: Columns, count: int, widening: float, specular: Float64, diffuse: Float64, through: Float64
+    model: ClothSide,
+    columns: Columns,
+    count: int,
+    widening: float,
+    specular: Float64,
+    diffuse: Float64,
+    through: Float64,
 ) -> Lobes:
     """Return the mixtures of queries, whose wi does not matter, from `count` points each.
 

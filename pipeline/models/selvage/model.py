@@ -1,19 +1,17 @@
-"""Sums over few nodes, corrected by a small network: one network for all fabrics and scales.
+"""Soft nodes corrected by a residual perceptron: one network for all fabrics and scales.
 
-What a cloth does to light is known; only its hidden nodes are too many. `pipeline.analytic.soft_nodes` answers a query
-by the point model over tens of nodes with softened horizons, and says on the way how much of the answer is in doubt. A
-narrow perceptron reads that and puts out four factors, one for each component that the sums alone give:
+`pipeline.analytic.soft_nodes` answers a query by the point model over tens of nodes with softened horizons, and reports
+how much of the answer is uncertain. A narrow perceptron reads these numbers and puts out four factors, one for each
+component:
 
-    features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the sums
+    features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the soft nodes
 
-Factors lie between 0 and 2 and begin at 1: before the first step the network is the sums, and however little it has
-learnt of a cloth, its colours, highlights and repeat are the cloth's own. With `bound` no component exceeds what the
-sums give without shadows of the light, and the diffuse ones return at most what arrives
-(pipeline.analytic.soft_nodes.features). With `narrow_nodes` small footprints, where so few nodes err most, are left to
-a Gauss rule of that many nodes; between the two ends of `seam` both are blended.
+Factors lie between 0 and 2 and begin at 1: an untrained network is the soft nodes, and colours, highlights and the
+repeat of a cloth need not be learnt. With `bound` no component exceeds the soft nodes' answer without shadows of the
+light, and diffuse light returns at most what arrives (pipeline.analytic.soft_nodes.features).
 
-What the fabric alone decides, 10 of the 40 features, folds into a bias. Mirror images need not be learnt, because
-features know none; exchanging warp and weft is taught by exchanging them in half of all steps.
+10 of the 40 features depend on the fabric alone and fold into a bias. Mirror images need not be learnt, because the
+features are the same for both; the exchange of warp and weft is learnt by exchanging them in half of all steps.
 """
 
 from __future__ import annotations
@@ -38,8 +36,6 @@ from pipeline.analytic.soft_nodes.features import (
 )
 from pipeline.analytic.soft_nodes.nodes import Table, tabulate
 from pipeline.models.domain import Domain, domain_of
-from pipeline.models.gauss_nodes.model import GaussNodes
-from pipeline.models.gauss_nodes.options import GaussNodesOptions
 from pipeline.models.method import CHUNK, Batch
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
@@ -84,7 +80,7 @@ class SelvageNetwork(nn.Module):
             self._measure(fabrics)
 
     def forward(self, features: Tensor, components: Tensor, bounds: Tensor) -> Tensor:
-        """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) that the sums give."""
+        """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) of the soft nodes."""
         x = (features - self.mean) * self.scale
         for layer in self.hidden:
             x = functional.leaky_relu(layer(x), _SLOPE)
@@ -109,7 +105,7 @@ class SelvageNetwork(nn.Module):
         return loss
 
     def start_at(self, target: Tensor) -> None:
-        """Change nothing: the network starts at the sums."""
+        """Change nothing: the network starts at the soft nodes."""
 
     def schedule(self, progress: float) -> None:
         """Change nothing over the training."""
@@ -152,18 +148,16 @@ class Selvage:
     network : SelvageNetwork
         Trained weights.
     domain : Domain, optional
-        What it was taught; anything that the sums know if left out.
+        Range of its training; any query of the soft nodes if left out.
     """
 
     untaught: ClassVar[frozenset[str]] = frozenset({"stretch"})
-    """Kinds of queries that it knows without training: what an ellipse weighs is the sums' business."""
+    """Kinds of queries that need no training: the soft nodes weigh an ellipse."""
 
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self.bound = network.options.bound
         self._network = network.eval()
-        nodes = network.options.narrow_nodes
-        self._rule = GaussNodes(nodes, GaussNodesOptions()) if nodes else None
         self._cloths = PerFabric(self._tabulate)
         # Transposed weights; the normalisation folds into the first layer.
         layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
@@ -176,44 +170,25 @@ class Selvage:
         self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: any fabric can be tabulated."""
+        """Return True: any fabric can be tabulated."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric, once."""
         self._cloths.of(fabric)
-        if self._rule:
-            self._rule.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries outside its training."""
         self._refuse(queries)
-        if self._rule is None:
-            return self._corrected(fabric, queries)
-        share = self._share(queries)
-        by_network, by_rule = (np.flatnonzero(rows) for rows in (share[:, 0] > 0.0, share[:, 0] < 1.0))
-        result = np.zeros((len(share), 4), np.float32)
-        if by_network.size:
-            result[by_network] = self._corrected(fabric, queries.take(by_network))
-        if by_rule.size:
-            narrow = self._rule.predict(fabric, queries.take(by_rule))
-            result[by_rule] = share[by_rule] * result[by_rule] + (1.0 - share[by_rule]) * narrow
-        return result
+        return self._corrected(fabric, queries)
 
     def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return the network; sums and rule are read before it, and the bias of the fabric is its constant."""
+        """Return the network; the soft nodes are summed before it, and the bias of the fabric is its constant."""
         table, bias = self._cloths.of(fabric)
 
         def inputs(queries: Queries) -> Columns:
             features, components, bounds = read_queries(table, queries)
-            read = (np.ascontiguousarray(features[:, :OF_QUERY]), components, bounds)
-            if self._rule is None:
-                return read
-            share, narrow = self._share(queries).astype(np.float32), np.zeros_like(components)
-            by_rule = np.flatnonzero(share[:, 0] < 1.0)
-            if by_rule.size:
-                narrow[by_rule] = self._rule.predict(fabric, queries.take(by_rule))
-            return (*read, share, narrow)
+            return np.ascontiguousarray(features[:, :OF_QUERY]), components, bounds
 
         return PerQuery(self._refuse, inputs, self._answering, (bias,))
 
@@ -223,22 +198,13 @@ class Selvage:
         other.bound, other.setting = bound, "bounded" if bound else "unbounded"
         return other
 
-    def _components(self, *given: Tensor) -> Tensor:
-        """Answer from features, components and bounds, share and answers of the rule if there is one, and the bias."""
-        features, components, bounds, *by_rule, bias = given
+    def _components(self, features: Tensor, components: Tensor, bounds: Tensor, bias: Tensor) -> Tensor:
+        """Answer from features, components and bounds of the soft nodes, and the bias of the fabric."""
         x = torch.addmm(bias, features, self._of_query)
         for weight, shift in self._others:
             x = torch.addmm(shift, functional.leaky_relu(x, _SLOPE), weight)
         answer = _LARGEST * torch.sigmoid(x.float()) * components
-        if self.bound:
-            answer = torch.minimum(answer, bounds)
-        return torch.lerp(by_rule[1], answer, by_rule[0]) if by_rule else answer
-
-    def _share(self, queries: Queries) -> npt.NDArray[np.floating]:
-        """Return how much of each answer is the network's, (N, 1)."""
-        low, high = self._network.options.seam
-        place = (np.sqrt(queries.sigma * queries.sigma_minor) - low) / (high - low)
-        return np.asarray(np.clip(place, 0.0, 1.0)[:, None])
+        return torch.minimum(answer, bounds) if self.bound else answer
 
     def _refuse(self, queries: Queries) -> None:
         if self.domain is not None:
@@ -246,7 +212,7 @@ class Selvage:
         refuse_other(queries, self.name, stretch=True)
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
-        """Answer by the sums and the network."""
+        """Answer by the soft nodes and the network."""
         table, bias = self._cloths.of(fabric)
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
@@ -264,10 +230,7 @@ class Selvage:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table and of the network."""
-        rule = self._rule.bytes_stored(fabric) if self._rule else 0
-        return (
-            rule + self._cloths.of(fabric)[0].nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
-        )
+        return self._cloths.of(fabric)[0].nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
 
     def _tabulate(self, fabric: Fabric) -> tuple[Table, Tensor]:
         """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
@@ -281,7 +244,7 @@ def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
 
 
 def restore(options: SelvageOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Selvage]:
-    """Return the method that a trained network is."""
+    """Return the method of a trained network."""
     methods = []
     for card, weights in trained:
         network = SelvageNetwork(options)

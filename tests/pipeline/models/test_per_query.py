@@ -42,7 +42,6 @@ METHODS = {
     "btf_autoencoder": lambda: BtfAutoencoder("btf", {OPTICS: UnifiedBtf(UnifiedBtfNetwork(SMALL_BTF))}),
     "selvage": corrected,
     "selvage, unbounded": lambda: corrected().with_bound(False),
-    "selvage, with a rule": lambda: corrected(narrow_nodes=4),
 }
 
 

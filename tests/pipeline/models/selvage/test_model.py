@@ -5,8 +5,6 @@ import torch
 from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.domain import Domain
-from pipeline.models.gauss_nodes.model import restore as restore_quadrature
-from pipeline.models.gauss_nodes.options import GaussNodesOptions
 from pipeline.models.method import Batch, Method
 from pipeline.models.registry import module_of
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
@@ -151,25 +149,6 @@ def test_it_refuses_what_it_was_not_taught(fabrics):
         # Without a domain it still knows no more than the sums do.
         with pytest.raises(BadInput, match="selvage"):
             Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
-
-
-def test_small_footprints_can_be_left_to_a_rule_without_a_seam(fabrics):
-    """Below the seam the rule's own answers, above it the network's, and no jump at either end."""
-    options = SMALL.model_copy(update={"narrow_nodes": 6, "seam": (0.2, 0.3)})
-    method, plain = Selvage(SelvageNetwork(options)), Selvage(SelvageNetwork(SMALL))
-    fabric = fabrics[0]
-    (rule,) = restore_quadrature(GaussNodesOptions(nodes=[6]), [])
-    asked = draw_queries(QueryOptions(max_angle=70.0), fabric.weave.repeat, 1, 0, 64)
-
-    def at(sigma, method):
-        size = np.full(64, sigma, np.float32)
-        return method.predict(fabric, asked._replace(sigma=size, sigma_minor=size))
-
-    np.testing.assert_allclose(at(0.1, method), at(0.1, rule), rtol=1e-5, atol=1e-7)
-    np.testing.assert_allclose(at(0.5, method), at(0.5, plain), rtol=1e-5, atol=1e-7)
-    for edge, one in ((0.2, rule), (0.3, plain)):
-        np.testing.assert_allclose(at(edge, method), at(edge, one), rtol=2e-3, atol=1e-4)
-    assert method.bytes_stored(fabric) > plain.bytes_stored(fabric)
 
 
 def test_a_network_told_to_shine_is_bounded(fabrics):
