@@ -1,7 +1,7 @@
-"""The command line: one verb a stage, in the order of work.
+"""Command line of twillight: the verbs in the order of work.
 
-Whatever goes wrong is one sentence: exit code 2 for input that cannot be used, 1 for work that failed, 130 for Ctrl-C.
-Verbs import what they need when they run, so that help is instant.
+Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C. A verb's
+modules are imported when it runs, so that help is fast.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from weaves.errors import BadInput, WorkFailed
 app = App(
     name="twillight",
     help="Woven cloth at every scale, from a weave draft to the light it returns: "
-    "ground truth, neural models, and a table of what each way of rendering costs and gets wrong.",
+    "ground truth, neural models, and a benchmark of their errors and times.",
     version_flags=(),
     suppress_keyboard_interrupt=False,
     group_commands="Verbs, in the order of work",
@@ -33,25 +33,18 @@ app = App(
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
 Out = Annotated[Path, Parameter(help="Folder of all products.")]
-Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; without one, this machine works.")]
-Workers = Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one a core.")]
+Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; default: this machine.")]
+Workers = Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")]
 
 OUT = Path("out")
 
 
 @app.command(name="list", sort_key=0)
 def list_() -> None:
-    """List the fabrics and the recipes that come with the package."""
-    from rich.console import Console
+    """List the fabrics and the recipes of the package."""
+    from jobs.verbs.list import print_lists
 
-    from jobs.recipe.load import load_recipe, recipe_names
-    from jobs.verbs.tables import fabrics_table, recipes_table
-    from weaves.fabric import load_fabric, preset_names
-
-    console = Console()
-    console.print(fabrics_table([load_fabric(name) for name in preset_names()]))
-    console.print()
-    console.print(recipes_table([load_recipe(name) for name in recipe_names()]))
+    print_lists()
 
 
 @app.command(sort_key=1)
@@ -61,18 +54,9 @@ def show(
     out: Annotated[Path | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
 ) -> None:
     """Show a fabric: its drawdown and its yarns."""
-    from rich.console import Console
+    from jobs.verbs.show import show as print_fabric
 
-    from jobs.verbs.tables import fabric_page
-    from weaves.fabric import load_fabric
-
-    cloth = load_fabric(fabric)
-    console = Console()
-    console.print(fabric_page(cloth))
-    if out is not None:
-        from jobs.verbs.show import write_pictures
-
-        console.print(*write_pictures(cloth, out), sep="\n", soft_wrap=True)
+    print_fabric(fabric, out)
 
 
 @app.command(sort_key=2)
@@ -83,7 +67,7 @@ def export(
     vertices: Annotated[int, Parameter(help="Steps across a yarn, and along it in every cell.")] = 64,
     repeats: Annotated[int, Parameter(help="Copies of the repeat in each direction.")] = 1,
 ) -> None:
-    """Write a fabric's surface as triangles with the colours of its yarns, for any 3D program."""
+    """Write a fabric's surface as a coloured triangle mesh, for any 3D program."""
     from rich.console import Console
 
     from jobs.verbs.export import write_mesh
@@ -96,13 +80,9 @@ def export(
 @app.command(sort_key=3)
 def plan(recipe: RecipeName) -> None:
     """Show the tasks of a recipe with their rows, bytes and estimated time; nothing is computed."""
-    from rich.console import Console
+    from jobs.verbs.plan import print_plan
 
-    from jobs.plan.plan import plan as tasks_of
-    from jobs.recipe.load import load_recipe
-    from jobs.verbs.tables import plan_table
-
-    Console().print(plan_table(tasks_of(load_recipe(recipe))))
+    print_plan(recipe)
 
 
 @app.command(sort_key=4)
@@ -116,23 +96,23 @@ def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", w
 @app.command(sort_key=5)
 def evaluate(
     fabric: FabricName,
-    queries: Annotated[Path, Parameter(help="Parquet file of questions, in the columns of a shard.")],
+    queries: Annotated[Path, Parameter(help="Parquet file of queries, with the columns of a shard.")],
     *,
     out: Annotated[Path, Parameter(help="Parquet file to write.")],
-    model: Annotated[str | None, Parameter(help="Ask a trained model, by name or folder, not the truth.")] = None,
-    extrapolate: Annotated[bool, Parameter(help="Ask it about yarns unlike those it was trained on, too.")] = False,
-    estimator: Annotated[str | None, Parameter(help="How a value is computed: auto, table, owen, mc, …")] = None,
-    relative_error: Annotated[float | None, Parameter(help="Error to stop at, as a share of the value.")] = None,
-    absolute_error: Annotated[float | None, Parameter(help="Or to stop at in 1/sr, for dark rows.")] = None,
-    max_count: Annotated[int | None, Parameter(help="Points after which a row is given up on, a power of 2.")] = None,
+    model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
+    extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
+    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, quadrature, owen, mc, …")] = None,
+    relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None,
+    absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None,
+    max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None,
     footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None,
-    frame: Annotated[str | None, Parameter(help="Cosines inside the yarns: ply or macro.")] = None,
-    normaliser: Annotated[str | None, Parameter(help="Denominator: visible or projected.")] = None,
-    seed: Annotated[int, Parameter(help="Name of the random numbers.")] = 0,
-    workers: Annotated[int, Parameter(help="Threads that answer; 0: one a core.")] = 0,
-    skip_bad: Annotated[bool, Parameter(help="List rows without an answer, instead of stopping at them.")] = False,
+    frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None,
+    normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None,
+    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
+    workers: Annotated[int, Parameter(help="Threads; 0: one per core.")] = 0,
+    skip_bad: Annotated[bool, Parameter(help="List rows that cannot be evaluated, and continue.")] = False,
 ) -> None:
-    """Answer any list of questions about a fabric: the file's rows with their answers."""
+    """Evaluate a file of queries on a fabric: its rows with the BSDF values."""
     from jobs.verbs.evaluate import evaluate as answer
     from jobs.verbs.evaluate import truth_options
     from weaves.fabric import load_fabric
@@ -148,9 +128,9 @@ def evaluate(
     }
     options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
     if model is not None:
-        from jobs.verbs.answerer import answerer, refuse_options_of_the_truth
+        from jobs.verbs.evaluate_model import answerer, refuse_truth_options
 
-        refuse_options_of_the_truth(chosen | {"seed": seed or None, "workers": workers or None})
+        refuse_truth_options(chosen | {"seed": seed or None, "workers": workers or None})
         other = answerer(model, cloth, extrapolate)
     answer(cloth, queries, out, options, seed, workers, skip_bad, other)
 
@@ -159,7 +139,7 @@ def evaluate(
 def check(
     subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")], *, out: Out = OUT
 ) -> int:
-    """Read every finished shard again, or test a fabric's ground truth against the laws of physics."""
+    """Check the finished shards of a data set, or the ground truth of a fabric against physical invariants."""
     from jobs.verbs.check import check_dataset, check_fabric, resolve
     from weaves.fabric import Fabric
 
@@ -169,7 +149,7 @@ def check(
         return 0
     faults = check_dataset(found)
     for fault in faults:
-        _tell(fault)
+        _print_error(fault)
     return BadInput.exit_code if faults else 0
 
 
@@ -186,7 +166,8 @@ def bench(
     recipe: Annotated[
         str,
         Parameter(
-            help="Recipe; or `stability`: rounding at the extremes; `truth`: its errors; `sampler`: what it saves."
+            help="Recipe, or a measurement of the truth: `stability` (rounding), `truth` (speed and errors), "
+            "`sampler` (variance saved)."
         ),
     ],
     *,
@@ -194,7 +175,7 @@ def bench(
     scheduler: Scheduler = "",
     workers: Workers = 0,
 ) -> None:
-    """Measure error, aliasing and time of every method, or how stable, fast and accurate the truth itself is."""
+    """Measure error, aliasing and time of every method, or stability, speed and accuracy of the truth."""
     from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
@@ -207,7 +188,7 @@ def bench(
 
 @app.command(sort_key=9)
 def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
-    """Write the page: pictures, tables and plots of everything measured."""
+    """Write the page: pictures, tables and plots of all measurements."""
     from jobs.verbs.run import work
 
     work(recipe, ["report"], out, scheduler, workers)
@@ -215,7 +196,7 @@ def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", wor
 
 @app.command(sort_key=10)
 def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
-    """Generate, train, bench and report, skipping what is done."""
+    """Generate, train, bench and report; finished tasks are skipped."""
     from jobs.plan.task import STAGES
     from jobs.verbs.run import work
 
@@ -224,27 +205,21 @@ def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", worker
 
 @app.command(sort_key=11)
 def status(recipe: RecipeName, *, out: Out = OUT) -> None:
-    """Show what is done, what failed and why, and what is missing."""
-    from rich.console import Console
+    """Show which tasks are done, failed (with the reason) or missing."""
+    from jobs.verbs.status import print_status
 
-    from jobs.plan.plan import plan as tasks_of
-    from jobs.recipe.load import load_recipe
-    from jobs.run.ledger import Ledger
-    from jobs.verbs.bench import measured_alone
-    from jobs.verbs.tables import status_table
-
-    Console().print(status_table(tasks_of(load_recipe(recipe), measured_alone(out)), Ledger(out)))
+    print_status(recipe, out)
 
 
 @app.command(sort_key=12)
 def compare(
     a: Annotated[Path, Parameter(help="Folder of products, folder of a page, or file of Records.")],
-    b: Annotated[Path, Parameter(help="Another one: the table says what B is, held against A.")],
+    b: Annotated[Path, Parameter(help="Another one; the table shows B relative to A.")],
     *,
-    recipe: Annotated[str, Parameter(help="Name of the recipe, where a folder of products has several pages.")] = "",
-    other_machine: Annotated[bool, Parameter(help="Compare measurements of different machines, too.")] = False,
+    recipe: Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")] = "",
+    other_machine: Annotated[bool, Parameter(help="Allow measurements of different machines.")] = False,
 ) -> None:
-    """Compare two benchmarks and mark which differences are real."""
+    """Compare two benchmarks and mark significant differences."""
     from jobs.verbs.compare import compare as compared
 
     compared(a, b, recipe, other_machine)
@@ -254,19 +229,17 @@ def compare(
 def require(
     scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
     *,
-    error: Annotated[float, Parameter(help="Largest relative RMSE of the colour: .05 is 5 %.")] = float("inf"),
+    error: Annotated[float, Parameter(help="Largest relative RMSE of the colour; .05 is 5 %.")] = float("inf"),
     time: Annotated[float, Parameter(help="Longest time of a frame on one thread, in milliseconds.")] = float("inf"),
-    recipe: Annotated[str, Parameter(help="General recipe whose page holds the measurements.")] = "quick",
-    frames: Annotated[int, Parameter(help="Frames of the camera's way to look at.")] = 4,
-    margin: Annotated[float, Parameter(help="Factor by which ranges are widened.")] = 1.25,
-    method: Annotated[str, Parameter(help="Method of the general recipe; left out: the cheapest.")] = "",
-    effort: Annotated[float, Parameter(help="Share of its rows a fabric and of its steps to learn from.")] = 0.25,
-    set_: Annotated[
-        list[str], Parameter(name="--set", help="Option of the method that is other than there: hidden=64.")
-    ] = [],  # noqa: B006
+    recipe: Annotated[str, Parameter(help="General recipe with a finished page.")] = "quick",
+    frames: Annotated[int, Parameter(help="Frames of the camera path that are analysed.")] = 4,
+    margin: Annotated[float, Parameter(help="Factor by which the ranges of queries are widened.")] = 1.25,
+    method: Annotated[str, Parameter(help="Method of the general recipe; default: the cheapest.")] = "",
+    effort: Annotated[float, Parameter(help="Share of its rows per fabric and of its training steps.")] = 0.25,
+    set_: Annotated[list[str], Parameter(name="--set", help="Changed option of the method, such as hidden=64.")] = [],  # noqa: B006
     out: Out = OUT,
 ) -> None:
-    """Tell what a scene requires and write the cheapest recipe that meets a wish."""
+    """Analyse the queries of a scene and write the cheapest recipe that meets an error or a time."""
     from jobs.verbs.require import require as required
 
     required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
@@ -275,11 +248,11 @@ def require(
 @app.command(sort_key=14)
 def savings(
     recipe: RecipeName,
-    scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, have run.")],
+    scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, are finished.")],
     *,
     out: Out = OUT,
 ) -> None:
-    """Tell what scenes' own recipes saved against the general one, and at which error."""
+    """Compare scenes' own recipes with the general one: time and rows saved, and errors."""
     from jobs.verbs.savings import savings as saved
 
     saved(scenes, out, recipe)
@@ -311,9 +284,9 @@ def main(tokens: Sequence[str] | None = None) -> int:
     except (BadInput, WorkFailed) as error:
         return _end(str(error), error.exit_code)
     except KeyboardInterrupt as stop:
-        return _end(str(stop) or "stopped; what was finished is kept, and the same command goes on from there", 130)
+        return _end(str(stop) or "stopped; finished work is kept, and the same command continues", 130)
     except BrokenPipeError:
-        # Whoever read the output has seen enough, such as `head`.
+        # The reader of the output has closed it, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -322,11 +295,11 @@ def main(tokens: Sequence[str] | None = None) -> int:
 
 
 def _end(sentence: str, code: int) -> int:
-    _tell(sentence)
+    _print_error(sentence)
     return code
 
 
-def _tell(sentence: str) -> None:
+def _print_error(sentence: str) -> None:
     print(sentence, file=sys.stderr, flush=True)
 
 

@@ -1,1 +1,1 @@
-"""What the cloth is: drafts, yarns, fabrics and the geometry of their repeat."""
+"""Woven cloth: drafts, yarns, fabrics and the geometry of their repeat; no light."""

@@ -1,6 +1,6 @@
-"""Colours of yarns: written as linear RGB, as sRGB hex, or as a reflectance spectrum; used as linear sRGB.
+"""Colours of yarns in linear sRGB, read from RGB, sRGB hex or a reflectance spectrum.
 
-And of pictures: sRGB encoding, and how far apart an eye sees two colours.
+Also for pictures: the sRGB encoding and the colour difference CIEDE2000.
 
 The conversions are those of colour-science, imported only when a colour is not already linear RGB. Spectra are seen by
 the CIE 1931 2° observer under D65, and colours outside the sRGB gamut are clipped to it.
@@ -28,7 +28,7 @@ LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
 
 
 class Spectrum(BaseModel):
-    """A reflectance spectrum: straight lines between the samples, constant beyond them."""
+    """A reflectance spectrum: linear between the samples, constant beyond them."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
@@ -56,7 +56,7 @@ def _hex(value: str) -> str:
 
 
 def _notation(value: Any) -> str | None:
-    """Tell which of the three notations is meant; None if it is none of them."""
+    """Return which of the three notations a value uses; None if none."""
     if isinstance(value, str):
         return "hex"
     if isinstance(value, Spectrum | Mapping):

@@ -1,4 +1,4 @@
-"""Drafts: which yarn lies on top at every crossing, one repeat of it.
+"""Drafts: the yarn on top at every crossing of one repeat.
 
 `warp_over[pick, end]` is True where the warp covers the weft. End i covers x in [i, i + 1), pick j covers y in
 [j, j + 1): pick 0 is the lowest row of a drawn draft, so drawings (rows of text) list the picks from the last to the
@@ -33,7 +33,7 @@ class Draft:
     warp_over : bool (picks, ends)
         True where the warp is on top; copied and made read-only.
     name : str
-        As the weaver says it: ``"twill 3/1"``. Equality ignores it.
+        In weavers' terms, such as ``"twill 3/1"``. Equality ignores it.
 
     Raises
     ------
@@ -85,14 +85,14 @@ class Draft:
         treadling: Sequence[int],
         name: str = "loom",
     ) -> Draft:
-        """Weave what a loom weaves: pick j raises the shafts tied to its treadle, end i rises with its shaft.
+        """Weave a loom plan: pick j raises the shafts tied to its treadle, end i rises with its shaft.
 
         Parameters
         ----------
         threading : ints (ends,)
             Shaft of each end, from 1.
         tie_up : bools (treadles, shafts)
-            Which shafts each treadle lifts.
+            Shafts that each treadle lifts.
         treadling : ints (picks,)
             Treadle of each pick, from 1.
 
@@ -103,7 +103,7 @@ class Draft:
         """
         shafts = len(tie_up[0]) if tie_up else 0
         if not shafts or any(len(treadle) != shafts for treadle in tie_up):
-            raise BadInput(name, "tie_up", tie_up, "one row a treadle is needed, all with one entry a shaft")
+            raise BadInput(name, "tie_up", tie_up, "one row per treadle is needed, all with one entry per shaft")
         for key, chosen, most in (("threading", threading, shafts), ("treadling", treadling, len(tie_up))):
             if not chosen or not all(1 <= number <= most for number in chosen):
                 raise BadInput(name, key, list(chosen), f"numbers from 1 to {most} are needed")
@@ -115,11 +115,11 @@ class Draft:
         return Draft(~self.warp_over[:, ::-1], f"{self.name}, back")
 
     def rolled(self, ends: int, picks: int) -> Draft:
-        """Return the same cloth, its repeat begun `ends` further left and `picks` further down."""
+        """Return this cloth with the repeat shifted by `ends` to the left and `picks` down."""
         return Draft(np.roll(self.warp_over, (picks, ends), axis=(0, 1)), self.name)
 
     def tiled(self, repeats: int) -> Draft:
-        """Return so many repeats of the cloth in each direction as one; BadInput if that is too large."""
+        """Return several repeats in each direction as one; BadInput if that is too large."""
         return Draft(np.tile(self.warp_over, (repeats, repeats)), f"{self.name}, {repeats} x {repeats} repeats")
 
     def rows(self) -> list[str]:
@@ -131,7 +131,7 @@ class Draft:
         return "\n".join(row.replace("#", "██").replace(".", "· ") for row in self.rows())
 
     def canonical(self) -> tuple[tuple[int, int], bytes]:
-        """Return what all shifts and mirror images of this cloth have in common, and no other cloth."""
+        """Return a form that is equal for all shifts and mirror images of this cloth, and for no other cloth."""
         matrix = _smallest_repeat(self.warp_over)
         picks, ends = matrix.shape
         images = (matrix, matrix[::-1], matrix[:, ::-1], matrix[::-1, ::-1])
@@ -198,7 +198,7 @@ def _smallest_repeat(matrix: Bools) -> Bools:
 
 
 class Family(BaseModel):
-    """What a fabric file says of its draft; every weave family is one subclass, chosen by the word `family`."""
+    """Draft of a fabric file; each weave family is a subclass, chosen by the key `family`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -217,7 +217,7 @@ class Matrix(Family):
 
     family: Literal["matrix"] = "matrix"
     rows: tuple[str, ...] = Field(min_length=1, max_length=LARGEST_REPEAT)
-    """The drawdown as it is seen, last pick first: # for warp over, . for weft over."""
+    """The drawdown, last pick first: # for warp over, . for weft over."""
 
     def build(self) -> Draft:
         """Weave the drawn draft."""
@@ -231,7 +231,7 @@ class Loom(Family):
     threading: tuple[StrictInt, ...]
     """Shaft of each end, from 1."""
     tie_up: tuple[tuple[StrictBool | StrictInt, ...], ...]
-    """One row a treadle: which shafts it lifts (1 or 0)."""
+    """One row per treadle: 1 for each shaft that it lifts, else 0."""
     treadling: tuple[StrictInt, ...]
     """Treadle of each pick, from 1."""
 

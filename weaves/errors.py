@@ -1,7 +1,6 @@
-"""The two ways a run can end badly: input that cannot be used, and work that failed.
+"""Errors for the user: bad input, and work that failed.
 
-Both carry one sentence meant for the person at the terminal; the command line prints it without a traceback and exits
-with `exit_code`.
+Each carries one sentence. The command line prints it without a traceback and exits with `exit_code`.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
     key : str
         Dotted path of the key; empty when the whole file is meant.
     value : object
-        What was found there.
+        The value found.
     allowed : str
-        What would have been accepted, as the end of a sentence.
+        What is allowed, as the end of a sentence.
     """
 
     exit_code = 2
@@ -40,7 +39,7 @@ class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
 
 
 class WorkFailed(RuntimeError):  # noqa: N818 - the name reads as the sentence does
-    """Work that could not be finished though its input was fine; exit code 1."""
+    """Work that failed on valid input; exit code 1."""
 
     exit_code = 1
 
@@ -51,21 +50,21 @@ def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
     Parameters
     ----------
     word : str
-        What was found.
+        The name found.
     known : iterable of str
-        What would have been accepted.
+        Names that are allowed.
     kind : str
         Kind of the name in `weaves.renamed`; empty if names of this kind never changed.
 
     Returns
     -------
     str
-        ``"did you mean 'x'? known: a, b, x"``, without the question when nothing is near; for a name of an earlier
+        ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near; for a name of an earlier
         version ``"'old' is now 'x'"``.
     """
     names = sorted(known)
     if new := replacement(kind, word):
         return new
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
-    question = f"did you mean {close[0]!r}? " if close else ""
-    return f"{question}known: {', '.join(names)}"
+    suggestion = f"did you mean {close[0]!r}? " if close else ""
+    return f"{suggestion}known: {', '.join(names)}"

@@ -46,9 +46,9 @@ class Fabric(BaseModel):
     name: Annotated[str, AfterValidator(_file_name)]
     """Letters, digits, - and _: it becomes part of file names."""
     source: str = Field(default="", max_length=2000)
-    """Where the numbers come from."""
+    """Source of the numbers."""
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
-    """T of the yarn layer."""
+    """Optical thickness T of the yarn layer."""
     draft: Weave
     """The weave family and its numbers."""
     warp: Yarn
@@ -62,9 +62,9 @@ class Fabric(BaseModel):
         return _woven(self.draft)
 
     def optics(self) -> dict[str, Any]:
-        """Return all that shapes the four components, and nothing else: no name, source or colour.
+        """Return the parameters that the four components depend on: no name, source or colour.
 
-        Two fabrics with equal optics have the same ground truth, so this is what fingerprints take.
+        Two fabrics with equal optics have the same ground truth, so fingerprints use it.
         """
         return {
             "draft": self.weave.rows(),

@@ -19,7 +19,7 @@ from weaves.fabric import Fabric
 from weaves.surface import WARP, WEFT, Floats, surface_at
 
 INSIDE: Final = 1e-12
-"""How far inside a piece its border is looked at, where it is sure to be seen."""
+"""Distance inside a piece at which its border is sampled, so that it is on top there."""
 STEP: Final = 1e-6
 """Pieces whose heights differ by less than this meet without a wall, in yarn spacings."""
 
@@ -43,12 +43,12 @@ class Mesh(NamedTuple):
 
 
 class RepeatMesh(NamedTuple):
-    """Meshes of a cloth that together have one point, or in gaps none, above every point of the plane.
+    """Meshes of a cloth; together they have one point above every point of the plane, none in gaps.
 
     Attributes
     ----------
     warp, weft : Mesh
-        What is seen of each yarn from above.
+        Parts of each yarn that are visible from above.
     walls : Mesh
         The steps between them; those at x = 0 and y = 0 are in it, those at the far borders belong to the next repeat.
     """
@@ -59,7 +59,7 @@ class RepeatMesh(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """The same rectangle in some of the cells: places of its vertices from the cell's corner, heights (n, y, x)."""
+    """One rectangle in several cells: places of its vertices from the cell's corner, heights (n, y, x)."""
 
     family: int
     pick: npt.NDArray[np.intp]
@@ -77,7 +77,8 @@ def repeat_mesh(fabric: Fabric, vertices_per_cell: int = 64, repeats: tuple[int,
     fabric : Fabric
         The cloth.
     vertices_per_cell : int
-        Steps across a yarn, and along it in every cell; >= 2. Heights between vertices err as its inverse square.
+        Steps across a yarn, and along it in every cell; >= 2. The error of heights between vertices falls as its
+        inverse square.
     repeats : two ints
         Copies along x and along y, >= 1.
 
@@ -99,7 +100,7 @@ def repeat_mesh(fabric: Fabric, vertices_per_cell: int = 64, repeats: tuple[int,
 
 
 def _pieces(fabric: Fabric, steps: int) -> list[_Piece]:
-    """Cut the cells into rectangles and look at their vertices."""
+    """Cut the cells into rectangles and compute their vertices."""
     sine = np.sin(np.linspace(-np.pi / 2, np.pi / 2, steps + 1))
     along = np.linspace(0.0, 1.0, steps + 1)
     radius = (fabric.warp.width / 2, fabric.weft.width / 2)
@@ -193,7 +194,7 @@ def _steps(border: float, grid: Floats, left: Floats, right: Floats) -> Mesh:
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Put meshes into one."""
+    """Join meshes."""
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = [np.empty((0, 3)), *(mesh.vertices for mesh in meshes)]
     faces = [np.empty((0, 3), np.int64), *(mesh.faces + s for mesh, s in zip(meshes, start[:-1], strict=True))]

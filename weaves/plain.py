@@ -1,4 +1,4 @@
-"""Plain weave and its kin: neighbours are always on opposite sides.
+"""Plain, rib and basket weaves: neighbouring yarns or groups are on opposite sides.
 
 A plain weave alternates yarn by yarn; a rib moves groups of yarns together in one direction, a basket weave in both.
 """

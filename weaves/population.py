@@ -1,4 +1,4 @@
-"""Random fabrics: many drafts and yarns for a network to learn cloth from, instead of a few cloths by heart.
+"""Random fabrics: many drafts and yarns to train a general network on.
 
 Fabric i of a population is a function of the seed and i alone, so a larger population begins with the smaller one. The
 default ranges of roughness and relief are those of a published generator, quoted as stand-ins for the unknown ones of
@@ -49,7 +49,7 @@ Roughness = Annotated[Range, AfterValidator(_range_of("roughness"))]
 
 
 class Ranges(BaseModel):
-    """From where the numbers of the two yarns are drawn, each yarn for itself; [lowest, highest]."""
+    """Ranges [lowest, highest] of the parameters of the yarns, drawn for each yarn separately."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -64,7 +64,7 @@ class Ranges(BaseModel):
     bend: Annotated[Range, AfterValidator(_range_of("bend"))] = (10.0, 50.0)
     """Largest inclination, degrees."""
     twist: Annotated[Range, AfterValidator(_range_of("twist"))] = (0.0, 0.0)
-    """Fibre angle, degrees; one number for both yarns, as a mill spins them alike."""
+    """Fibre angle, degrees; one value for both yarns, which a mill spins alike."""
 
 
 class Population(BaseModel):
@@ -75,13 +75,13 @@ class Population(BaseModel):
     count: StrictInt = Field(default=0, ge=0, le=100_000)
     """Number of fabrics."""
     seed: StrictInt = Field(default=0, ge=0, lt=2**63)
-    """Which fabrics."""
+    """Seed of the fabrics."""
     families: tuple[FamilyName, ...] = Field(
         default=("plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"), min_length=1
     )
     """Weave families, equally likely; write one twice to double its share."""
     solid: float = Field(default=0.0, ge=0, le=1)
-    """Share of the fabrics whose yarns are as wide as their spacing, whatever the ranges say."""
+    """Share of the fabrics whose yarns are as wide as their spacing, in place of the drawn width."""
     exclude: tuple[str, ...] = ()
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
     plain: Ranges = Ranges()
@@ -101,7 +101,7 @@ class Population(BaseModel):
                 near = get_close_matches(name, known, n=3) or ["plain", "twill 4/4", "satin 8/3"]
                 raise BadInput("population", "exclude", name, f"drafts of a population are called {', '.join(near)} …")
         if not _allowed(self.families, self.exclude):
-            raise BadInput("population", "exclude", list(self.exclude), "at least one draft must be left")
+            raise BadInput("population", "exclude", list(self.exclude), "at least one draft must remain")
         return self
 
 

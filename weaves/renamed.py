@@ -30,11 +30,11 @@ REMOVED: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
         KEY: {},
     }
 )
-"""What to use instead of names that have no successor, by kind and old name."""
+"""Alternatives to names without a successor, by kind and old name."""
 
 
 def replacement(kind: str, name: object) -> str:
-    """Return the sentence that says what replaces a name of an earlier version; empty for any other name."""
+    """Return the sentence that names the replacement of an old name; empty for any other name."""
     if not isinstance(name, str):
         return ""
     if new := RENAMED.get(kind, {}).get(name):

@@ -1,4 +1,6 @@
-"""The surface of a woven repeat: yarn, height, normal and fibre tangent at any point. The oracle of all other code.
+"""Surface of a woven repeat: yarn, height, normal and fibre tangent at any point.
+
+The reference for the tests of all faster versions.
 
 Every float is a piece of a torus after [Irawan2012Woven], which makes the cloth a true height field. In the frame of
 the float (x across the yarn, y along it, from its centre), with r = w/2, R = L/(2 sin u_max), k = 1/R:
@@ -33,7 +35,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Surface(NamedTuple):
-    """What lies at the asked points, all of one shape.
+    """Surface at given points; arrays of one shape.
 
     Attributes
     ----------
@@ -55,7 +57,7 @@ class Surface(NamedTuple):
 
 
 def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
-    """Look at the cloth from above.
+    """Evaluate the surface at points seen from above.
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
 
 
 def surface_maps(fabric: Fabric, texels_per_yarn: int) -> Surface:
-    """Look at the centres of the texels of one repeat.
+    """Evaluate the surface at the texel centres of one repeat.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ def surface_maps(fabric: Fabric, texels_per_yarn: int) -> Surface:
 def curvature(yarn: Yarn, length: npt.ArrayLike) -> Floats:
     """Return 1/R = 2 sin u_max / L of floats, and 0 for those drawn flat.
 
-    Flat is what never changes side, and what is too short for its width: w sin u_max >= L.
+    Flat floats never change side, or are too short for their width: w sin u_max >= L.
 
     Parameters
     ----------

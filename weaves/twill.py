@@ -27,7 +27,7 @@ def twill(over: Sequence[int], under: Sequence[int], direction: Direction = "rig
     over, under : ints
         Picks that an end passes over, then under, then over …; as many of one as of the other.
     direction : "right" or "left"
-        Where the diagonal rises to.
+        Side to which the diagonal rises.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class Twill(Family):
     under: Steps
     """Picks it then passes under."""
     direction: Direction = "right"
-    """Where the diagonal rises to."""
+    """Side to which the diagonal rises."""
 
     def build(self) -> Draft:
         """Weave it."""
@@ -138,7 +138,7 @@ class BrokenTwill(Family):
     under: Steps
     """Picks it then passes under."""
     direction: Direction = "right"
-    """Where the first half rises to."""
+    """Side to which the first half rises."""
 
     def build(self) -> Draft:
         """Weave it."""

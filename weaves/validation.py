@@ -1,7 +1,7 @@
-"""TOML files and option classes: whatever is wrong with them becomes one sentence.
+"""Reading and validation of TOML files: each error is one sentence.
 
-`read_toml` reads a file, `validated` builds a pydantic model from its content. Both raise `BadInput` and nothing else,
-so that fabrics and recipes complain in the same words: file, dotted key, value, what is allowed.
+`read_toml` reads a file, `validated` builds a pydantic model from its content. Both raise `BadInput` only; its sentence
+names file, dotted key, value and what is allowed.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
-    """Build `model` from `data`, or say what is wrong.
+    """Build `model` from `data`.
 
     Parameters
     ----------
     model : type of pydantic model
-        What the data should be.
+        Class of the result.
     data : mapping
-        As TOML gives it.
+        Content of the file.
     where : str
-        The file, for the sentence.
+        The file, for messages.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
 
 def bad_input(error: ValidationError, model: type[BaseModel], data: object, where: str) -> BadInput:
     """Turn a pydantic error into one sentence."""
-    # Unknown keys first: a misspelt key also makes its right name missing, and only the former tells what happened.
+    # Unknown keys first: a misspelt key also makes the right one missing, and the former message is more useful.
     errors = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
     first = errors[0]
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
@@ -97,7 +97,7 @@ def bad_input(error: ValidationError, model: type[BaseModel], data: object, wher
             allowed = first["msg"].removeprefix("Value error, ")
             cause = first.get("ctx", {}).get("error")
             if isinstance(cause, BadInput):
-                # A rule of the weave itself (such as the moves of a satin) names its own key below ours.
+                # A rule of the weave (such as the moves of a satin) names its own key below this one.
                 key, value, allowed = ".".join(filter(None, (key, cause.key))), cause.value, cause.allowed
     if not key:
         return BadInput(where, "", f"found {value!r}", allowed + more)
@@ -105,7 +105,7 @@ def bad_input(error: ValidationError, model: type[BaseModel], data: object, wher
 
 
 def _path(location: Sequence[int | str], data: object, *, keep_last: bool) -> list[str]:
-    """Keep of pydantic's location what is in the data: it also names the member of a union that it tried."""
+    """Return the part of pydantic's location that is in the data; it also contains names of union members."""
     path: list[str] = []
     for depth, step in enumerate(location):
         inside = range(len(data)) if isinstance(data, list | tuple) else data
@@ -130,7 +130,7 @@ def _fields_at(model: type[BaseModel], location: Sequence[int | str]) -> set[str
 
 
 def _models(field: Any) -> list[type[BaseModel]]:
-    """Return the models inside an annotation, however deep."""
+    """Return the models inside an annotation, at any depth."""
     annotation = getattr(field, "annotation", field)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
@@ -148,6 +148,6 @@ def _brief(value: object) -> object:
 
 
 def _clean(text: str) -> str:
-    """Keep a sentence on one line and within reason."""
+    """Return a text as one line of at most 200 characters."""
     line = "".join(letter if letter.isprintable() else "·" for letter in text)
     return line if len(line) <= 200 else f"{line[:200]}…"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import track
+from rich.table import Table
 
 from jobs.plan.dataset import folder_of, shards
 from jobs.recipe.load import load_recipe, recipe_names
+from jobs.verbs.console import table_of
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput, WorkFailed, nearest
@@ -83,7 +87,6 @@ def check_fabric(fabric: Fabric) -> None:
     WorkFailed
         If an invariant does not hold.
     """
-    from jobs.verbs.tables import invariants_table
     from pipeline.truth.checks.invariants import INVARIANTS
 
     console = Console(stderr=True)
@@ -93,3 +96,34 @@ def check_fabric(fabric: Fabric) -> None:
     Console().print(invariants_table(fabric.name, found))
     if broken := [item.name for item in found if item.status == "broken"]:
         raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(found)} invariants do not hold: {', '.join(broken)}")
+
+
+def invariants_table(name: str, found: Sequence[Any]) -> Table:
+    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.check_result.CheckResult`)."""
+    table = table_of("invariant", "value", "should be", "holds", "", right=("value",))
+    for item in found:
+        style = "bold red" if item.status == "broken" else ""
+        table.add_row(item.name, _measured(item), _should_be(item), _holds(item), item.note, style=style)
+    table.title, table.title_justify = name, "left"
+    return table
+
+
+def _measured(item: Any) -> str:
+    value = f"{item.measured:.4g}"
+    return f"{value} ± {item.standard_error:.1g}" if item.standard_error else value
+
+
+def _should_be(item: Any) -> str:
+    return "–" if item.relation == "reported" else f"{item.relation} {item.expected:g}"
+
+
+def _holds(item: Any) -> str:
+    inside = item.relation == "<=" and item.sigmas < -5
+    match item.status:
+        case "exact":
+            return "exactly"
+        case "statistics":
+            return f"by {-item.sigmas:.0f} σ" if inside else f"within statistics ({item.sigmas:+.1f} σ)"
+        case "broken":
+            return f"NO ({item.sigmas:+.1f} σ)" if item.standard_error else "NO"
+    return "a number only"

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
 
-from jobs.verbs.tables import evaluation_table
-from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file
+from jobs.verbs.console import number, table_of
+from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput, nearest
@@ -86,3 +87,21 @@ def evaluate(
         rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
         told = f"{rows} no answer; see {bad_list(out)}"
         Console().print(told, soft_wrap=True, highlight=False)
+
+
+def evaluation_table(summary: Summary) -> Table:
+    """Show what `twillight evaluate` did."""
+    answered = summary.rows - summary.bad
+    table = table_of("rows", "answered", "median relative error", "points a query", "queries a second")
+    for column in table.columns:
+        column.justify = "right"
+    table.add_row(
+        f"{summary.rows:,}",
+        f"{answered:,}",
+        "–"
+        if summary.median_relative_error != summary.median_relative_error
+        else f"{summary.median_relative_error:.2%}",
+        number(summary.points / answered) if answered and summary.points else "–",
+        number(answered / summary.seconds) if summary.seconds else "–",
+    )
+    return table

@@ -13,11 +13,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jobs.recipe.fallback_share import left_to_quadrature
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.verbs.compare import records_file
-from jobs.verbs.fallback_share import left_to_quadrature
-from jobs.verbs.narrow_recipe import EFFORT, savings, write_recipe
+from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
 from weaves.fabric import Fabric

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 
 from jobs.plan.dataset import shards
 from jobs.plan.plan import plan
-from jobs.plan.task import Stage, Task
+from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
@@ -18,7 +19,7 @@ from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.stages import run
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.tables import methods_table, summary_table
+from jobs.verbs.console import duration, number, table_of
 from weaves.errors import WorkFailed
 
 
@@ -76,3 +77,29 @@ def summary_of(records: Sequence[Path]) -> Any:
     from reports.tables.summary import summary_table as condensed
 
     return condensed(read_records(records))
+
+
+def summary_table(tasks: Sequence[Task], ran: Mapping[str, float]) -> Table:
+    """Show what a run did: tasks by stage, how many of them it did now, and the seconds of work in them."""
+    table = table_of("stage", "tasks", "done now", "work", right=("tasks", "done now", "work"))
+    stages: list[Stage] = [stage for stage in STAGES if any(task.stage == stage for task in tasks)]
+    for stage in stages:
+        ids = [task.id for task in tasks if task.stage == stage]
+        now = [ran[key] for key in ids if key in ran]
+        table.add_row(stage, str(len(ids)), str(len(now)), duration(sum(now)) if now else "")
+    return table
+
+
+def methods_table(frame: Any) -> Table:
+    """Show a benchmark condensed to one row a method (a DataFrame from `reports.tables.summary.summary_table`).
+
+    Bytes are left to the page, so that a line fits a terminal of 80 columns.
+    """
+    frame = frame.drop(columns="bytes", errors="ignore").rename(columns={"ns/query": "ns a query"})
+    names = list(frame.columns)
+    table = table_of("method", *names, right=names)
+    table.columns[0].no_wrap = True
+    table.padding = (0, 1, 0, 0)
+    for (method, setting), *values in frame.itertuples():
+        table.add_row(f"{method} {setting}".strip(), *(number(value) for value in values))
+    return table

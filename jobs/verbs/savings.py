@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from jobs.plan.plan import plan
 from jobs.plan.task import Task
+from jobs.recipe.fallback_share import left_to_quadrature
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.fallback_share import left_to_quadrature
-from jobs.verbs.narrow_recipe import alone
+from jobs.verbs.require_recipe import alone
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:

@@ -1,4 +1,7 @@
-"""The pictures that `twillight show --out` writes: drawdown, height and normals as PNG, the geometry's maps as EXR."""
+"""`twillight show`: a fabric's drawdown and yarns on the terminal, and its pictures.
+
+Pictures are drawdown, height and normals as PNG, and the maps of the geometry as EXR.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,28 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.text import Text
 
+from jobs.verbs.console import table_of
 from pipeline.atomic import atomic_write
 from reports.images import tiles
 from reports.images.exr import write_exr
-from weaves.fabric import Fabric
+from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, surface_maps
+from weaves.yarn import Yarn
 
 TEXELS_PER_YARN: Final = 64
+
+_UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"}
+
+
+def show(name: str, out: Path | None) -> None:
+    """Print a fabric, and write its pictures if a folder is given."""
+    fabric, console = load_fabric(name), Console()
+    console.print(fabric_page(fabric))
+    if out is not None:
+        console.print(*write_pictures(fabric, out), sep="\n", soft_wrap=True)
 
 
 def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
@@ -36,3 +53,26 @@ def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
     about: dict[str, str | int | float] = {"fabric": fabric.name, "texels_per_yarn": TEXELS_PER_YARN}
     write_exr(paths[-1], {name: plane[::-1] for name, plane in channels.items()}, about)
     return paths
+
+
+def fabric_page(fabric: Fabric) -> RenderableType:
+    """Show a fabric: the drawdown and the numbers of its yarns."""
+    ends, picks = fabric.weave.repeat
+    table = table_of("yarn", "warp", "weft", "unit")
+    for name in Yarn.model_fields:
+        warp, weft = (_value(getattr(yarn, name)) for yarn in (fabric.warp, fabric.weft))
+        table.add_row(name, warp, weft, _UNITS.get(name, ""))
+    heading = f"{fabric.name}: {fabric.weave.name}, {ends} ends × {picks} picks (██ warp over, last pick first)"
+    return Group(
+        Text(heading),
+        Text(""),
+        Text(fabric.weave.text()),
+        Text(""),
+        table,
+        Text(f"optical thickness {fabric.optical_thickness:g}"),
+        Text(fabric.source),
+    )
+
+
+def _value(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

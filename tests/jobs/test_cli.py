@@ -114,7 +114,7 @@ def test_work_left_out_is_failed_work(twillight):
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
-        (KeyboardInterrupt(), 130, "the same command goes on"),
+        (KeyboardInterrupt(), 130, "the same command continues"),
         (WorkFailed("the loss diverged"), 1, "the loss diverged"),
         (ZeroDivisionError("by zero"), 1, "this is a bug in twillight"),
     ],

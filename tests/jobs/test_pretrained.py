@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from jobs.verbs.answerer import pretrained_names
+from jobs.verbs.evaluate_model import pretrained_names
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate

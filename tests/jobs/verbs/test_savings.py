@@ -11,7 +11,7 @@ from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger, measure
-from jobs.verbs.narrow_recipe import write_recipe
+from jobs.verbs.require_recipe import write_recipe
 from jobs.verbs.savings import DIFFERENCE, Saving, Value, saved, verdict
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries

@@ -15,7 +15,7 @@ from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
 
 
-def refuse_options_of_the_truth(chosen: Mapping[str, object]) -> None:
+def refuse_truth_options(chosen: Mapping[str, object]) -> None:
     """Refuse what means nothing to a model: it answers as it was trained."""
     for name, value in chosen.items():
         if value is not None:

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from jobs.recipe.load import load_recipe
-from jobs.verbs.narrow_recipe import SAMPLED, alone, effort_of, savings, write_recipe
+from jobs.verbs.require_recipe import SAMPLED, alone, effort_of, savings, write_recipe
 from pipeline.models.curved.options import CurvedOptions
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries

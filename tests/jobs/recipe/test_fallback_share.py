@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from jobs.recipe.fallback_share import left_to_quadrature
 from jobs.recipe.load import load_recipe
-from jobs.verbs.fallback_share import left_to_quadrature
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
 from pipeline.shards.queries import QueryOptions, draw_queries

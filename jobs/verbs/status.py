@@ -1,0 +1,34 @@
+"""`twillight status`: what is done, what failed and why, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from jobs.plan.plan import plan
+from jobs.plan.task import STAGES, Task
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
+from jobs.verbs.bench import measured_alone
+from jobs.verbs.console import table_of
+
+
+def print_status(recipe: str, out: Path) -> None:
+    """Print the states of a recipe's tasks."""
+    Console().print(status_table(plan(load_recipe(recipe), measured_alone(out)), Ledger(out)))
+
+
+def status_table(tasks: Sequence[Task], ledger: Ledger) -> Table:
+    """Show what the files say: done, failed and missing tasks by stage, and the reason of each failure."""
+    table = table_of("stage", "done", "failed", "missing", right=("done", "failed", "missing"))
+    states = {task.id: ledger.state(task) for task in tasks}
+    for stage in STAGES:
+        found = [states[task.id] for task in tasks if task.stage == stage]
+        if found:
+            table.add_row(stage, *(str(found.count(state)) for state in ("done", "failed", "missing")))
+    failed = [f"{task.title}: {ledger.reason(task)}" for task in tasks if states[task.id] == "failed"]
+    table.caption = "\n".join(failed) or None
+    return table
