@@ -44,7 +44,7 @@ class Bounded:
         self._tables = PerFabric(tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Tell whether the method covers the fabric."""
+        """Return whether the method covers the fabric."""
         return self._method.covers(fabric)
 
     def prepare(self, fabric: Fabric) -> None:

@@ -1,7 +1,7 @@
-"""What a benchmark asks of any way of answering queries, and what the training loop asks of a network.
+"""Interfaces: `Method`, which a benchmark measures, and `Network`, which the training loop trains.
 
-A Method answers queries about a fabric; arrays are NumPy. A Network is the part of a trained method that learns; it
-sees batches of torch tensors.
+A Method evaluates queries on a fabric; arrays are NumPy. A Network is the trainable part of a method; its batches are
+torch tensors.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ GPU_CHUNK = 2**18
 """Rows inferred at a time on a GPU."""
 
 KNOWN = ("u", "v", "sigma", "wi", "wo")
-"""Columns of round footprints of flat cloth: what the published networks know."""
+"""Columns of round footprints of flat cloth, the inputs of the published networks."""
 
 Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
 """Cards and weights of trained models."""
@@ -34,7 +34,7 @@ Net = TypeVar("Net", bound=nn.Module)
 
 @runtime_checkable
 class Method(Protocol):
-    """A way of answering queries."""
+    """Evaluation of queries on a fabric."""
 
     @property
     def name(self) -> str:
@@ -42,23 +42,23 @@ class Method(Protocol):
 
     @property
     def setting(self) -> str:
-        """What tells variants of one method apart, such as ``"k = 2"``; may be empty."""
+        """Variant of the method, such as ``"k = 2"``; may be empty."""
 
     def covers(self, fabric: Fabric) -> bool:
-        """Tell whether the method can answer for this fabric."""
+        """Return whether the method covers a fabric."""
 
     def prepare(self, fabric: Fabric) -> None:
-        """Do once what a renderer does when a fabric is loaded; not timed."""
+        """Precompute tables or latents of a fabric, as a renderer does when it is loaded; not part of query times."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries: float32 (N, 4), non-negative and finite; `seed` feeds random methods only."""
+        """Return the components of N queries, float32 (N, 4), finite and >= 0; only random methods use `seed`."""
 
     def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes a renderer keeps to answer for this fabric."""
+        """Return the bytes that a renderer stores for this fabric."""
 
 
 class Batch(NamedTuple):
-    """Queries and answers of a training step: F fabrics, n queries each.
+    """Queries and targets of a training step: F fabrics, n queries each.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Batch(NamedTuple):
 
 
 class Network(Protocol):
-    """A torch module that the training loop can train; the module's file says what it learns."""
+    """A torch module that the training loop can train; the module's file describes what it learns."""
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; `random` is a pure function of seed and step."""
@@ -99,7 +99,7 @@ class Network(Protocol):
         """Set the last bias to the mean of targets (M, 4): a leaky ReLU can stall far from it."""
 
     def schedule(self, progress: float) -> None:
-        """Adjust what changes over the training, at `progress` in [0, 1)."""
+        """Adjust scheduled parameters at `progress` in [0, 1)."""
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
         """Return the optimiser's parameter groups with their peak learning rates."""
@@ -109,7 +109,7 @@ class Network(Protocol):
 
 
 def loaded(network: Net, weights: dict[str, Tensor]) -> Net:
-    """Return a network with these weights; RuntimeError if they are another network's."""
+    """Return a network with these weights; RuntimeError if they do not fit."""
     network.load_state_dict(weights)
     return network
 
@@ -121,33 +121,33 @@ def in_chunks(
     columns: Sequence[str] = KNOWN,
     width: int = 4,
 ) -> npt.NDArray[np.float32]:
-    """Answer queries some rows at a time, without gradients.
+    """Evaluate queries in chunks, without gradients.
 
     Parameters
     ----------
     queries : Queries
-        N questions.
+        N queries.
     answer : callable
         Takes the columns as float32 tensors (rows,) or (rows, 3) on `device`; returns (rows, width).
     device : torch.device
-        Where `answer` computes.
+        Device of `answer`.
     columns : sequence of str
-        What it is given of the queries.
+        Columns that `answer` takes.
     width : int
-        Numbers that it answers to each.
+        Values per query.
 
     Returns
     -------
     float32 (N, width)
     """
     result = np.empty((len(queries.u), width), np.float32)
-    asked = [getattr(queries, name) for name in columns]
+    arrays = [getattr(queries, name) for name in columns]
     chunk = CHUNK if device.type == "cpu" else GPU_CHUNK
     with torch.inference_mode():
         for start in range(0, len(result), chunk):
             rows = slice(start, start + chunk)
             # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
-            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in asked]
+            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in arrays]
             result[rows] = answer(*tensors).numpy(force=True)
     return result
 

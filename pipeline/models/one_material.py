@@ -1,4 +1,4 @@
-"""A method whose networks know one fabric each: textures and perceptrons, as `neumip` and `curved` train them."""
+"""Methods with one network per fabric: textures and perceptrons, as `neumip` and `curved` train them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class OneMaterial(Generic[Net]):
         self._known = PerFabric(lambda fabric: self._networks[fingerprint(fabric.optics())])
 
     def covers(self, fabric: Fabric) -> bool:
-        """Tell whether this fabric was trained."""
+        """Return whether the model was trained on a fabric."""
         return fingerprint(fabric.optics()) in self._networks
 
     def prepare(self, fabric: Fabric) -> None:

@@ -1,4 +1,4 @@
-"""What the options of all models share: what a model says of itself, and the fields that several of them have.
+"""Base class of the options of all models, and the types of fields that several models have.
 
 Fields are declared by each model, in its own order: a base would move them to the front of every card.
 """
@@ -12,24 +12,24 @@ from pydantic import BaseModel, ConfigDict, Field
 from pipeline import versions
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
-"""A name that can stand in a file name and in a task id."""
+"""A name that is valid in file names and task ids."""
 
 Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
 """The footprint of a method that knows one kernel."""
 
 LogK = Annotated[float, Field(gt=0, le=1e4, description="k of the specular space g(x) = ln(k x + 1).")]
-"""How far highlights are squeezed before they are learnt (`pipeline.models.networks.losses`)."""
+"""Strength of the logarithmic compression of highlights in the loss (`pipeline.models.networks.losses`)."""
 
 Weight = Annotated[float, Field(ge=0, le=1e4)]
 """A factor of one term of a loss."""
 
 
 RoundFootprint = Literal["geometric_mean", "major"]
-"""Round footprint that stands for an ellipse: of the same area, or of its major axis."""
+"""Round footprint in place of an ellipse: of equal area, or with its major axis."""
 
 
 class Options(BaseModel):
-    """What every model says of itself; each has a field ``model``, its file's name, and a field ``name``, its own."""
+    """Options of a model; each has the fields ``model``, the name of its folder, and ``name``, its name in tables."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -44,14 +44,13 @@ class Options(BaseModel):
             """Name in tables and files."""
 
     learns: ClassVar[bool] = True
-    """Whether there is anything to train."""
+    """True if the model is trained."""
     of_one_material: ClassVar[bool] = False
-    """Whether a trained model knows a single fabric."""
+    """True if a trained model knows a single fabric."""
     blends: ClassVar[bool] = False
-    """Whether it answers for what lies between two fabrics, from blended latents."""
+    """True if blended latents of two fabrics give the fabrics between them."""
     any_physics: ClassVar[bool] = False
-    """Whether it learns whatever frame, normaliser, geometry, shadows and variation the truth has; else it knows the
-    default ones."""
+    """True if it can learn any physics of the truth (frame, normaliser, shadows, variation); else only the default."""
     seconds: ClassVar[tuple[float, float]] = (2e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
 
@@ -62,12 +61,12 @@ class Options(BaseModel):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         return ()
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Which of `behind`, `stretch` and `curvature` (`QueryOptions`) its queries may have."""
+        """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
         return frozenset()
 
     knob: ClassVar[str] = ""

@@ -1,7 +1,7 @@
-"""What a method works out once for each fabric, and looks up from then on.
+"""Cache of what a method computes once for each fabric.
 
-Fabrics of equal optics share it. A fabric object seen before is known by its identity, for fingerprints take longer
-than the answers to a few hundred queries.
+Fabrics of equal optics share an entry. A known fabric object is found by its identity, because a fingerprint takes
+longer than a few hundred queries.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _MOST_OBJECTS = 256  # fabric objects remembered; an editor makes a new one at e
 
 
 class PerFabric(Generic[Made]):
-    """Products of fabrics, each made when it is first asked for and then kept.
+    """Products of fabrics, each computed at its first use and then kept.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
-"""The part of a trained method that runs for every query, apart from how it is run.
+"""The part of a trained method that runs for every query.
 
-A fabric is looked at once; what is left is arithmetic from a few numbers of each query, and a few of the fabric, to the
-four components. As a module of its own it can be compiled, exported or rounded (`pipeline.models.runtimes`) without a
-new training and without knowing what it computes.
+A fabric is encoded once; the rest maps a few numbers of each query and of the fabric to the four components. As a
+separate module it can be compiled, exported or quantised (`pipeline.models.runtimes`) without a new training.
 """
 
 from __future__ import annotations
@@ -23,16 +22,16 @@ Columns = tuple[npt.NDArray[np.float32], ...]
 
 
 class PerQuery(NamedTuple):
-    """What a method does for each query of one fabric."""
+    """Computation of a method for each query of one fabric."""
 
     refuse: Callable[[Queries], None]
-    """Raises BadInput for queries that were not taught."""
+    """Raises BadInput for queries outside the domain."""
     inputs: Callable[[Queries], Columns]
-    """Returns what the module is given of N queries: float32 arrays of N rows."""
+    """Returns the inputs of the module for N queries: float32 arrays of N rows."""
     module: nn.Module
     """Takes those, as tensors, then the constants; returns the components (N, 4)."""
     constants: tuple[Tensor, ...] = ()
-    """What the module is given of the fabric. Fabrics whose constants have the same shapes may share the module."""
+    """Inputs of the module for the fabric. Fabrics whose constants have equal shapes may share the module."""
 
 
 @runtime_checkable
@@ -49,7 +48,7 @@ class Answering(nn.Module):
     Parameters
     ----------
     network : nn.Module
-        Where the weights are.
+        Holds the weights.
     answer : callable
         From inputs and constants to components (N, 4).
     """

@@ -1,4 +1,4 @@
-"""The plain query, a footprint of flat cloth lit from the viewer's side: all that some methods answer."""
+"""Refusal of queries other than flat cloth lit and seen from the front, which some methods are limited to."""
 
 from __future__ import annotations
 

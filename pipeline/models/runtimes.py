@@ -38,7 +38,7 @@ from weaves.errors import WorkFailed
 from weaves.fabric import Fabric
 
 TOLERANCE: Final = 1e-4
-"""Most by which answers in single precision may differ: norm of the difference over that of the method's own."""
+"""Largest difference of values in single precision: norm of the difference over that of the method's values."""
 
 _STREAM = 0x0A57  # of the queries that modules are compiled and compared on
 _COMPARED = 512
@@ -51,7 +51,7 @@ class _Program(NamedTuple):
     run: Callable[..., Tensor]
     """From inputs and constants to components (N, 4)."""
     saved: int = 0
-    """Bytes that its weights take less than in single precision."""
+    """Bytes saved by its weights, relative to single precision."""
 
 
 class Runtime(NamedTuple):
@@ -60,7 +60,7 @@ class Runtime(NamedTuple):
     missing: Callable[[], str]
     """Returns why this machine cannot; empty if it can."""
     load: Callable[[nn.Module, Sequence[Tensor], int], _Program]
-    """Takes a module, what it will be given, and how many of that, the first ones, have a row a query."""
+    """Takes a module, its inputs, and the number of inputs (the first ones) that have a row per query."""
 
 
 def _eager(dtype: torch.dtype) -> Runtime:
@@ -95,7 +95,7 @@ def _rounding(module: Callable[..., Tensor], dtype: torch.dtype | None) -> Calla
 
 @cache
 def _no_compiler() -> str:
-    """Return why torch cannot compile here: the one sure way to know is to try."""
+    """Return why torch cannot compile on this machine; empty if it can. It compiles a small module to find out."""
     try:
         with _quiet():
             torch.compile(torch.sin, fullgraph=True)(torch.ones(2))
@@ -167,7 +167,7 @@ def _quantised(model: bytes) -> bytes:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Hear nothing of what compilers and exporters have to say about themselves."""
+    """Silence the messages of compilers and exporters."""
     level = logging.root.manager.disable
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -186,10 +186,10 @@ RUNTIMES: Final[dict[str, Runtime]] = {
     "onnx": _onnx(quantised=False),
     "onnx-int8": _onnx(quantised=True),
 }
-"""Every way by its name, the names of `reports.options.RuntimeName`."""
+"""Runtimes by name (`reports.options.RuntimeName`)."""
 
 EXACT: Final = frozenset({"compile", "onnx"})
-"""Those that round like the method itself."""
+"""Runtimes in single precision."""
 
 
 class RunBy:
@@ -210,7 +210,7 @@ class RunBy:
         self._ready = PerFabric(self._prepared)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Tell whether the method covers the fabric."""
+        """Return whether the method covers the fabric."""
         return self._method.covers(fabric)
 
     def prepare(self, fabric: Fabric) -> None:
@@ -224,7 +224,7 @@ class RunBy:
         self._ready.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries outside the domain."""
         part, program = self._ready.of(fabric)
         part.refuse(queries)
         return _answered(part, program, queries)
@@ -249,7 +249,7 @@ class RunBy:
         return part, program
 
     def _compare(self, fabric: Fabric, part: PerQuery, program: _Program, queries: Queries) -> None:
-        """Hold answers against the method's own."""
+        """Compare values with the method's own."""
         own = self._method.predict(fabric, queries)
         difference = np.linalg.norm(_answered(part, program, queries) - own)
         error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)

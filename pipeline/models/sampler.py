@@ -1,4 +1,4 @@
-"""Directions drawn from what a patch of cloth returns, with their exact density: what a path tracer needs of a model.
+"""Importance sampling of directions at a patch of cloth, with their exact density, for path tracers.
 
 An analytic proxy, no network: the flakes' lobes at a few points of the footprint and a cosine on either side
 (pipeline.analytic.importance.lobes). It knows the fabric's colours, because they decide how much of the light is
@@ -44,9 +44,9 @@ class Sampler:
     Parameters
     ----------
     points : int
-        Points of the footprint that stand for it, and so lobes of the mixture.
+        Points of the footprint, each a lobe of the mixture.
     widening : float
-        How much a lobe is widened by the spread of the tangents; 2 gave the least variance of 1 to 3.
+        Factor on the widening of a lobe by the spread of the tangents; 2 gave the least variance of 1 to 3.
     """
 
     def __init__(self, points: int = 8, widening: float = 2.0) -> None:

@@ -41,7 +41,7 @@ class BtfAutoencoder:
         self._known = PerFabric(lambda fabric: methods[fingerprint(fabric.optics())])
 
     def covers(self, fabric: Fabric) -> bool:
-        """Tell whether this fabric was trained."""
+        """Return whether the model was trained on a fabric."""
         return fingerprint(fabric.optics()) in self._methods
 
     def prepare(self, fabric: Fabric) -> None:

@@ -22,5 +22,5 @@ class BtfAutoencoderOptions(BtfOptions):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         return ("four components in place of RGB, in samples and answers", "the encoder of 2020")

@@ -16,7 +16,7 @@ class CurvedOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
 
     model: Literal["curved"] = "curved"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "curved"
     """Name of the trained model."""
     texels_per_yarn: int = Field(default=16, ge=1, le=256)
@@ -81,7 +81,7 @@ class CurvedOptions(Options):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         changes = {
             "pyramids for footprints": self.levels != 1,
             "no offset": not self.offset,

@@ -38,7 +38,7 @@ class GaussNodes:
         self._rules = PerFabric(self._tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: nothing is learnt."""
+        """Return True: nothing is learnt."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

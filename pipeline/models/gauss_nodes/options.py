@@ -20,7 +20,7 @@ class GaussNodesOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (0.0, 3e-7)
 
     model: Literal["gauss_nodes"] = "gauss_nodes"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     footprint: Gaussian = "gaussian"
     name: Name = "gauss_nodes"
     """Name in tables."""

@@ -17,7 +17,7 @@ class NeumipOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (1.2e-5, 1.5e-6)
 
     model: Literal["neumip"] = "neumip"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "neumip"
     """Name of the trained model."""
     texels_per_yarn: int = Field(default=16, ge=1, le=256)
@@ -57,7 +57,7 @@ class NeumipOptions(Options):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))
 

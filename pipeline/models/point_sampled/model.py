@@ -56,7 +56,7 @@ class PointSampled:
         self._samplers = PerFabric(lambda fabric: PointSampler(fabric, truth))
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: nothing is learnt."""
+        """Return True: nothing is learnt."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:
@@ -93,7 +93,7 @@ class HorizonSampled:
         self._samplers = samplers
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: nothing is learnt."""
+        """Return True: nothing is learnt."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

@@ -20,7 +20,7 @@ class PointSampledOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
 
     model: Literal["point_sampled"] = "point_sampled"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "point_sampled"
     """Name in tables."""
     counts: list[Count] = Field(default=[1, 2, 3, 4, 8, 16, 64], min_length=1, max_length=16)

@@ -35,7 +35,7 @@ class Prefiltered:
         self._maps = PerFabric(lambda fabric: PrefilteredMaps(fabric, options.texels_per_yarn))
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: nothing is learnt."""
+        """Return True: nothing is learnt."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

@@ -16,7 +16,7 @@ class PrefilteredOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (0.0, 2e-7)
 
     model: Literal["prefiltered"] = "prefiltered"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     footprint: Gaussian = "gaussian"
     name: Name = "prefiltered"
     """Name in tables."""

@@ -15,7 +15,7 @@ class SelvageOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
 
     model: Literal["selvage"] = "selvage"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "selvage"
     """Name of the trained model."""
     width: Literal[16, 32, 64] = 64

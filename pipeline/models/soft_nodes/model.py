@@ -38,7 +38,7 @@ class SoftNodes:
         self._tables = PerFabric(tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: any fabric can be tabulated."""
+        """Return True: any fabric can be tabulated."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

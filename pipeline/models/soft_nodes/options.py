@@ -14,7 +14,7 @@ class SoftNodesOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
 
     model: Literal["soft_nodes"] = "soft_nodes"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "soft_nodes"
     """Name in tables."""
     footprint: Literal["gaussian"] = "gaussian"

@@ -163,7 +163,7 @@ class UnifiedBtf:
         self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: any fabric can be encoded."""
+        """Return True: any fabric can be encoded."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

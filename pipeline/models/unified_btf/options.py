@@ -48,7 +48,7 @@ class BtfOptions(Options):
     latent: int
     """Numbers that a texel is known by."""
     model: str
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name
     """Name of the trained model."""
 
@@ -72,5 +72,5 @@ class UnifiedBtfOptions(BtfOptions):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         return ("four components in place of RGB, in samples and answers",)

@@ -148,7 +148,7 @@ class Woven:
         self._answering = Answering(self._network, self._all_at_once)
 
     def covers(self, fabric: Fabric) -> bool:
-        """Say yes: any fabric can be encoded."""
+        """Return True: any fabric can be encoded."""
         return True
 
     def prepare(self, fabric: Fabric) -> None:

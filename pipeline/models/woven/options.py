@@ -16,7 +16,7 @@ class WovenOptions(Options):
     blends: ClassVar[bool] = True
 
     model: Literal["woven"] = "woven"
-    """Which file of `pipeline.models` implements it."""
+    """Name of its folder in `pipeline.models`."""
     name: Name = "woven"
     """Name of the trained model."""
     latent: int = Field(default=64, ge=4, le=512)
@@ -64,7 +64,7 @@ class WovenOptions(Options):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What is not as published, in words for the page."""
+        """Deviations from the published method, for the page."""
         changes = {
             "a picture of the repeat seen from the place asked about": self.one_blob == "local",
             "bare numbers in place of one-blobs": self.one_blob == "none",
