@@ -32,7 +32,8 @@ from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.silhouette import measure_silhouette, render_edge
 from reports.measure.timing import thread_counts
 from reports.options import EXTREME_PRECISIONS, BenchOptions
-from reports.page.page import ModelNote, PageInput, write_page
+from reports.page.content import ModelNote, PageInput
+from reports.page.page import write_page
 from reports.page.picture_strips import PictureFile
 from reports.record import Provenance, Record, read_machine, read_records, this_machine, write_records
 from weaves.fabric import Fabric

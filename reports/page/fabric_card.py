@@ -1,4 +1,4 @@
-"""What the gallery of a page says of a fabric."""
+"""Cards of the fabrics in the gallery of a page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from weaves.fabric import Fabric
 
 
 def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
-    """Return what the gallery says of a fabric."""
+    """Return the title, weave, source and yarns of a fabric as text, and the colours of the yarns."""
     ends, picks = fabric.weave.repeat
     yarns = []
     for family, yarn in (("warp", fabric.warp), ("weft", fabric.weft)):

@@ -1,4 +1,4 @@
-"""Which pictures a page shows beside each other: views of fabrics and scenes by every method, and strips of frames."""
+"""Order of pictures on a page: views of fabrics and scenes by every method, and strips of frames."""
 
 from __future__ import annotations
 
@@ -30,6 +30,11 @@ class PictureFile:
     """``truth`` for the reference."""
     setting: str
     path: Path
+
+    @property
+    def label(self) -> str:
+        """Of the method with its setting."""
+        return display(self.method, self.setting)
 
     @property
     def stem(self) -> str:
@@ -86,8 +91,8 @@ def strips(
 def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
     """Return for each scene the rows of its strip of frames: the truth, then every method once.
 
-    Of a method with knobs the first that is shown: where it aliases most. Of more than `MOST_FILMS` the first ones
-    stay, and the baseline.
+    Of a method with several settings the first picture counts: there it aliases most. Of more than `MOST_FILMS` the
+    first ones stay, and the baseline.
     """
     result: dict[str, list[PictureFile]] = {}
     for scene in dict.fromkeys(file.scene for file in pictures if not file.fabric):

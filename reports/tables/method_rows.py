@@ -1,4 +1,4 @@
-"""Rows of the tables of methods, already worded."""
+"""Rows of the tables of methods, as text."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Row = dict[str, Any]
 
 
 def groups(lines: Sequence[Row]) -> list[Row]:
-    """Gather rows of methods: each group is a method's name and its rows; a method with knobs has a head of its own."""
+    """Return a group for each method: its name and its rows; a method with several settings has a head (`head`)."""
     found: dict[str, list[Row]] = {}
     for line in lines:
         found.setdefault(line["method"], []).append(line)
@@ -46,13 +46,28 @@ def groups(lines: Sequence[Row]) -> list[Row]:
 
 
 def row_of(method: str, setting: str) -> Row:
-    """Return what any row of a method says: whose it is, and both its names, whole and within its group."""
+    """Return the start of a method's row: its name whole (`label`) and within its group (`setting`)."""
     return {
         "method": method,
         "label": display(method, setting),
         "setting": setting.replace(" ", NO_BREAK) or display(method),
         "baseline": (method, setting) == BASELINE,
     }
+
+
+ERROR: Final = (
+    "MSE",
+    "95 % interval",
+    "noise",
+    "× lower",
+    "95 % interval of × lower",
+    "colour",
+    "S warp",
+    "S weft",
+    "C warp",
+    "C weft",
+)
+"""Columns of `error_rows` after the method."""
 
 
 def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, list[Row]]:
@@ -86,8 +101,8 @@ def fabric_rows(table: pd.DataFrame) -> dict[str, Any]:
         values = [(record[label], lowest) for record, lowest in zip(records, best, strict=True)]
         cells = [{"text": scientific(value), "best": value == lowest} for value, lowest in values]
         lines.append(row_of(*_split(label)) | {"cells": cells})
-    fabrics = [{"title": plain(str(record["fabric"])), "role": record["role"]} for record in records]
-    return {"fabrics": fabrics, "groups": groups(lines)}
+    columns = [plain(str(r["fabric"])) + (" (unseen)" if r["role"] == "unseen" else "") for r in records]
+    return {"columns": columns, "groups": groups(lines)}
 
 
 FRONT: Final = ("ns a query", "error of the colour", "bytes stored")
@@ -136,7 +151,7 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     ]
     return {
         "groups": groups(lines),
-        "roles": roles,
+        "columns": [f"{name}, {role}" for role in roles for name in ("flicker", "excess energy")],
         "motion": scientific(float(np.mean(motion))) if motion else NONE,
     }
 
@@ -146,7 +161,7 @@ ENERGY: Final = ("diffuse, k_d = 1", "specular, k_s = 1", "in its own colours", 
 
 
 def energy_rows(energy: pd.DataFrame, errors: pd.DataFrame, timing: pd.DataFrame) -> list[Row]:
-    """Return the rows of the table of energies, in groups; what sends back more than arrives is marked."""
+    """Return the rows of the table of energies, in groups; albedos above 1 are marked."""
     lines = []
     for row in rows(energy):
         albedos = (row.diffuse, row.specular, row.colour)
@@ -253,7 +268,7 @@ EXTREMES: Final = (
 
 
 def extreme_rows(table: pd.DataFrame) -> list[Row]:
-    """Return the rows of the table of methods at their extremes, in groups; what none may answer is marked."""
+    """Return the rows of the table of methods at their extremes, in groups; impossible answers are marked."""
     lines = []
     for row in rows(table):
         errors = [percent(getattr(row, name)) for name in map(error_name, FOOTPRINTS)]
@@ -265,7 +280,7 @@ def extreme_rows(table: pd.DataFrame) -> list[Row]:
 
 
 def path_rows(table: pd.DataFrame) -> list[list[str]]:
-    """Return the rows of the table of what lies between: method, path, way, then the error at every share of it."""
+    """Return the rows of the table of paths between fabrics: method, path, way, then the error at every share."""
     lines: dict[tuple[str, ...], list[str]] = {}
     for row in rows(table):
         path = f"{plain(row.fabric)} → {plain(row.to)}"
@@ -274,7 +289,7 @@ def path_rows(table: pd.DataFrame) -> list[list[str]]:
 
 
 def edit_rows(records: Sequence[Record]) -> list[list[str]]:
-    """Return the rows of the table of edits: method, what is edited, median time, quartiles."""
+    """Return the rows of the table of edits: method, edit, median time, quartiles."""
     return [
         [
             display(record.method, record.setting),
