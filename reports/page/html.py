@@ -75,9 +75,19 @@ def page_html(
     plots : collection of str
         Names of the plots that were drawn.
     """
-    errors, timing = tables["errors"], tables["timing"]
-    per_material = [note.name for note in page.models if note.per_material]
-    schemes_, without_training = schemes(page), untrained(page)
+    content = {
+        **_methods(page, tables),
+        **_pictures(page, tables),
+        **_truth(page, findings),
+        "page": page,
+        "plots": plots,
+        "plot_titles": PLOT_TITLES,
+        "alt_texts": alt_texts(tables),
+        "definitions": DEFINITIONS,
+        "schemes": schemes(page),
+        "display": display,
+        "table_names": sorted(tables),
+    }
     environment = Environment(
         loader=PackageLoader("reports.page"),
         autoescape=True,
@@ -85,17 +95,16 @@ def page_html(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    fabrics = [fabric_card(fabric, role) for fabric, role in page.fabrics]
-    measured = truth_measurements(page.records)
-    shown = {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH}
-    views = strips(
-        page.pictures,
-        {fabric.name: role for fabric, role in page.fabrics},
-        [*page.options.views, *page.options.scenes.names],
-        [tables["pictures"], tables["scenes"]],
-    )
-    content: dict[str, Any] = {
-        "page": page,
+    sections = [(name, title) for name, title in SECTIONS.items() if name in ALWAYS or _has(content, name)]
+    return environment.get_template("page.html.j2").render(content, sections=sections)
+
+
+def _methods(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
+    """Return sentences and rows about the methods."""
+    errors, timing = tables["errors"], tables["timing"]
+    per_material = [note.name for note in page.models if note.per_material]
+    without_training = untrained(page)
+    return {
         "headlines": _headlines(errors, timing, without_training),
         "figures_of_merit": method_rows.figures_of_merit(page.records, errors, timing, without_training),
         "front": method_rows.front_rows(tables["tradeoff"]),
@@ -118,11 +127,48 @@ def page_html(
         "paths": method_rows.path_rows(summary.path_table(page.records)),
         "edits": method_rows.edit_rows(page.records),
         "shares": [f"t = {share:g}" for share in latents.SHARES],
-        "stability": truth_rows.stability_rows(findings),
         "extremes": method_rows.extreme_rows(extremes_table(page.records)),
         "extreme_columns": method_rows.EXTREMES,
+        "caveats": [
+            *caveats(page.options, per_material, errors),
+            *waiting(page.records),
+            *lacking(page.records),
+            *unseen_by_eye(page.records),
+        ],
+    }
+
+
+def _pictures(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
+    """Return fabrics, scenes and the order of their pictures."""
+    views = strips(
+        page.pictures,
+        {fabric.name: role for fabric, role in page.fabrics},
+        [*page.options.views, *page.options.scenes.names],
+        [tables["pictures"], tables["scenes"]],
+    )
+    return {
+        "fabrics": [fabric_card(fabric, role) for fabric, role in page.fabrics],
+        "shown": {(file.fabric, file.scene) for file in page.pictures if file.method == TRUTH},
+        "strips": [view for view in views if view.fabric],
+        "scenes": scene_rows.scene_rows(tables["scenes"]),
+        "scene_columns": [column.title for column in scene_rows.scene_columns(tables["scenes"])],
+        "scene_strips": {view.scene: view for view in views if not view.fabric},
+        "scene_sentences": scene_sentences(tables["scenes"]),
+        "films": films(page.pictures),
+        "film_frames": min(page.options.scenes.frames, SHOWN),
+        "relative_range": tiles.RELATIVE_RANGE,
+        "difference_range": tiles.DIFFERENCE_RANGE,
+    }
+
+
+def _truth(page: PageInput, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Return rows about the truth itself: rounding, speed, accuracy, bias, effort, and the sampler of directions."""
+    measured = truth_measurements(page.records)
+    accuracies = truth_rows.accuracy_rows(measured["truth_accuracy"])
+    return {
+        "stability": truth_rows.stability_rows(findings),
         "rates": truth_rows.rate_rows(page.records),
-        "accuracies": truth_rows.accuracy_rows(measured["truth_accuracy"]),
+        "accuracies": accuracies,
         "reference": percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         "accuracy_count": max((row.count for row in measured["truth_accuracy"]), default=0),
         "biases": truth_rows.bias_rows(measured["truth_bias"]),
@@ -136,35 +182,8 @@ def page_html(
             "effort": truth_rows.EFFORT,
             "sampler": truth_rows.SAMPLERS,
         },
-        "titles": {name: plain(name) for name in truth_rows.accuracy_rows(measured["truth_accuracy"])},
-        "strips": [view for view in views if view.fabric],
-        "scenes": scene_rows.scene_rows(tables["scenes"]),
-        "scene_columns": [column.title for column in scene_rows.scene_columns(tables["scenes"])],
-        "scene_strips": {view.scene: view for view in views if not view.fabric},
-        "films": films(page.pictures),
-        "scene_sentences": scene_sentences(tables["scenes"]),
-        "relative_range": tiles.RELATIVE_RANGE,
-        "display": display,
-        "film_frames": min(page.options.scenes.frames, SHOWN),
-        "fabrics": fabrics,
-        "shown": shown,
-        "plots": plots,
-        "plot_titles": PLOT_TITLES,
-        "alt_texts": alt_texts(tables),
-        "definitions": DEFINITIONS,
-        "caveats": [
-            *caveats(page.options, per_material, errors),
-            *waiting(page.records),
-            *lacking(page.records),
-            *unseen_by_eye(page.records),
-        ],
-        "colours": {name: scheme.colours([TRUTH, *(n.name for n in page.models)]) for name, scheme in schemes_.items()},
-        "schemes": schemes_,
-        "difference_range": tiles.DIFFERENCE_RANGE,
-        "table_names": sorted(tables),
+        "titles": {name: plain(name) for name in accuracies},
     }
-    shown_sections = [(name, title) for name, title in SECTIONS.items() if name in ALWAYS or _has(content, name)]
-    return environment.get_template("page.html.j2").render(content, sections=shown_sections)
 
 
 def _has(content: Mapping[str, Any], section: str) -> bool:
