@@ -54,6 +54,31 @@ text = Path("jobs/recipes/smoke.toml").read_text()
 Path("my.toml").write_text(text.replace("[bench]", '[[models]]\\nmodel = "matt"\\n\\n[bench]', 1))
 assert any("matt" in task.title for task in plan(load_recipe("my.toml")))
 """,
+    "A metric": """
+from pathlib import Path
+from types import SimpleNamespace
+import numpy as np
+from pipeline.truth.query import Answers, Queries
+from reports.measure import held_out
+from reports.options import BenchOptions
+from reports.record import to_table
+from weaves.fabric import load_fabric
+u = np.zeros(3, np.float32)
+up = np.tile(np.float32([0, 0, 1]), (3, 1))
+answers = Answers.opaque(np.full((3, 4), 0.1, np.float32), np.full((3, 4), 1e-3, np.float32), np.ones(3, np.int32))
+asked = load_fabric("denim"), Queries.round(u, u, u + 1, up, up), answers
+held_out._held_out = lambda *_: asked
+class Method:
+    name, setting = "off", ""
+    def prepare(self, fabric): ...
+    def predict(self, fabric, queries, seed=0):
+        return answers.mean + np.float32([[0], [0], [0.25]])
+manifest = SimpleNamespace(about={"truth": {}})
+records = held_out.measure_errors(Method(), manifest, Path(), "denim", "seen", BenchOptions())
+(found,) = [record for record in records if record.metric == "largest_error"]
+assert abs(found.value - 0.25) < 1e-6 and found.unit == "1/sr"
+assert "largest_error" in set(to_table(records)["metric"])
+""",
     "A scene": """
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
