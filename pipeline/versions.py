@@ -14,7 +14,14 @@ TRUTH: Final = 4
 TRAINING: Final = 2
 """The training loop."""
 
-MODELS: Final[dict[str, int]] = {"gauss_nodes": 2, "point_sampled": 2, "prefiltered": 2, "selvage": 2, "soft_nodes": 2}
+MODELS: Final[dict[str, int]] = {
+    "curved": 2,
+    "gauss_nodes": 2,
+    "point_sampled": 2,
+    "prefiltered": 2,
+    "selvage": 2,
+    "soft_nodes": 2,
+}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 FALLBACK: Final = 2

@@ -130,6 +130,16 @@ class Draft:
         """Return the drawdown for a terminal: two characters a cell, full for warp over, the last pick first."""
         return "\n".join(row.replace("#", "██").replace(".", "· ") for row in self.rows())
 
+    def different_cells(self) -> int:
+        """Return the number of cells that no translation of the cloth onto itself carries into one another.
+
+        An 8-end satin has 64 cells of 8 different kinds. Each translation group has as many members in every orbit, so
+        the number is that of all cells over that of the translations.
+        """
+        matrix = self.warp_over
+        shifts = sum(np.array_equal(np.roll(matrix, shift, (0, 1)), matrix) for shift in np.ndindex(matrix.shape))
+        return int(matrix.size // shifts)
+
     def canonical(self) -> tuple[tuple[int, int], bytes]:
         """Return a form that is equal for all shifts and mirror images of this cloth, and for no other cloth."""
         matrix = _smallest_repeat(self.warp_over)

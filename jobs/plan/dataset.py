@@ -1,19 +1,22 @@
-"""The data set that a recipe asks for: its shards as tasks, and its folder."""
+"""The data set of a recipe: its shards as tasks, and its folder.
+
+Beside the recipe's own rows the folder holds the extra rows that its models learn from (`Options.extra_rows`). These
+are part of the models' identities and not of the data set's: a model more changes no measurement of the others.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 from jobs.plan.task import Task, identity
 from jobs.recipe.recipe import Recipe
 from pipeline.fingerprint import fingerprint
-from pipeline.shards.generate import ShardTask
+from pipeline.shards.angular_samples import AngularSamples
+from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 from pipeline.truth.options import TruthOptions
-
-Split = Literal["train", "validation", "test"]
 
 SECONDS_A_POINT: Final = 3.5e-7
 """One point of the truth, on one core of a server of 2021."""
@@ -26,37 +29,25 @@ BYTES_A_ROW: Final = 62
 class Shard:
     """A shard and the task that makes it."""
 
-    question: ShardTask
+    question: AnyShardTask
     task: Task
+
+    @property
+    def is_extra(self) -> bool:
+        """Whether single models alone read its rows."""
+        return isinstance(self.question, ExtraShardTask)
 
 
 def shards(recipe: Recipe) -> list[Shard]:
-    """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows."""
-    asked = list(_questions(recipe))
-    ids = [identity("generate", question.identity()) for _, question in asked]
-    folder = f"datasets/{recipe.name}-{fingerprint(sorted(ids), 8)}"
-    return [
-        Shard(
-            question,
-            Task(
-                "generate",
-                f"{role} · {question.split}",
-                f"{question.fabric.name} {question.split} rows {question.start}–{question.start + question.rows - 1}",
-                question.identity(),
-                (f"{folder}/part-{key}.parquet",),
-                cost=question.rows * SECONDS_A_POINT * points_a_row(question.truth),
-                rows=question.rows,
-                size=question.rows * BYTES_A_ROW,
-                setting={"question": question.model_dump(mode="json")},
-            ),
-        )
-        for (role, question), key in zip(asked, ids, strict=True)
-    ]
+    """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows; extra rows last."""
+    own: list[tuple[str, AnyShardTask]] = list(_own_rows(recipe))
+    folder = f"datasets/{recipe.name}-{fingerprint(sorted(_id(question) for _, question in own), 8)}"
+    return [_shard(role, question, folder) for role, question in [*own, *_extra_rows(recipe)]]
 
 
 def fingerprint_of(parts: Sequence[Shard]) -> str:
-    """Return the data set's fingerprint: that of its shards, in whatever order."""
-    return fingerprint(sorted(part.task.id for part in parts))
+    """Return the data set's fingerprint: that of its own rows' shards, in whatever order."""
+    return fingerprint(sorted(part.task.id for part in parts if not part.is_extra))
 
 
 def folder_of(parts: Sequence[Shard]) -> str:
@@ -64,7 +55,29 @@ def folder_of(parts: Sequence[Shard]) -> str:
     return str(Path(parts[0].task.products[0]).parent)
 
 
-def _questions(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
+def _id(question: AnyShardTask) -> str:
+    return identity("generate", question.identity())
+
+
+def _shard(role: str, question: AnyShardTask, folder: str) -> Shard:
+    """Return a shard of a fabric in this role."""
+    rows = f"rows {question.start}–{question.start + question.rows - 1}"
+    what = question.kind.replace("_", " ") if isinstance(question, ExtraShardTask) else question.split
+    task = Task(
+        "generate",
+        f"{role} · {what}",
+        f"{question.fabric.name} {question.split} {rows}",
+        question.identity(),
+        (f"{folder}/part-{_id(question)}.parquet",),
+        cost=question.rows * SECONDS_A_POINT * _points(question),
+        rows=question.rows,
+        size=question.rows * BYTES_A_ROW,
+        setting={"question": question.model_dump(mode="json")},
+    )
+    return Shard(question, task)
+
+
+def _own_rows(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     """Cut every fabric's splits into shards, each with the role of its fabric."""
     rows = recipe.dataset.rows
     named = {"train": rows.train, "validation": rows.validation, "test": rows.test}
@@ -81,19 +94,43 @@ def _questions(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     ):
         for fabric in fabrics:
             for split, total in splits.items():
-                for start in range(0, total, recipe.dataset.shard_rows):
+                for start, count in _cut(total, recipe.dataset.shard_rows):
                     yield (
                         role,
                         ShardTask(
                             fabric=fabric,
                             split=split,
                             start=start,
-                            rows=min(recipe.dataset.shard_rows, total - start),
+                            rows=count,
                             seed=recipe.dataset.seed,
                             queries=recipe.dataset.queries,
                             truth=recipe.dataset.truth_of(split),
                         ),
                     )
+
+
+def _extra_rows(recipe: Recipe) -> Iterator[tuple[str, ExtraShardTask]]:
+    """Cut the extra rows of the fabrics that each model is trained on into shards; equal sets of two models once."""
+    for role, fabrics in (("seen", recipe.seen), ("population", recipe.population), ("unseen", recipe.unseen)):
+        readers = [model for model in recipe.own_models if role in model.trained_roles]
+        for extra in dict.fromkeys(extra for model in readers for extra in model.options.extra_rows):
+            for fabric in fabrics:
+                for start, count in _cut(extra.count(fabric), recipe.dataset.shard_rows):
+                    yield role, ExtraShardTask(fabric=fabric, extra=extra, start=start, rows=count)
+
+
+def _cut(total: int, most: int) -> Iterator[tuple[int, int]]:
+    """Yield the start and the number of rows of each shard."""
+    for start in range(0, total, most):
+        yield start, min(most, total - start)
+
+
+def _points(question: AnyShardTask) -> float:
+    """Estimate the points of a row."""
+    if isinstance(question, ShardTask):
+        return points_a_row(question.truth)
+    extra = question.extra
+    return points_a_row(extra.truth) if isinstance(extra, AngularSamples) else float(extra.points)
 
 
 def points_a_row(truth: TruthOptions) -> float:

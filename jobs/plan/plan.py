@@ -19,6 +19,7 @@ from jobs.plan.task import Task, identity
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
 from pipeline.fingerprint import fingerprint
+from pipeline.shards.extra_rows import set_name
 
 
 def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> list[Task]:
@@ -168,9 +169,10 @@ def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Task])
 
 
 def _train_task(model: ModelRecipe, fabrics: list[str], alone_on: str, parts: Sequence[Shard]) -> Task:
-    """Return one training; it reads the training and validation rows of its fabrics and nothing else."""
+    """Return one training; it reads its fabrics' training and validation rows and the extra rows of its options."""
     options, training = model.options, model.training
-    read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split != "test"]
+    splits = {"train", "validation", *map(set_name, options.extra_rows)}
+    read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split in splits]
     needs = tuple(part.task.id for part in read)
     spec: dict[str, Any] = {
         "versions": [options.version, versions.TRAINING],

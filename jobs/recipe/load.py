@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jobs.recipe.recipe import Recipe, RecipeFile
 from jobs.recipe.trained_by import refuse_unlike, with_teachers
-from jobs.recipe.validation import refuse_contradictions
+from jobs.recipe.validation import validate_recipe
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.shipped import SHIPPED
 from reports.options import BenchOptions
@@ -76,7 +76,7 @@ def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
         teachers=teachers,
     )
-    refuse_contradictions(recipe, where)
+    validate_recipe(recipe, where)
     refuse_unlike(recipe, where)
     return recipe
 

@@ -86,6 +86,13 @@ class ModelRecipe(_Section):
         return self.options.of_one_material
 
     @property
+    def trained_roles(self) -> frozenset[str]:
+        """Roles of the fabrics that it is trained on: each named fabric by itself, or all but the unseen ones."""
+        if not self.learns:
+            return frozenset()
+        return frozenset({"seen", "unseen"} if self.of_one_material else {"seen", "population"})
+
+    @property
     def learns(self) -> bool:
         """Whether there is anything to train."""
         return self.options.learns

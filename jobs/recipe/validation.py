@@ -1,21 +1,58 @@
-"""What the sections of a recipe must not say together: each may be right by itself."""
+"""Validation across the sections of a recipe: each may be right by itself and still not fit the others."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 from jobs.recipe.recipe import Recipe
-from pipeline.truth.options import TruthOptions
+from pipeline.models.domain import PHYSICS
+from pipeline.shards.angular_samples import AngularSamples
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
 from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+_PLAIN = TruthOptions()
+_LEARNT = ("frame", "normaliser", "geometry", "shadows", "variation")  # physics that not every model can learn
 
 
-def refuse_contradictions(recipe: Recipe, where: str) -> None:
-    """Refuse sections that do not fit together.
+def validate_recipe(recipe: Recipe, where: str) -> None:
+    """Check that the sections of a recipe fit together, so that no task is refused in the middle of a run.
 
     Raises
     ------
     BadInput
-        For names given twice, an unseen draft in the population, other physics for training rows than for the rest,
-        and models that do not know the queries or the physics of the data set.
+        For names given twice, an unseen draft in the population, different physics in two tables of truth options,
+        models that do not know the queries or the physics of the data set, and the estimator `table` for cloth or
+        queries that it does not know.
     """
+    _check_names(recipe, where)
+    _check_population(recipe, where)
+    _check_models(recipe, where)
+    _check_physics(recipe, where)
+    _check_estimators(recipe, where)
+
+
+def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[Fabric]) -> str:
+    """Return why the estimator `table` cannot answer all queries of a distribution; empty if it can.
+
+    `table` answers from its nodes or not at all, so that tests and timings know what they compare. `auto` takes the
+    same table where it is good enough and samples the rest; with a large `relative_error` it costs the same.
+    """
+    if any(getattr(truth, name) != getattr(_PLAIN, name) for name in ("frame", "geometry", "shadows", "variation")):
+        return "it knows the default frame, geometry, shadows and variation only"
+    if queries.sigma[0] < TABLE_SIGMA:
+        return f"it knows footprints from {TABLE_SIGMA:.3g} yarn spacings on, the queries begin at {queries.sigma[0]:g}"
+    if queries.stretch > 1.0 or queries.curvature[1] > 0.0:
+        return "it knows round footprints of flat cloth only"
+    for fabric in fabrics:
+        ends, picks = fabric.weave.repeat
+        if ends * picks > TABLE_CELLS and (cells := fabric.weave.different_cells()) > TABLE_CELLS:
+            return f"it knows at most {TABLE_CELLS} different cells, {fabric.name} has {cells}"
+    return ""
+
+
+def _check_names(recipe: Recipe, where: str) -> None:
     for key, names in (
         ("dataset", [fabric.name for fabric in recipe.fabrics]),
         ("models", [model.options.name for model in recipe.models]),
@@ -23,34 +60,83 @@ def refuse_contradictions(recipe: Recipe, where: str) -> None:
         for name in names:
             if names.count(name) > 1:
                 raise BadInput(where, key, name, "names must differ, because files are called by them")
+
+
+def _check_population(recipe: Recipe, where: str) -> None:
     if recipe.population and not recipe.dataset.rows.population:
         raise BadInput(where, "dataset.rows.population", 0, "must be > 0 when dataset.population.count is")
-    # Where a seen fabric has the same draft, it is the yarns that are unseen.
+    # Where a seen fabric has the same draft, only the yarns are unseen.
     seen = {fabric.weave.canonical() for fabric in recipe.seen}
     unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen if fabric.weave.canonical() not in seen}
     for member in recipe.population:
         if fabric := unseen.get(member.weave.canonical()):
             allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
             raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
-    truth, training_truth = recipe.dataset.truth, recipe.dataset.truth_of("train")
-    for name in ("footprint", "frame", "normaliser", "geometry", "shadows", "variation"):
-        if (value := getattr(training_truth, name)) != getattr(truth, name):
-            allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
-            raise BadInput(where, f"dataset.training_truth.{name}", value, allowed)
-    queries = recipe.dataset.queries
-    asked = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-    plain = TruthOptions()
-    if recipe.bench.bounds and (kinds := [kind for kind, there in asked.items() if there]):
-        raise BadInput(where, "bench.bounds", True, f"the bound does not know queries with {' and '.join(kinds)}")
+
+
+def _check_physics(recipe: Recipe, where: str) -> None:
+    """Refuse rows, samples and pictures of another physics than that of `dataset.truth`."""
+    truth = recipe.dataset.truth
+    for key, other, _, _ in _truths(recipe):
+        for name in PHYSICS:
+            if (value := getattr(other, name)) != getattr(truth, name):
+                allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
+                raise BadInput(where, f"{key}.{name}", value, allowed)
+
+
+def _check_estimators(recipe: Recipe, where: str) -> None:
+    for key, truth, queries, fabrics in _truths(recipe):
+        if truth.estimator != "table":
+            continue
+        reason = table_refusal(truth, queries, fabrics) if queries else "footprints of pictures are not known before"
+        if reason:
+            raise BadInput(where, f"{key}.estimator", "table", f"{reason}; take 'auto'")
+
+
+def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | None, Sequence[Fabric]]]:
+    """Yield each table of truth options: its key, itself, the queries if they are known, the fabrics."""
+    dataset, bench = recipe.dataset, recipe.bench
+    named = (*recipe.seen, *recipe.unseen)
+    trained = (*recipe.seen, *recipe.population)
+    if any("unseen" in model.trained_roles for model in recipe.own_models):
+        trained = recipe.fabrics
+    yield "dataset.truth", dataset.truth, dataset.queries, named if dataset.training_truth else (*named, *trained)
+    if dataset.training_truth:
+        yield "dataset.training_truth", dataset.training_truth, dataset.queries, trained
     for index, model in enumerate(recipe.models):
-        for kind in (kind for kind, there in asked.items() if there and kind not in model.options.kinds):
+        for rows in model.options.extra_rows:
+            if isinstance(rows, AngularSamples):
+                # A general model computes the samples of unseen fabrics as well.
+                yield f"models.{index}.truth", rows.truth, rows.queries, recipe.fabrics
+    yield "bench.truth", bench.truth, None, named
+    yield "bench.frame_truth", bench.frame_truth, None, named
+    if dataset.queries.curvature[1] > 0:
+        yield "bench.edge.truth", bench.edge.truth, None, named
+    if bench.scenes.names:
+        yield "bench.scenes.truth", bench.scenes.truth, None, named
+        yield "bench.scenes.frame_truth", bench.scenes.frame_truth, None, named
+
+
+def _check_models(recipe: Recipe, where: str) -> None:
+    queries, truth = recipe.dataset.queries, recipe.dataset.truth
+    kinds = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
+    drawn = [kind for kind, there in kinds.items() if there]
+    if recipe.bench.bounds and drawn:
+        raise BadInput(where, "bench.bounds", True, f"the bound does not know queries with {' and '.join(drawn)}")
+    for index, model in enumerate(recipe.models):
+        options = model.options
+        for kind in (kind for kind in drawn if kind not in options.kinds):
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
-            raise BadInput(where, f"models.{index}.name", model.options.name, allowed)
-        for name in () if model.options.any_physics else ("frame", "normaliser", "geometry", "shadows", "variation"):
-            if (value := getattr(truth, name)) != (own := getattr(plain, name)):
-                allowed = f"{model.options.name} (models.{index}) knows {name} = {own!r} only"
+            raise BadInput(where, f"models.{index}.name", options.name, allowed)
+        for name in () if options.any_physics else _LEARNT:
+            if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
+                allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        footprint = getattr(model.options, "footprint", truth.footprint)
+        footprint = getattr(options, "footprint", truth.footprint)
         if footprint != truth.footprint:
             key = f"models.{index}.footprint"
             raise BadInput(where, key, footprint, f"must be that of dataset.truth, {truth.footprint!r}")
+        largest = getattr(options, "largest_curvature", queries.curvature[1])
+        if largest < queries.curvature[1]:
+            allowed = f"must not be below that of dataset.queries.curvature, {queries.curvature[1]:g}"
+            raise BadInput(where, f"models.{index}.largest_curvature", largest, allowed)

@@ -1,4 +1,4 @@
-"""The manifest of a data set, kept in step with the ledger."""
+"""Keep the manifest of a data set in step with the ledger."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jobs.run.ledger import Ledger
 
 
 class ManifestFile:
-    """The manifest on disk, kept in step with the ledger; it changes no byte when there is nothing new to say."""
+    """The manifest on disk, kept in step with the ledger; it is not rewritten without a change."""
 
     def __init__(self, recipe: Recipe, parts: Sequence[Shard], ledger: Ledger) -> None:
         self._recipe, self._ledger = recipe, ledger
@@ -39,6 +39,7 @@ class ManifestFile:
             self._entries[part.task.id] = ShardEntry(
                 file=name,
                 fabric=question.fabric.name,
+                kind=question.kind,
                 split=question.split,
                 start=question.start,
                 rows=question.rows,

@@ -21,9 +21,9 @@ def run(task: Task, out: Path, progress: Progress) -> None:
 
 
 def _generate(task: Task, out: Path, progress: Progress) -> None:
-    from pipeline.shards.generate import ShardTask, generate_shard
+    from pipeline.shards.generate import SHARD_TASK, generate_shard
 
-    question = ShardTask.model_validate(task.setting["question"])
+    question = SHARD_TASK.validate_python(task.setting["question"])
     first, *others = (out / path for path in task.products)
     generate_shard(question, first, progress)
     for other in others:  # of other data sets that hold it

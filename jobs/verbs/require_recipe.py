@@ -19,12 +19,12 @@ import tomli_w
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from jobs.recipe.validation import table_refusal
 from pipeline.atomic import atomic_write
 from pipeline.models.domain import PHYSICS
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
-from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.validation import validated
 
@@ -155,19 +155,8 @@ def _stated(truth: TruthOptions) -> dict[str, Any]:
 
 
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
-    """Tell whether an estimator answers the distribution's queries, the smallest footprints, about all fabrics."""
-    if truth.estimator == SAMPLED.estimator:
-        return True
-    from pipeline.shards.queries import draw_queries
-    from pipeline.truth.estimator import estimate
-
-    smallest = queries.model_copy(update={"sigma": (queries.sigma[0], queries.sigma[0])})
-    try:
-        for fabric in fabrics:
-            estimate(fabric, draw_queries(smallest, fabric.weave.repeat, 0, 0, 2), truth, 0)
-    except BadInput:
-        return False
-    return True
+    """Tell whether an estimator answers all queries of the distribution about all fabrics."""
+    return truth.estimator != "table" or not table_refusal(truth, queries, fabrics)
 
 
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:

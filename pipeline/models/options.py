@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from pipeline import versions
+from pipeline.shards.extra_rows import ExtraRows
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
 """A name that is valid in file names and task ids."""
@@ -68,6 +69,11 @@ class Options(BaseModel):
     def kinds(self) -> frozenset[str]:
         """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
         return frozenset()
+
+    @property
+    def extra_rows(self) -> tuple[ExtraRows, ...]:
+        """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
+        return ()
 
     knob: ClassVar[str] = ""
     """Name of the field that holds the values of the speed-accuracy knob; empty if there is none."""

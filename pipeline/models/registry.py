@@ -1,7 +1,8 @@
 """Models by name and from folders; a model's file is imported when it is needed.
 
 The file ``pipeline/models/NAME/model.py`` offers ``restore(options, trained) -> list of Method`` and, if it learns,
-``build(options, fabrics) -> Network``, where `trained` pairs each model card with its weights.
+``build(options, fabrics, *extra) -> Network``, where `trained` pairs each model card with its weights. `extra` is one
+list for each set that ``options.extra_rows`` declares: the columns of its rows, fabric by fabric.
 """
 
 from __future__ import annotations

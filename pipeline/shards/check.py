@@ -1,4 +1,4 @@
-"""Whether shards are what their manifest says: hashes, schema, ranges, finite values."""
+"""Check shards against their manifest: hashes, schema, ranges, finite values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.schema import SCHEMA, STANDARD_ERRORS
+from pipeline.shards.schema import SCHEMAS, STANDARD_ERRORS
 from pipeline.shards.store import read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import STEEPEST_CURVATURE
@@ -27,7 +27,7 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
     if file_sha256(path) != entry.sha256:
         faults.append(f"{path}: its bytes are not those that were written (SHA-256 differs); delete it and generate")
     try:
-        table = read_table(path)
+        table = read_table(path, entry.kind)
     except BadInput as error:
         return [*faults, str(error)]
     if table.num_rows != entry.rows:
@@ -36,20 +36,22 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
         faults.append(f"{path}: column fabric holds other names than {entry.fabric!r}")
 
     # Values: finite, within their ranges, directions of unit length.
-    column = {name: table.column(name).to_numpy() for name in SCHEMA.names if name != "fabric"}
+    column = {name: table.column(name).to_numpy() for name in SCHEMAS[entry.kind].names[1:]}
     ends, picks = manifest.fabrics[entry.fabric].weave.repeat
     ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (-1.0, 1.0), "count": (1, np.inf)}
     ranges |= {"angle": (-np.inf, np.inf), "curvature": (0.0, STEEPEST_CURVATURE)}
     ranges |= {TRANSPARENCY: (0.0, 1.0), f"{TRANSPARENCY}_standard_error": (0.0, np.inf)}
-    ranges |= dict.fromkeys(("sigma", "sigma_minor", *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
+    ranges |= {"opacity": (0.0, 1.0)}
+    positive = ("sigma", "sigma_minor", "opacity_standard_error", "grazing_mean", "grazing_variance")
+    ranges |= dict.fromkeys((*positive, *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
     for name, values in column.items():
         low, high = ranges.get(name, (-1.0, 1.0))
         if not np.isfinite(values).all():
             faults.append(f"{path}: column {name} holds values that are not finite")
         elif values.size and (values.min() < low or values.max() > high):
             faults.append(f"{path}: column {name} spans [{values.min()}, {values.max()}], allowed [{low}, {high}]")
-    for prefix in ("wi", "wo"):
+    for prefix in (prefix for prefix in ("wi", "wo") if f"{prefix}_x" in column):
         length = np.sqrt(sum(column[f"{prefix}_{axis}"].astype(np.float64) ** 2 for axis in "xyz"))
-        if values.size and np.abs(length - 1).max() > _UNIT_TOLERANCE:
+        if length.size and np.abs(length - 1).max() > _UNIT_TOLERANCE:
             faults.append(f"{path}: {prefix} is off unit length by {np.abs(length - 1).max():.1e}")
     return faults

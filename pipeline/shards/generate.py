@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from pipeline import versions
-from pipeline.fingerprint import fingerprint
+from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.streams import stream_seed
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
@@ -19,12 +20,12 @@ _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 
 
 class ShardTask(BaseModel):
-    """Everything that a shard's numbers depend on, and the fabric's name."""
+    """Everything that a shard of the data set's own rows depends on, and the fabric's name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     fabric: Fabric
-    """The fabric asked about; its colours and source do not enter the numbers."""
+    """The fabric; its colours and source do not enter the numbers."""
     split: Literal["train", "validation", "test"]
     """Each split draws its own queries."""
     start: int = Field(ge=0)
@@ -34,35 +35,84 @@ class ShardTask(BaseModel):
     seed: int = Field(ge=0)
     """The data set's seed."""
     queries: QueryOptions = QueryOptions()
-    """Distribution of the questions."""
+    """Distribution of the queries."""
     truth: TruthOptions = TruthOptions()
     """How they are answered."""
 
+    @property
+    def kind(self) -> Kind:
+        """Kind of the rows, which names their columns (`pipeline.shards.schema`)."""
+        return "components"
+
     def identity(self) -> dict[str, Any]:
         """Return what the numbers depend on, without names, sources and colours; versions included."""
-        specification = self.model_dump(mode="json", exclude={"fabric"})
-        return {"version": versions.TRUTH, "optics": self.fabric.optics(), "name": self.fabric.name, **specification}
+        return _identity(self)
 
 
-def generate_shard(task: ShardTask, path: Path, progress: Callable[[float], None] = lambda fraction: None) -> None:
+class ExtraShardTask(BaseModel):
+    """Everything that a shard of extra rows depends on, and the fabric's name."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    fabric: Fabric
+    """The fabric; its colours and source do not enter the numbers."""
+    extra: ExtraRows
+    """The set that the rows belong to."""
+    start: int = Field(ge=0)
+    """First row of the set's stream."""
+    rows: int = Field(gt=0)
+    """Rows in this shard."""
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the rows, which names their columns (`pipeline.shards.schema`)."""
+        return self.extra.kind
+
+    @property
+    def split(self) -> str:
+        """Name of the set, in place of a split."""
+        return set_name(self.extra)
+
+    def identity(self) -> dict[str, Any]:
+        """Return what the numbers depend on, without names, sources and colours; versions included."""
+        return _identity(self)
+
+
+AnyShardTask = ShardTask | ExtraShardTask
+
+SHARD_TASK: Final = TypeAdapter[ShardTask | ExtraShardTask](AnyShardTask)
+"""Reads either kind of task from its JSON."""
+
+
+def generate_shard(task: AnyShardTask, path: Path, progress: Callable[[float], None] = lambda fraction: None) -> None:
     """Answer a task's queries and write them to `path`; `progress` is told the share done."""
     # Imported here so that a plan can name tasks without loading compilers.
-    from pipeline.shards.store import write_shard
+    from pipeline.shards.store import columns_of, write_columns
+
+    if isinstance(task, ShardTask):
+        columns = columns_of(*_answered(task, progress))
+    else:
+        answered = task.extra.answer(task.fabric, task.start, task.rows, lambda done: progress(done / task.rows))
+        columns = answered if isinstance(answered, dict) else columns_of(*answered)
+    write_columns(path, task.kind, task.fabric.name, columns, {"task": task.identity()})
+
+
+def _answered(task: ShardTask, progress: Callable[[float], None]) -> Any:
+    """Return queries and answers of a task of the data set's own rows."""
     from pipeline.truth.estimator import estimate
     from pipeline.truth.query import Answers
 
     stream = [task.fabric.optics(), task.split, task.seed]
-    queries = draw_queries(task.queries, task.fabric.weave.repeat, _seed("queries", stream), task.start, task.rows)
-    seed = _seed("points", stream)
+    seed = stream_seed("queries", stream)
+    queries = draw_queries(task.queries, task.fabric.weave.repeat, seed, task.start, task.rows)
     parts = []
     for first in range(0, task.rows, _CHUNK):
         chunk = queries.take(slice(first, first + _CHUNK))
-        parts.append(estimate(task.fabric, chunk, task.truth, seed, task.start + first))
+        parts.append(estimate(task.fabric, chunk, task.truth, stream_seed("points", stream), task.start + first))
         progress(min(1.0, (first + _CHUNK) / task.rows))
-    answers = Answers(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    write_shard(path, task.fabric.name, queries, answers, {"task": task.identity()})
+    return queries, Answers(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def _seed(purpose: str, stream: list[Any]) -> int:
-    """Return the 64-bit name of a stream of random numbers."""
-    return int(fingerprint([purpose, *stream], 16), 16)
+def _identity(task: AnyShardTask) -> dict[str, Any]:
+    specification = task.model_dump(mode="json", exclude={"fabric"})
+    return {"version": versions.TRUTH, "optics": task.fabric.optics(), "name": task.fabric.name, **specification}

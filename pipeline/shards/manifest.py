@@ -1,4 +1,4 @@
-"""What a data set holds: its fabrics and their roles, its shards and their hashes.
+"""Contents of a data set: its fabrics and their roles, its shards and their hashes.
 
 Roles: `seen` fabrics are named by the recipe; `population` members are drawn at random and only trained on; `unseen`
 fabrics are never shown to a general model (a per-material model, which knows no other fabric, reads their training
@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pipeline.atomic import atomic_write
+from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
 from pipeline.shards.schema import SCHEMA_VERSION
-from pipeline.shards.store import read_shard
+from pipeline.shards.store import read_columns, rows_of
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -36,8 +38,10 @@ class ShardEntry(BaseModel):
     """Name within the data set's folder."""
     fabric: str
     """Name of the fabric of all its rows."""
-    split: Split
-    """What its rows are for."""
+    kind: Kind = "components"
+    """Kind of its rows, which names its columns (`pipeline.shards.schema`)."""
+    split: str
+    """What its rows are for: train, validation or test; of extra rows the name of their set."""
     start: int
     """First row of the split's stream."""
     rows: int
@@ -54,7 +58,7 @@ class Manifest(BaseModel):
     name: str
     """Name of the recipe that asked for it."""
     fingerprint: str
-    """Fingerprint of everything that shaped it."""
+    """Fingerprint of everything that shaped its own rows; extra rows are part of the models that learn from them."""
     schema_version: int = SCHEMA_VERSION
     """Version of the columns."""
     roles: dict[Role, list[str]]
@@ -64,7 +68,7 @@ class Manifest(BaseModel):
     about: dict[str, Any]
     """The recipe's data set section."""
     shards: list[ShardEntry]
-    """The finished shards, in the order of fabric, split and row."""
+    """The finished shards, in the order of fabric, split or set, and row."""
 
     @classmethod
     def load(cls, folder: Path) -> Manifest:
@@ -91,12 +95,17 @@ class Manifest(BaseModel):
 
     def read(self, folder: Path, fabric: str, split: Split) -> tuple[Queries, Answers]:
         """Return all rows of a fabric's split in stream order, checksums verified; BadInput if there are none."""
+        return rows_of(self._columns(folder, fabric, split))
+
+    def read_extra(self, folder: Path, fabric: str, extra: ExtraRows) -> dict[str, npt.NDArray[Any]]:
+        """Return all extra rows of a fabric by column, in stream order, checksums verified; BadInput if none."""
+        return self._columns(folder, fabric, set_name(extra))
+
+    def _columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
         entries = sorted(
             (s for s in self.shards if s.fabric == fabric and s.split == split), key=lambda entry: entry.start
         )
         if not entries:
             raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
-        parts = [read_shard(folder / entry.file) for entry in entries]
-        queries = Queries(*(np.concatenate(columns) for columns in zip(*(q for q, _ in parts), strict=True)))
-        answers = Answers(*(np.concatenate(columns) for columns in zip(*(a for _, a in parts), strict=True)))
-        return queries, answers
+        parts = [read_columns(folder / entry.file, entry.kind) for entry in entries]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -1,8 +1,8 @@
-"""The columns of a shard: one row is one query with its answer.
+"""The columns of a shard of each kind: one row is one query with its answer.
 
 Flat named columns, 32-bit floats; conventions (who is `wi`, is the cosine inside) are those of
-pipeline.truth.conventions. The file's own metadata repeats the choices that shaped it, so that a shard read alone is
-still understood.
+pipeline.truth.conventions. The file's own metadata repeats the choices that shaped it, so that a shard can be
+understood without this package.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Final
 
 import pyarrow as pa
 
+from pipeline.shards.extra_rows import Kind
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 
 SCHEMA_VERSION: Final = 2
@@ -57,4 +58,34 @@ SCHEMA: Final = pa.schema(
         _field("count", pa.int32(), "points evaluated for this row"),
     ]
 )
-"""Arrow schema of every shard, each column with its meaning."""
+"""Arrow schema of a query with its components, each column with its meaning."""
+
+_VIEW: Final = {
+    "u": _QUERY["u"],
+    "v": _QUERY["v"],
+    "sigma": "standard deviation of the round footprint, yarn spacings, > 0",
+    **{f"wo_{axis}": "unit vector to the viewer" for axis in "xyz"},
+    "curvature": "curvature of the cloth in the viewer's plane, 1/yarn spacings, > 0",
+}
+_OPACITY: Final = {
+    "opacity": "share of the camera rays that hit a yarn before they leave the cloth's boundary, in [0, 1]",
+    "opacity_standard_error": "standard error of opacity",
+}
+_GRAZING: Final = {
+    "grazing_mean": "mean over the footprint of the cosine at which a ray just touches, over the root of the curvature",
+    "grazing_variance": "variance over the footprint of the same",
+}
+
+
+def _silhouette(answer: dict[str, str]) -> pa.Schema:
+    columns = {**_VIEW, **answer}
+    return pa.schema([SCHEMA.field("fabric"), *(_field(name, pa.float32(), columns[name]) for name in columns)])
+
+
+SCHEMAS: Final[dict[Kind, pa.Schema]] = {
+    "components": SCHEMA,
+    "angular_samples": SCHEMA,
+    "opacity": _silhouette(_OPACITY),
+    "grazing_cosine": _silhouette(_GRAZING),
+}
+"""Arrow schema of every kind of rows."""

@@ -13,38 +13,46 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
-from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION, STANDARD_ERRORS
+from pipeline.shards.extra_rows import Kind
+from pipeline.shards.schema import SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 
 _KEY = b"twillight"
 _ROW_GROUP = 16_384
-_FLOATS = [field.name for field in SCHEMA if field.type == pa.float32()]
+
+Columns = Mapping[str, npt.NDArray[Any]]
+"""Columns of rows by name, all of one length; the fabric's name is none of them."""
 
 
 def write_shard(path: Path, fabric: str, queries: Queries, answers: Answers, about: dict[str, Any]) -> None:
+    """Write N queries with their answers as a shard of kind `components`; parameters as for `write_columns`."""
+    write_columns(path, "components", fabric, columns_of(queries, answers), about)
+
+
+def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: dict[str, Any]) -> None:
     """Write one shard.
 
     Parameters
     ----------
     path : Path
         The file; it appears whole.
+    kind : Kind
+        Kind of the rows, a key of `SCHEMAS`.
     fabric : str
         Name of the fabric of every row.
-    queries, answers : Queries, Answers
-        N rows.
+    columns : mapping
+        All columns of the kind but `fabric`, N values each.
     about : dict
         JSON-able facts of the file: the task that made it, options, versions.
     """
-    names = pa.DictionaryArray.from_arrays(np.zeros(len(queries.u), np.int32), pa.array([fabric]))
-    columns = [queries.u, queries.v, queries.sigma, *queries.wi.T, *queries.wo.T]
-    columns += [queries.sigma_minor, queries.angle, queries.curvature]
-    columns += [*answers.mean.T, *answers.standard_error.T]
-    columns += [answers.transparency, answers.transparency_standard_error, answers.count]
-    arrays = [names, *(pa.array(np.ascontiguousarray(column)) for column in columns)]
+    schema = SCHEMAS[kind]
+    rows = len(next(iter(columns.values())))
+    names = pa.DictionaryArray.from_arrays(np.zeros(rows, np.int32), pa.array([fabric]))
+    arrays = [names, *(pa.array(np.ascontiguousarray(columns[name])) for name in schema.names[1:])]
     facts = json.dumps({"schema_version": SCHEMA_VERSION, **about}, sort_keys=True).encode()
-    table = pa.Table.from_arrays(arrays, schema=SCHEMA.with_metadata({_KEY: facts}))
+    table = pa.Table.from_arrays(arrays, schema=schema.with_metadata({_KEY: facts}))
     with atomic_path(path) as temporary:
         pq.write_table(
             table,
@@ -52,19 +60,20 @@ def write_shard(path: Path, fabric: str, queries: Queries, answers: Answers, abo
             row_group_size=_ROW_GROUP,
             compression="zstd",
             use_dictionary=["fabric"],
-            use_byte_stream_split=_FLOATS,
+            use_byte_stream_split=[field.name for field in schema if field.type == pa.float32()],
             write_page_checksum=True,
         )
 
 
-def read_table(path: Path) -> pa.Table:
-    """Read a shard with its checksums verified.
+def read_table(path: Path, kind: Kind = "components") -> pa.Table:
+    """Read a shard of a kind with its checksums verified.
 
     Raises
     ------
     BadInput
-        If the file is missing, cut short, damaged, or not a shard of this schema.
+        If the file is missing, cut short, damaged, or not a shard of this kind and schema.
     """
+    schema = SCHEMAS[kind]
     try:
         table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
     except FileNotFoundError as error:
@@ -74,33 +83,52 @@ def read_table(path: Path) -> pa.Table:
         raise BadInput(
             str(path), "", f"not a whole Parquet file ({reason})", "delete it and run `twillight generate`"
         ) from error
-    if not table.schema.equals(SCHEMA, check_metadata=False):
-        odd = sorted(set(table.schema.names) ^ set(SCHEMA.names))
+    if not table.schema.equals(schema, check_metadata=False):
+        odd = sorted(set(table.schema.names) ^ set(schema.names))
         detail = f"columns {', '.join(odd)} differ" if odd else "column types differ"
-        raise BadInput(str(path), "schema", detail, f"must be schema version {SCHEMA_VERSION}")
+        raise BadInput(str(path), "schema", detail, f"must be schema version {SCHEMA_VERSION} of {kind}")
     return table
 
 
 def read_about(path: Path) -> dict[str, Any]:
-    """Return the facts that `write_shard` stored in a shard's metadata."""
+    """Return the facts that a shard's metadata hold."""
     metadata = pq.read_schema(path).metadata or {}
     facts: dict[str, Any] = json.loads(metadata.get(_KEY, b"{}"))
     return facts
 
 
+def read_columns(path: Path, kind: Kind) -> dict[str, npt.NDArray[Any]]:
+    """Read a shard's columns but the fabric with their checksums verified; errors as `read_table`."""
+    table = read_table(path, kind)
+    return {name: table.column(name).to_numpy() for name in SCHEMAS[kind].names[1:]}
+
+
 def read_shard(path: Path) -> tuple[Queries, Answers]:
-    """Read a shard's rows with their checksums verified; errors as `read_table`."""
-    table = read_table(path)
-    column = {name: table.column(name).to_numpy() for name in SCHEMA.names if name != "fabric"}
-    queries = queries_of(column)
+    """Read a shard of kind `components`; errors as `read_table`."""
+    return rows_of(read_columns(path, "components"))
+
+
+def columns_of(queries: Queries, answers: Answers) -> dict[str, npt.NDArray[Any]]:
+    """Return queries and answers by column."""
+    axes = [("wi_x", "wi_y", "wi_z"), ("wo_x", "wo_y", "wo_z"), COMPONENTS, STANDARD_ERRORS]
+    columns: dict[str, npt.NDArray[Any]] = {"u": queries.u, "v": queries.v, "sigma": queries.sigma}
+    for names, values in zip(axes, (queries.wi, queries.wo, answers.mean, answers.standard_error), strict=True):
+        columns |= dict(zip(names, values.T, strict=True))
+    columns |= {"sigma_minor": queries.sigma_minor, "angle": queries.angle, "curvature": queries.curvature}
+    columns |= {TRANSPARENCY: answers.transparency, "count": answers.count}
+    return columns | {f"{TRANSPARENCY}_standard_error": answers.transparency_standard_error}
+
+
+def rows_of(column: Columns) -> tuple[Queries, Answers]:
+    """Return the queries and answers that columns hold: the inverse of `columns_of`."""
     mean = np.stack([column[name] for name in COMPONENTS], axis=-1)
     standard_error = np.stack([column[name] for name in STANDARD_ERRORS], axis=-1)
     through = column[TRANSPARENCY], column[f"{TRANSPARENCY}_standard_error"]
-    return queries, Answers(mean, standard_error, column["count"], *through)
+    return queries_of(column), Answers(mean, standard_error, column["count"], *through)
 
 
 def queries_of(column: Mapping[str, npt.NDArray[np.float32]]) -> Queries:
-    """Gather the columns of questions."""
+    """Return the queries that columns hold."""
     return Queries(
         column["u"],
         column["v"],

@@ -84,7 +84,9 @@ def train(
 
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
-        network: Any = module_of(options.model).build(options, members)
+        extra = [[manifest.read_extra(manifest_folder, name, one) for name in fabrics] for one in options.extra_rows]
+        network: Any = module_of(options.model).build(options, members, *extra)
+        del extra
         stride = max(len(rows.table) // _START_ROWS, 1)
         network.start_at(torch.from_numpy(rows.table[::stride, TARGET].copy()))
         network.to(device).train()

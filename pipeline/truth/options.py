@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "table", "auto", "elliptic"]
+
+TABLE_CELLS: Final = 96
+"""Most different cells of a cloth that the estimator `table` knows; a table of more would take too long to build."""
+
+TABLE_SIGMA: Final = 1.25 / 32
+"""Smallest standard deviation of a footprint, in yarn spacings, that the nodes of the estimator `table` resolve."""
 
 
 class Variation(BaseModel):

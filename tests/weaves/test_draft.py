@@ -135,3 +135,19 @@ def test_draft_is_a_read_only_copy_and_survives_pickling():
         draft.warp_over[0, 0] = False
     assert pickle.loads(pickle.dumps(draft)) == draft
     assert hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
+
+
+@pytest.mark.parametrize(
+    ("rows", "cells"),
+    [
+        (["#"], 1),
+        (["#.", ".#"], 2),
+        (["#.#.", ".#.#", "#.#.", ".#.#"], 2),
+        (["#...", ".#..", "..#.", "...#"], 4),
+        (["#..", "...", "..."], 9),
+        (["##..", "##..", "..##", "..##"], 8),
+    ],
+    ids=["one", "plain", "plain drawn twice", "twill", "single point", "basket"],
+)
+def test_different_cells_are_those_no_translation_carries_into_another(rows, cells):
+    assert Draft.from_rows(rows).different_cells() == cells

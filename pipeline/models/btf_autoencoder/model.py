@@ -6,7 +6,8 @@ One network for each fabric, so that eight numbers a texel are enough; with 3 ou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from pipeline.models.method import Trained
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import PerQuery
 from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork, restored
+from pipeline.models.unified_btf.model import build as unified_btf
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -61,10 +63,12 @@ class BtfAutoencoder:
         return self._known.of(fabric).bytes_stored(fabric)
 
 
-def build(options: BtfAutoencoderOptions, fabrics: Sequence[Fabric]) -> UnifiedBtfNetwork:
-    """Return an untrained network; there must be exactly one fabric."""
+def build(
+    options: BtfAutoencoderOptions, fabrics: Sequence[Fabric], samples: Sequence[Mapping[str, npt.NDArray[Any]]]
+) -> UnifiedBtfNetwork:
+    """Return an untrained network with its angular samples by column; there must be exactly one fabric."""
     (fabric,) = fabrics
-    return UnifiedBtfNetwork(options, [fabric])
+    return unified_btf(options, [fabric], samples)
 
 
 def restore(options: BtfAutoencoderOptions, trained: Trained) -> list[BtfAutoencoder]:

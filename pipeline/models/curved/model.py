@@ -13,17 +13,17 @@ step in it. Over a footprint that cosine has a distribution: its mean and deviat
 sqrt(kappa), from `pipeline.truth.geometry.opacity.grazing_cosine`, and the opacity is that Gaussian's share below wo.z.
 For that variant gaps count as filled, as they do in its truth.
 
-A shard's transparency is another thing: what goes straight through the cloth at the points that the viewer sees.
-So the truth of the silhouette is asked when a network is built (pipeline.models.curved.silhouettes). ADAPTED as in
-`neumip`: four components, specular ones in log space, counts of texels and steps. The paper has one level and no
-footprint: `levels = 1` is its network.
+A row's transparency is another quantity: the share of light that goes straight through the cloth at the points that the
+viewer sees. So the silhouette is learnt from rows of its own (pipeline.shards.silhouettes). ADAPTED as in `neumip`:
+four components, specular ones in log space, counts of texels and steps. The paper has one level and no footprint:
+`levels = 1` is its network.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from pipeline.models.curved.options import CurvedOptions
-from pipeline.models.curved.silhouettes import Silhouettes, View, draw_silhouettes
+from pipeline.models.curved.silhouettes import Silhouettes, View, silhouettes_of
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.networks.losses import to_components, to_network, weighted_error
 from pipeline.models.networks.perceptron import perceptron
@@ -126,7 +126,7 @@ class CurvedNetwork(TextureNetwork):
         return mean, _SHARPEST + functional.softplus(width)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
-        """Return the weighted squared error of the components, and the silhouette's own loss at random questions."""
+        """Return the weighted squared error of the components, and the silhouette's own loss at random rows."""
         options = self.options
         ends, picks = self.repeat
         columns = (batch.u / ends, batch.v / picks, batch.sigma, batch.wo, batch.curvature)
@@ -236,12 +236,14 @@ def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:
     return to_components(network(view, wi), network.options.log_k)
 
 
-def build(options: CurvedOptions, fabrics: Sequence[Fabric]) -> CurvedNetwork:
-    """Return an untrained network with its questions about the silhouette; there must be exactly one fabric."""
-    (fabric,) = fabrics
+def build(
+    options: CurvedOptions, fabrics: Sequence[Fabric], silhouettes: Sequence[Mapping[str, npt.NDArray[Any]]]
+) -> CurvedNetwork:
+    """Return an untrained network with its rows about the silhouette; there must be exactly one fabric."""
+    (fabric,), (columns,) = fabrics, silhouettes
     front = cloth_side(fabric, TruthOptions()).front
     fall = _NO_FALL if has_gaps(front) else float(front.highest - front.lowest)
-    return CurvedNetwork(options, fabric.weave.repeat, draw_silhouettes(options, fabric), fall)
+    return CurvedNetwork(options, fabric.weave.repeat, silhouettes_of(columns, fabric.weave.repeat), fall)
 
 
 def restore(options: CurvedOptions, trained: Trained) -> list[Curved]:

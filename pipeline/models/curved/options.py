@@ -7,6 +7,8 @@ from typing import ClassVar, Literal
 from pydantic import Field, model_validator
 
 from pipeline.models.options import LogK, Name, Options, Weight
+from pipeline.shards.extra_rows import ExtraRows
+from pipeline.shards.silhouettes import Silhouettes
 
 
 class CurvedOptions(Options):
@@ -22,7 +24,7 @@ class CurvedOptions(Options):
     texels_per_yarn: int = Field(default=16, ge=1, le=256)
     """Texels of the finest level along one yarn spacing; textures hold one repeat and wrap."""
     levels: int = Field(default=0, ge=0, le=12)
-    """Levels of the pyramids of opacity and reflectance: 1 as published, for questions without a footprint; 0 means
+    """Levels of the pyramids of opacity and reflectance: 1 as published, for queries without a footprint; 0 means
     down to one texel."""
     channels: int = Field(default=7, ge=1, le=32)
     """Channels of every texture; the paper does not say."""
@@ -41,11 +43,11 @@ class CurvedOptions(Options):
     certain: bool = True
     """Answer an opacity of 1 where every ray sinks below every yarn; only for cloths without gaps."""
     footprint: Literal["gaussian", "box"] = "gaussian"
-    """Kernel of the questions about the silhouette; must be the kernel of the truth."""
+    """Kernel of the queries about the silhouette; must be the kernel of the truth."""
     silhouette_texels_per_yarn: int = Field(default=4, ge=1, le=256)
     """Texels of the opacity's own texture. A ray meets crests yarns away, so that finer ones hold little but noise."""
     silhouette_rows: int = Field(default=262_144, ge=64, le=2**24)
-    """Questions about the silhouette, asked once before the training."""
+    """Queries about the silhouette, in shards of their own."""
     silhouette_points: Literal[32, 64, 128, 256, 512, 1024] = 32
     """Rays of each; of grazing cosines a sixteenth."""
     silhouette_sigma: tuple[float, float] = (0.05, 32.0)
@@ -53,9 +55,9 @@ class CurvedOptions(Options):
     largest_curvature: float = Field(default=0.5, gt=0, le=1)
     """Largest curvature learnt and answered, in 1/yarn spacings."""
     silhouette_anywhere: float = Field(default=0.1, ge=0, le=1)
-    """Share of these questions with any cosine; the others lie where the opacity varies."""
+    """Share of these queries with any cosine; the others lie where the opacity varies."""
     silhouette_seed: int = Field(default=0, ge=0, lt=2**63)
-    """Seed of these questions and of their rays."""
+    """Seed of these queries and of their rays."""
     silhouette_weight: Weight = 0.1
     """Weight of the silhouette's loss. It shares no weight with the rest, so it sets little but what clipping keeps."""
     blur: float = Field(default=8.0, ge=0, le=64)
@@ -78,6 +80,25 @@ class CurvedOptions(Options):
         if not 0 < low <= high:
             raise ValueError(f"silhouette_sigma must be [low, high] with 0 < low <= high, got [{low}, {high}]")
         return self
+
+    @property
+    def silhouettes(self) -> Silhouettes:
+        """The queries about the silhouette."""
+        return Silhouettes(
+            kind="opacity" if self.silhouette == "opacity" else "grazing_cosine",
+            rows=self.silhouette_rows,
+            points=self.silhouette_points,
+            sigma=self.silhouette_sigma,
+            largest_curvature=self.largest_curvature,
+            anywhere=self.silhouette_anywhere,
+            footprint=self.footprint,
+            seed=self.silhouette_seed,
+        )
+
+    @property
+    def extra_rows(self) -> tuple[ExtraRows, ...]:
+        """The queries about the silhouette of the trained fabric."""
+        return (self.silhouettes,)
 
     @property
     def departures(self) -> tuple[str, ...]:

@@ -1,14 +1,14 @@
-"""Angular samples of a fabric's texels: the synthetic bidirectional texture that an encoder reads.
+"""Angular samples of a fabric's texels as arrays: the synthetic bidirectional texture that an encoder reads.
 
-One repeat is a grid of texels, each a small Gaussian footprint. All texels of a fabric are asked under the same
-directions, as a measured texture's are: what an encoder makes of the directions is then computed once for all of them.
-The directions are another random set for every fabric, so that no encoder can learn them by heart.
+A training reads the samples of its fabrics from shards. A fabric that is added to a trained model brings its samples
+with it, as in the paper: computing them is part of the method, and of the time that adding a fabric takes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -16,12 +16,9 @@ import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.unified_btf.options import BtfOptions
-from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.query import Queries
+from pipeline.shards.store import columns_of
+from pipeline.truth.conventions import COMPONENTS
 from weaves.fabric import Fabric
-
-_BLOCK: Final = 1 << 17  # queries answered at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,46 +44,26 @@ class AngularSamples:
 _held: Final[WeakValueDictionary[str, AngularSamples]] = WeakValueDictionary()
 
 
-def angular_samples(fabric: Fabric, options: BtfOptions) -> AngularSamples:
-    """Return a fabric's samples; those that a network in training still holds are not drawn again."""
-    key = fingerprint([fabric.optics(), _identity(options)])
-    samples = _held.get(key)
-    if samples is None:
-        _held[key] = samples = draw_samples(fabric, options)
+def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> AngularSamples:
+    """Return a fabric's samples from their columns; as long as they are in use, `angular_samples` finds them."""
+    shape = options.angular_samples.grid(fabric)
+    texels = shape[0] * shape[1]
+    wi, wo = (np.stack([columns[f"{name}_{axis}"][::texels] for axis in "xyz"], axis=-1) for name in ("wi", "wo"))
+    values = np.empty((len(wi), texels, 4), np.float16)
+    for index, name in enumerate(COMPONENTS):
+        values[..., index] = columns[name].reshape(len(wi), texels)
+    samples = _held[_key(fabric, options)] = AngularSamples(shape, wi, wo, values)
     return samples
 
 
-def draw_samples(fabric: Fabric, options: BtfOptions) -> AngularSamples:
-    """Ask the truth for `options.samples` angular samples of every texel: what adding a fabric costs.
-
-    A sample depends on the fabric's optics, the grid and its own index alone: more samples begin with the same ones.
-    """
-    ends, picks = fabric.weave.repeat
-    fine, count = options.texels_per_yarn, options.samples
-    rows, columns = picks * fine, ends * fine
-    texels = rows * columns
-    row, column = np.divmod(np.arange(texels), columns)
-    u, v = ((column + 0.5) / fine).astype(np.float32), ((row + 0.5) / fine).astype(np.float32)
-    seed = int(fingerprint(["angular samples", fabric.optics(), _identity(options)["grid"]], 16), 16)
-    asked = QueryOptions(directions=options.directions, max_angle=options.max_angle)
-    drawn = draw_queries(asked, (1, 1), seed, 0, count)
-    values = np.empty((count, texels, 4), np.float16)
-    block = max(_BLOCK // texels, 1)
-    for start in range(0, count, block):
-        wi, wo = drawn.wi[start : start + block], drawn.wo[start : start + block]
-        queries = Queries.round(
-            np.tile(u, len(wi)),
-            np.tile(v, len(wi)),
-            np.full(texels * len(wi), options.texel_sigma / fine, np.float32),
-            np.repeat(wi, texels, axis=0),
-            np.repeat(wo, texels, axis=0),
-        )
-        answers = estimate(fabric, queries, options.truth, seed, start * texels)
-        values[start : start + block] = answers.mean.reshape(len(wi), texels, 4)
-    return AngularSamples((rows, columns), drawn.wi, drawn.wo, values)
+def angular_samples(fabric: Fabric, options: BtfOptions) -> AngularSamples:
+    """Return a fabric's samples: those in use in this process, such as a training's, else computed now."""
+    samples = _held.get(_key(fabric, options))
+    if samples is not None:
+        return samples
+    wanted = options.angular_samples
+    return read_samples(fabric, options, columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))))
 
 
-def _identity(options: BtfOptions) -> dict[str, object]:
-    """Return what samples depend on beside the fabric."""
-    grid = options.model_dump(mode="json", include={"texels_per_yarn", "texel_sigma", "directions", "max_angle"})
-    return {"grid": grid, "count": options.samples, "truth": options.truth.model_dump(mode="json")}
+def _key(fabric: Fabric, options: BtfOptions) -> str:
+    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json")])

@@ -20,7 +20,7 @@ round footprints only, as published.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ from pipeline.models.networks.perceptron import perceptron
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.models.unified_btf.angular_samples import angular_samples
+from pipeline.models.unified_btf.angular_samples import AngularSamples, angular_samples, read_samples
 from pipeline.models.unified_btf.options import BtfOptions, UnifiedBtfOptions
 from pipeline.models.unified_btf.set_encoder import ANGLES, SetEncoder, Texels, angles_of, read_texels
 from pipeline.shards.queries import QueryOptions
@@ -60,19 +60,19 @@ class UnifiedBtfNetwork(EncoderDecoder):
     ----------
     options : BtfOptions
         The design.
-    fabrics : sequence of Fabric
-        Training fabrics, addressed by index in batches; none for inference.
+    samples : sequence of AngularSamples
+        Samples of the training fabrics, addressed by index in batches; none for inference.
     """
 
     encoder: SetEncoder
     decoder: nn.Sequential
 
-    def __init__(self, options: BtfOptions, fabrics: Sequence[Fabric] = ()) -> None:
+    def __init__(self, options: BtfOptions, samples: Sequence[AngularSamples] = ()) -> None:
         super().__init__()
         self.options = options
         self.encoder, self.decoder = SetEncoder(options), decoder(options.latent, options.hidden)
-        self._samples = [angular_samples(fabric, options) for fabric in fabrics]  # held, so that none is drawn twice
-        self._texels = [read_texels(samples, options) for samples in self._samples]
+        self._samples = list(samples)  # kept in use, so that validation finds them
+        self._texels = [read_texels(one, options) for one in self._samples]
 
     def encode(self, texels: Texels, chosen: npt.NDArray[np.int64] | None = None) -> Tensor:
         """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
@@ -141,7 +141,7 @@ def averaged(latents: Tensor) -> list[Tensor]:
 
 
 class UnifiedBtf:
-    """A trained network that answers for any fabric; it draws the samples of each, and encodes them, once.
+    """A trained network that answers for any fabric; it computes and encodes the samples of each once.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class UnifiedBtf:
         return True
 
     def prepare(self, fabric: Fabric) -> None:
-        """Draw the fabric's samples from the truth and encode them, once: one forward pass, no optimisation."""
+        """Compute the fabric's samples and encode them, once: one forward pass, no optimisation."""
         self._pyramids.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
@@ -208,9 +208,12 @@ class UnifiedBtf:
             return [level.contiguous() for level in averaged(network.encode(texels))]
 
 
-def build(options: UnifiedBtfOptions, fabrics: Sequence[Fabric]) -> UnifiedBtfNetwork:
-    """Return an untrained network for these fabrics, whose samples are drawn now."""
-    return UnifiedBtfNetwork(options, fabrics)
+def build(
+    options: BtfOptions, fabrics: Sequence[Fabric], samples: Sequence[Mapping[str, npt.NDArray[Any]]]
+) -> UnifiedBtfNetwork:
+    """Return an untrained network for these fabrics, with their angular samples by column."""
+    pairs = zip(fabrics, samples, strict=True)
+    return UnifiedBtfNetwork(options, [read_samples(fabric, options, columns) for fabric, columns in pairs])
 
 
 def restore(options: UnifiedBtfOptions, trained: Trained) -> list[UnifiedBtf]:

@@ -1,4 +1,4 @@
-"""Options of `unified_btf`, and what it shares with `btf_autoencoder`."""
+"""Options of `unified_btf`, and those that it shares with `btf_autoencoder`."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.models.options import LogK, Name, Options, Weight
+from pipeline.shards.angular_samples import AngularSamples
+from pipeline.shards.extra_rows import ExtraRows
 from pipeline.truth.options import TruthOptions
 
 
 class BtfOptions(Options):
-    """What both encodings of bidirectional textures leave open."""
+    """Options of both encodings of bidirectional textures."""
 
     texels_per_yarn: int = Field(default=8, ge=1, le=64)
     """Texels along one yarn spacing."""
     texel_sigma: float = Field(default=0.5, gt=0, le=4)
     """Standard deviation of a texel's footprint, in texels."""
     samples: int = Field(default=128, ge=1, le=65_536)
-    """Angular samples of every texel: drawn from the truth when a fabric is added."""
+    """Angular samples of every texel; shards hold those of trained fabrics, any other fabric's are computed when it is
+    added."""
     fewest_samples: int = Field(default=50, ge=1)
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
     directions: Literal["projected_disc", "hemisphere"] = "projected_disc"
@@ -31,8 +34,8 @@ class BtfOptions(Options):
     angles: Literal["stereographic", "disc"] = "stereographic"
     """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
     log_samples: bool = False
-    """Whether the encoder reads the specular samples in log space, as the decoder answers; linear ones average as the
-    cloth does, and taught as much."""
+    """Whether the encoder reads the specular samples in log space, the space in which the decoder answers. Linear ones
+    average as the cloth does, and trained as well."""
     weights: int = Field(default=32, ge=1, le=512)
     """Weights m of every sample; not published."""
     encoder_hidden: int = Field(default=64, ge=4, le=1024)
@@ -51,6 +54,23 @@ class BtfOptions(Options):
     """Name of its folder in `pipeline.models`."""
     name: Name
     """Name of the trained model."""
+
+    @property
+    def angular_samples(self) -> AngularSamples:
+        """The samples of a fabric's texels."""
+        return AngularSamples(
+            texels_per_yarn=self.texels_per_yarn,
+            texel_sigma=self.texel_sigma,
+            samples=self.samples,
+            directions=self.directions,
+            max_angle=self.max_angle,
+            truth=self.truth,
+        )
+
+    @property
+    def extra_rows(self) -> tuple[ExtraRows, ...]:
+        """The samples of the trained fabrics' texels."""
+        return (self.angular_samples,)
 
     @model_validator(mode="after")
     def _enough_samples(self) -> Self:

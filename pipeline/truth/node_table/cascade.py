@@ -3,7 +3,7 @@
 `auto` asks a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a query
 and samples its own doubtful nodes where the error it states is above the one asked for (nodes, refine). What is still
 above is sampled as a whole, and so is what the table knows nothing of: tiny footprints, curved cloth, cloths of more
-than `_MOST_CELLS` different cells, and models other than the default. Footprints at an angle, which the table takes as
+than `TABLE_CELLS` different cells, and models other than the default. Footprints at an angle, which the table takes as
 mixtures (oblique), are `auto`'s to sample, as in all shards so far; `elliptic` asks the tables about them too.
 """
 
@@ -21,12 +21,10 @@ from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.symmetry import different_cells
 from pipeline.truth.monte_carlo import OWEN, sample_rows
 from pipeline.truth.node_table.answer import sum_rows
-from pipeline.truth.node_table.build import NODES, WIDE, Table, tabulate
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.node_table.build import WIDE, Table, tabulate
+from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
 from weaves.errors import BadInput
 
-_MOST_CELLS: Final = 96  # a table of more would take too long to build for a few queries
-_SMALLEST: Final = 1.25 / NODES  # standard deviation of a footprint, in yarn spacings, that nodes still resolve
 _UNBOUNDED: Final = (1.0, np.inf)  # relative and absolute error: whatever the table states will do
 _STUDENT: Final = 1.2  # 16 randomisations: so much wider is Student's t at 99.7 %
 """Factor on the standard error of sampled answers, so that three of them mean what they mean for a normal one."""
@@ -91,7 +89,7 @@ def table_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthO
     known, wide = tabulated(cloth, columns), _wide(columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
-        allowed = f"flat cloth of at most {_MOST_CELLS} different cells, footprints of at least {_SMALLEST:.3g} yarn "
+        allowed = f"flat cloth of at most {TABLE_CELLS} different cells, footprints of at least {TABLE_SIGMA:.3g} yarn "
         allowed += "spacings and not too thin, and the default frame, geometry, shadows and variation: take auto"
         raise BadInput("options", "estimator", f"table (row {index[row]})", allowed)
     rows = len(index)
@@ -116,12 +114,12 @@ def tabulated(cloth: ClothSide, columns: Columns) -> Mask:
     """Return which queries the table knows of, (N,)."""
     choices = cloth.choices
     other = choices.macro or choices.linear or not choices.shadows or cloth.varied
-    if other or different_cells(cloth.front) > _MOST_CELLS:
+    if other or different_cells(cloth.front) > TABLE_CELLS:
         return np.zeros(len(columns.u), np.bool_)
-    known = (np.minimum(columns.sigma, columns.sigma_minor) >= _SMALLEST) & (columns.curvature == 0.0)
+    known = (np.minimum(columns.sigma, columns.sigma_minor) >= TABLE_SIGMA) & (columns.curvature == 0.0)
     if (oblique := ~_axial(cloth, columns)).any():
         x, y, correlation = np.abs(axes(columns.sigma, columns.sigma_minor, columns.angle))
-        blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= _SMALLEST
+        blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= TABLE_SIGMA
         known &= ~oblique | (blurred & (correlation <= FINE_LINE.most) & (cloth.shape == GAUSSIAN))
     return np.asarray(known)
 

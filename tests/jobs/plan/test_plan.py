@@ -252,3 +252,41 @@ def test_settings_are_measured_on_scenes_one_by_one():
     assert len(ids(before, "bench", title)) == len(ids(after, "bench", title)) - 1
     assert set(ids(before, "bench", title)) < set(ids(after, "bench", title))
     assert ids(after, "bench", f"point_sampled k = 128 {title}")
+
+
+BTF = """
+[[models]]
+model = "unified_btf"
+texels_per_yarn = 2
+samples = 60
+
+[[models]]
+model = "btf_autoencoder"
+texels_per_yarn = 2
+samples = 60
+"""
+
+
+def test_extra_rows_are_tasks_that_equal_models_share(files, tasks):
+    """A general model reads the samples of seen and random fabrics, one of one material those of all named ones."""
+    files.text = files.text.replace("\n[bench]", BTF + "\n[bench]")
+    recipe = load_recipe(files.write())
+    after = plan(recipe)
+    extra = {task.id: task for task in after if task.stage == "generate" and "samples" in task.title}
+    names = {task.spec["name"] for task in extra.values()}
+    assert names == {fabric.name for fabric in recipe.fabrics}
+    for fabric in recipe.fabrics:
+        ends, picks = fabric.weave.repeat
+        rows = sum(task.rows for task in extra.values() if task.spec["name"] == fabric.name)
+        assert rows == 60 * 4 * ends * picks
+    read = {
+        task.title: {extra[need].spec["name"] for need in task.needs if need in extra}
+        for task in after
+        if task.stage == "train"
+    }
+    assert read["unified_btf on 5 fabrics"] == names - {"twill_4_4"}
+    assert read["btf_autoencoder on twill_4_4"] == {"twill_4_4"}
+    assert read["woven on 5 fabrics"] == set()
+    # What other models read and measure is as it was.
+    assert set(ids(tasks, "generate")) == set(ids(after, "generate")) - extra.keys()
+    assert {task.id for task in tasks if task.stage == "bench" and "timing" not in task.title} <= {t.id for t in after}

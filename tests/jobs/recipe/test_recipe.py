@@ -59,6 +59,27 @@ def test_a_recipe_of_ones_own(files):
             '[dataset.training_truth]\nfootprint = "box"',
             ["dataset.training_truth.footprint = 'box'", "must be that of dataset.truth, 'gaussian'"],
         ),
+        (
+            "sigma = [0.05, 8.0]\n\n[dataset.truth]",
+            'sigma = [0.03, 8.0]\n\n[dataset.truth]\nestimator = "table"',
+            ["dataset.truth.estimator = 'table'", "footprints from 0.0391 yarn spacings on"],
+        ),
+        ("frames = 4", 'truth = { estimator = "table" }', ["bench.truth.estimator = 'table'", "pictures", "'auto'"]),
+        (
+            "frames = 4",
+            "frame_truth = { shadows = false }",
+            ["bench.frame_truth.shadows", "dataset.truth, True"],
+        ),
+        (
+            'model = "neumip"',
+            'model = "unified_btf"\ntruth = { frame = "macro" }',
+            ["models.1.truth.frame = 'macro'", "must be that of dataset.truth, 'ply'"],
+        ),
+        (
+            'model = "neumip"',
+            'model = "unified_btf"\ntexels_per_yarn = 16\ntruth = { estimator = "table" }',
+            ["models.1.truth.estimator = 'table'", "footprints from 0.0391 yarn spacings on"],
+        ),
         ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
         ('model = "woven"', "", ["models.0.model is missing"]),
@@ -84,6 +105,31 @@ def test_bad_input_is_one_sentence(files, old, new, words):
     assert "\n" not in sentence and ".toml" in sentence
     for word in words:
         assert word in sentence, sentence
+
+
+def test_a_table_is_refused_for_cloth_of_too_many_cells(files):
+    """A stripe that shifts by one pick an end in 9 of 10 picks: no translation carries it onto itself."""
+    rows = ["#" + "." * 9, *["#." * 5] * 9]
+    files.exchange('family = "satin"\nends = 5\nmove = 2', f'family = "matrix"\nrows = {json.dumps(rows)}')
+    load_recipe(files.write())
+    files.exchange("relative_error = 0.05", 'estimator = "table"')
+    words = "at most 96 different cells, own has 100; take 'auto'"
+    with pytest.raises(BadInput, match=f"tiny.toml: dataset.truth.estimator = 'table': .* {words}"):
+        load_recipe(files.write())
+    # Only rows that are asked for count.
+    files.text = files.text.replace('"own.toml"]', "]").replace('["twill_4_4"]', '["own.toml"]')
+    files.text = files.text.replace('model = "neumip"', 'model = "soft_nodes"')
+    files.text = files.text.replace('estimator = "table"', '[dataset.training_truth]\nestimator = "table"')
+    load_recipe(files.write())
+
+
+def test_a_curvature_beyond_that_of_the_model_is_refused(files):
+    """`curved` would refuse the rows in the middle of a run."""
+    files.exchange("sigma = [0.05, 8.0]", "sigma = [0.05, 8.0]\ncurvature = [0.1, 0.8]")
+    models = files.text.index("[[models]]")
+    files.text = files.text[:models] + '[[models]]\nmodel = "curved"\n'
+    with pytest.raises(BadInput, match=r"models\.0\.largest_curvature = 0\.5: must not be below .* 0\.8"):
+        load_recipe(files.write())
 
 
 @pytest.mark.parametrize(

@@ -290,9 +290,17 @@ def test_another_cloth_of_the_same_name(asks, files):
         asks(TEACHER.replace('"own.toml"', '"other/own.toml"'))
 
 
+BENCH_WITHOUT_SHADOWS = """
+[bench]
+truth = { shadows = false }
+frame_truth = { shadows = false }
+"""
+
+
 def test_other_physics(asks):
     with pytest.raises(BadInput, match="shadows = True: must be that of the recipe sheer, False"):
-        asks(GENERAL.replace("relative_error = 0.1", "shadows = false"), SHEER, "sheer")
+        shadowless = GENERAL.replace("relative_error = 0.1", "shadows = false")
+        asks(shadowless + BENCH_WITHOUT_SHADOWS, SHEER, "sheer")
 
 
 def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):

@@ -7,11 +7,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.fingerprint import file_sha256
+from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.check import check_shard
-from pipeline.shards.generate import ShardTask, generate_shard
+from pipeline.shards.generate import SHARD_TASK, ExtraShardTask, ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions
-from pipeline.shards.store import read_about, read_shard
+from pipeline.shards.silhouettes import Silhouettes
+from pipeline.shards.store import read_about, read_columns, read_shard, write_columns
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -25,6 +27,22 @@ TASK = ShardTask(
     queries=QueryOptions(),
     truth=TruthOptions(relative_error=0.1, min_count=64, max_count=128),
 )
+
+
+SAMPLES = AngularSamples(
+    texels_per_yarn=1, texel_sigma=0.5, samples=4, directions="projected_disc", max_angle=80.0, truth=TASK.truth
+)
+OPACITY = Silhouettes(
+    kind="opacity",
+    rows=64,
+    points=32,
+    sigma=(0.5, 8.0),
+    largest_curvature=0.5,
+    anywhere=0.1,
+    footprint="gaussian",
+    seed=0,
+)
+EXTRA = [SAMPLES, OPACITY, OPACITY.model_copy(update={"kind": "grazing_cosine"})]
 
 
 @pytest.fixture
@@ -144,3 +162,53 @@ def test_a_broken_manifest_is_one_sentence(tmp_path, text):
         Manifest.load(tmp_path)
     with pytest.raises(BadInput, match="does not exist"):
         Manifest.load(tmp_path / "nowhere")
+
+
+def _extra(folder, extra):
+    """Write the extra rows of denim in two shards and return their manifest."""
+    entries = []
+    for start, rows in ((0, 40), (40, 24)):
+        task = ExtraShardTask(fabric=TASK.fabric, extra=extra, start=start, rows=rows)
+        path = folder / f"part-{start}.parquet"
+        generate_shard(SHARD_TASK.validate_json(task.model_dump_json()), path)
+        facts = {"file": path.name, "fabric": "denim", "kind": task.kind, "split": task.split}
+        entries.append(ShardEntry(**facts, start=start, rows=rows, sha256=file_sha256(path)))
+    return _manifest(folder).model_copy(update={"shards": entries})
+
+
+@pytest.mark.parametrize("extra", EXTRA, ids=lambda extra: extra.kind)
+def test_extra_rows_are_shards_like_all_others(folder, extra):
+    """Written, checked and read back in stream order: the same as in one piece."""
+    manifest = _extra(folder, extra)
+    assert [fault for entry in manifest.shards for fault in check_shard(folder, entry, manifest)] == []
+    manifest.save(folder)
+    read = Manifest.load(folder).read_extra(folder, "denim", extra)
+    generate_shard(ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=64), folder / "whole.parquet")
+    whole = read_columns(folder / "whole.parquet", extra.kind)
+    assert read.keys() == whole.keys()
+    for name, column in whole.items():
+        np.testing.assert_array_equal(read[name], column)
+    with pytest.raises(BadInput, match="no rows"):
+        manifest.read_extra(folder, "denim", SAMPLES.model_copy(update={"samples": 5}))
+
+
+def test_damaged_extra_rows_are_named(folder):
+    manifest = _extra(folder, OPACITY)
+    entry = manifest.shards[0]
+    path = folder / entry.file
+    column = read_columns(path, "opacity")
+    write_columns(path, "opacity", "denim", column | {"opacity": 2 * column["opacity"] + 1}, {})
+    faults = check_shard(folder, entry, manifest)
+    assert any("SHA-256" in fault for fault in faults)
+    assert any("column opacity spans" in fault for fault in faults)
+    # One kind read as another is refused, never misread.
+    misread = entry.model_copy(update={"kind": "components"})
+    assert "must be schema version" in check_shard(folder, misread, manifest)[-1]
+
+
+def test_identity_of_extra_rows_follows_their_parameters():
+    tasks = [ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=8) for extra in EXTRA]
+    assert len({json.dumps(task.identity()) for task in tasks}) == len({task.split for task in tasks}) == 3
+    red = TASK.fabric.model_copy(update={"warp": TASK.fabric.warp.model_copy(update={"diffuse": "#ff0000"})})
+    assert tasks[0].model_copy(update={"fabric": red}).identity() == tasks[0].identity()
+    assert "version" in tasks[0].identity()

@@ -7,10 +7,17 @@ from pipeline.models.btf_autoencoder.model import build, restore
 from pipeline.models.btf_autoencoder.options import BtfAutoencoderOptions
 from pipeline.models.unified_btf.model import UnifiedBtf
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.store import columns_of
 from weaves.fabric import load_fabric
 
 SMALL = BtfAutoencoderOptions(texels_per_yarn=2, samples=4, fewest_samples=2, encoder_hidden=8, weights=4, hidden=8)
 LINING, BASKET = load_fabric("polyester_lining"), load_fabric("basket")
+
+
+def untrained(*fabrics):
+    wanted = SMALL.angular_samples
+    samples = [columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))) for fabric in fabrics]
+    return build(SMALL, fabrics, samples)
 
 
 def card_of(fabric):
@@ -19,7 +26,7 @@ def card_of(fabric):
 
 def test_a_network_knows_one_fabric():
     torch.manual_seed(0)
-    network = build(SMALL, [LINING])
+    network = untrained(LINING)
     (method,) = restore(SMALL, [(card_of(LINING), network.state_dict())])
     assert method.covers(LINING)
     assert method.covers(LINING.model_copy(update={"name": "other"}))
@@ -28,14 +35,14 @@ def test_a_network_knows_one_fabric():
     queries = draw_queries(QueryOptions(), (2, 2), 5, 0, 32)
     np.testing.assert_array_equal(method.predict(LINING, queries), UnifiedBtf(network).predict(LINING, queries))
     with pytest.raises(ValueError, match="too many values"):
-        build(SMALL, [LINING, BASKET])
+        untrained(LINING, BASKET)
 
 
 def test_each_fabric_is_answered_by_its_own_network():
     weights = []
     for seed, fabric in enumerate((LINING, BASKET)):
         torch.manual_seed(seed)
-        weights.append((card_of(fabric), build(SMALL, [fabric]).state_dict()))
+        weights.append((card_of(fabric), untrained(fabric).state_dict()))
     (both,) = restore(SMALL, weights)
     queries = draw_queries(QueryOptions(), (2, 2), 5, 0, 8)
     for fabric, trained in zip((LINING, BASKET), weights, strict=True):

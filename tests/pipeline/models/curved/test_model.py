@@ -9,7 +9,7 @@ import torch
 from pipeline.fingerprint import fingerprint
 from pipeline.models.curved.model import Curved, CurvedNetwork, build
 from pipeline.models.curved.options import CurvedOptions
-from pipeline.models.curved.silhouettes import View, draw_silhouettes
+from pipeline.models.curved.silhouettes import View, silhouettes_of
 from pipeline.models.domain import Domain
 from pipeline.models.method import Batch
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
@@ -22,6 +22,10 @@ from weaves.fabric import load_fabric
 SMALL = CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0))
 GRAZING = SMALL.model_copy(update={"silhouette": "grazing"})
 DENIM = load_fabric("denim")
+
+
+def _built(options=SMALL, fabric=DENIM):
+    return build(options, [fabric], [options.silhouettes.answer(fabric, 0, options.silhouette_rows)])
 
 
 def _wo(cosine, azimuth=0.0):
@@ -105,9 +109,9 @@ def test_rays_that_sink_below_every_yarn_have_hit_one():
 
 def test_a_cloth_with_gaps_is_never_certain():
     front = height_field(DENIM)
-    assert build(SMALL, [DENIM]).fall.item() == pytest.approx(front.highest - front.lowest)
+    assert _built().fall.item() == pytest.approx(front.highest - front.lowest)
     narrow = {family: getattr(DENIM, family).model_copy(update={"width": 0.7}) for family in ("warp", "weft")}
-    assert build(SMALL, [DENIM.model_copy(update=narrow)]).fall.item() < 0.0
+    assert _built(fabric=DENIM.model_copy(update=narrow)).fall.item() < 0.0
 
 
 def test_opacity_of_the_grazing_variant_is_the_gaussian_share_below_the_cosine():
@@ -135,7 +139,7 @@ def test_silhouettes_are_learnt(options):
     """A few hundred steps find opacities that no constant comes near; silhouettes alone, which no light concerns."""
     torch.manual_seed(0)
     options = options.model_copy(update={"silhouette_rows": 2048, "blur": 0.0})
-    network = build(options, [DENIM]).train()
+    network = _built(options).train()
     optimiser = torch.optim.Adam(network.parameter_groups(5e-3))
     random = np.random.default_rng(3)
     for _ in range(120):
@@ -144,7 +148,8 @@ def test_silhouettes_are_learnt(options):
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
-    others = draw_silhouettes(SMALL.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256}), DENIM)
+    other = SMALL.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
+    others = silhouettes_of(other.silhouettes.answer(DENIM, 0, 512), DENIM.weave.repeat)
     view = View(*(others.get_buffer(name) for name in View._fields))
     target = others.get_buffer("target")[:, 0]
     with torch.no_grad():
@@ -154,7 +159,7 @@ def test_silhouettes_are_learnt(options):
 
 
 def test_loss_adds_the_silhouettes_to_the_components():
-    network = build(SMALL, [DENIM]).eval()
+    network = _built().eval()
     random = np.random.default_rng(0)
     columns = [torch.from_numpy(random.random((1, 64)).astype(np.float32)) for _ in range(7)]
     directions = [torch.from_numpy(_wo(random.random((1, 64)))) for _ in range(2)]
@@ -169,8 +174,8 @@ def test_loss_adds_the_silhouettes_to_the_components():
     torch.testing.assert_close(both, alone + SMALL.silhouette_weight * edge)
 
 
-def test_questions_are_no_part_of_the_weights():
-    network = build(SMALL, [DENIM])
+def test_silhouettes_are_no_part_of_the_weights():
+    network = _built()
     assert not [name for name in network.state_dict() if "silhouettes" in name]
     restored = CurvedNetwork(SMALL, DENIM.weave.repeat)
     restored.load_state_dict(network.state_dict())

@@ -10,6 +10,7 @@ from pipeline.models.method import Batch
 from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork, averaged, build, decoder, restore
 from pipeline.models.unified_btf.options import UnifiedBtfOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.store import columns_of
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -23,6 +24,13 @@ def network(seed: int = 0, **changes: object) -> UnifiedBtfNetwork:
     built = UnifiedBtfNetwork(SMALL.model_copy(update=changes)).eval()
     built.encoder.scale.fill_(10.0)
     return built
+
+
+def trainable(**changes: object) -> UnifiedBtfNetwork:
+    """Return an untrained network with the samples of the lining."""
+    options = SMALL.model_copy(update=changes)
+    wanted = options.angular_samples
+    return build(options, [LINING], [columns_of(*wanted.answer(LINING, 0, wanted.count(LINING)))])
 
 
 def batch_of(queries: Queries, target: torch.Tensor) -> Batch:
@@ -65,7 +73,7 @@ def test_place_chooses_the_texel():
 def test_it_learns_what_differs_from_place_to_place():
     """A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained."""
     torch.manual_seed(0)
-    model = build(SMALL.model_copy(update={"texels_per_yarn": 4}), [LINING]).train()
+    model = trainable(texels_per_yarn=4).train()
     queries = draw_queries(QueryOptions(sigma=(0.1, 0.1)), LINING.weave.repeat, 3, 0, 256)
     warp = torch.from_numpy(np.sin(np.pi * queries.u) * np.sin(np.pi * queries.v))
     target = (0.1 + 0.05 * warp).unsqueeze(-1).expand(-1, 4).contiguous()
@@ -83,7 +91,7 @@ def test_it_learns_what_differs_from_place_to_place():
 
 
 def test_loss_is_a_function_of_its_random_numbers():
-    model = build(SMALL, [LINING])
+    model = trainable()
     queries = draw_queries(QueryOptions(), LINING.weave.repeat, 3, 0, 16)
     batch = batch_of(queries, torch.rand(16, 4, generator=torch.Generator().manual_seed(0)))
     first, again, other = (model.loss(batch, np.random.default_rng(seed)).item() for seed in (1, 1, 2))
@@ -92,7 +100,7 @@ def test_loss_is_a_function_of_its_random_numbers():
 
 @pytest.mark.parametrize("strange", [{"behind": 1.0}, {"stretch": 4.0}, {"curvature": (0.1, 0.2)}])
 def test_rows_it_cannot_learn_are_refused(strange):
-    model = build(SMALL, [LINING])
+    model = trainable()
     queries = draw_queries(QueryOptions(**strange), LINING.weave.repeat, 3, 0, 4)
     with pytest.raises(BadInput, match="leave behind, stretch and curvature out"):
         model.loss(batch_of(queries, torch.zeros(4, 4)), np.random.default_rng(0))

@@ -1,0 +1,25 @@
+"""Extra rows: what a model learns from beside the data set's queries, as its options declare it.
+
+A set of extra rows is a kind and its parameters. Models whose options declare equal sets share the shards.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.fingerprint import fingerprint
+from pipeline.shards.angular_samples import AngularSamples
+from pipeline.shards.silhouettes import Silhouettes
+
+Kind = Literal["components", "angular_samples", "opacity", "grazing_cosine"]
+"""Kinds of rows, each with its columns (`pipeline.shards.schema`): a data set's own, and those of extra rows."""
+
+ExtraRows = Annotated[AngularSamples | Silhouettes, Field(discriminator="kind")]
+"""Any set of extra rows, told apart by its kind."""
+
+
+def set_name(rows: ExtraRows) -> str:
+    """Return the name of a set in a manifest, where it stands in place of a split: kind and fingerprint."""
+    return f"{rows.kind}-{fingerprint(rows.model_dump(mode='json'), 8)}"
