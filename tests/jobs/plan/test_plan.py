@@ -279,11 +279,8 @@ def test_extra_rows_are_tasks_that_equal_models_share(files, tasks):
         ends, picks = fabric.weave.repeat
         rows = sum(task.rows for task in extra.values() if task.spec["name"] == fabric.name)
         assert rows == 60 * 4 * ends * picks
-    read = {
-        task.title: {extra[need].spec["name"] for need in task.needs if need in extra}
-        for task in after
-        if task.stage == "train"
-    }
+    trainings = [task for task in after if task.stage == "train"]
+    read = {task.title: {extra[need].spec["name"] for need in task.needs if need in extra} for task in trainings}
     assert read["unified_btf on 5 fabrics"] == names - {"twill_4_4"}
     assert read["btf_autoencoder on twill_4_4"] == {"twill_4_4"}
     assert read["woven on 5 fabrics"] == set()

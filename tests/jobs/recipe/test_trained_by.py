@@ -162,9 +162,8 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     assert [fabric for fabric, *_ in titles["extremes of curved"].spec["fabrics"]] == ["denim"]
     notes = {note["name"]: note["about"] for note in tasks[-1].setting["models"]}
     assert "trained by the recipe bent, on queries of its own" in notes["curved"]
-    assert notes["curved"].endswith(
-        "left out on twill_4_4, in the scene dinner_table: it was not trained on that cloth"
-    )
+    where = "left out on twill_4_4, in the scene dinner_table"
+    assert notes["curved"].endswith(f"{where}: it was not trained on that cloth")
     assert "left out in the scene curtain, in the scene dinner_table: " in notes["neumip"]
     assert "left out" not in notes["woven"] + notes["point_sampled"]
     assert set(ids(tasks, "train", "curved")) < set(titles["timing of all methods"].needs)

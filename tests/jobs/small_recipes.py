@@ -1,0 +1,58 @@
+"""Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators."""
+
+import json
+import tomllib
+
+from jobs.recipe.load import RECIPES
+from jobs.recipe.recipe import Rows
+from jobs.verbs.toml_text import toml
+from pipeline.models.catalogue import CLASSES
+from pipeline.training.options import TrainingOptions
+from reports.options import BenchOptions
+
+SCALE = 100
+
+
+def write_small(name, folder):
+    """Write the recipe and those that it names into a folder; return its path."""
+    content = tomllib.loads((RECIPES / f"{name}.toml").read_text(encoding="utf-8"))
+    dataset = content["dataset"]
+    dataset["rows"] = _scaled(Rows(**dataset["rows"]).model_dump(), {"train": 128, "validation": 64, "test": 128})
+    dataset["shard_rows"] = 4096  # each shard is a task
+    content["models"] = [_model(entry, folder) for entry in content["models"]]
+    content["bench"] = _bench(content.get("bench", {}))
+    path = folder / f"{name}.toml"
+    path.write_text(toml(content), encoding="utf-8")
+    return path
+
+
+def _scaled(values, least):
+    """Divide values by the scale where a least one is named; 0 stays 0."""
+    return values | {key: max(values[key] // SCALE, low) if values[key] else 0 for key, low in least.items()}
+
+
+def _model(entry, folder):
+    if "recipe" in entry:
+        return entry | {"recipe": write_small(entry["recipe"], folder).name}
+    defaults = {name: field.default for name, field in CLASSES[entry["model"]].model_fields.items()}
+    own = defaults | entry
+    least = {"silhouette_rows": 256, "measured_rows": 16, "samples": 2, "fewest_samples": 1}
+    entry |= _scaled({key: own[key] for key in least if key in own}, {key: least[key] for key in least if key in own})
+    if CLASSES[entry["model"]].learns:
+        training = TrainingOptions(**entry.get("training", {})).model_dump()
+        least = {"steps": 8, "batch": 64, "checkpoint_every": 4, "validation_rows": 128}
+        entry["training"] = _scaled(training, least)
+    return entry
+
+
+def _bench(content):
+    """Return measurements of a hundredth of the pixels, a tenth each way, and of the fewest frames and calls."""
+    bench = json.loads(BenchOptions(**content).model_dump_json())
+    for key in ("sphere_size", "plane_size", "frame_size"):
+        bench[key] = [max(side // 10, 16) for side in bench[key]]
+    bench |= _scaled({key: bench[key] for key in ("rows", "timing_rows")}, {"rows": 64, "timing_rows": 64})
+    bench |= {"frames": 3, "timing_repeats": 20, "warm_up": 1}
+    bench["edge"]["rows"] = max(bench["edge"]["rows"] // 10, 4)
+    bench["scenes"] |= {"size": [24, 16], "frames": 3}
+    bench["scenes"]["image"] |= {"block": 4, "resamples": 100}
+    return bench
