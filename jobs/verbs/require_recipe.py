@@ -91,7 +91,7 @@ def write_recipe(
             "queries": queries.model_dump(mode="json", exclude_defaults=True, exclude_none=True),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
-        "models": [_model(model, setting, effort, options), *_baseline(general, method)],
+        "models": [_model(model, setting, effort, _bent(model, queries) | dict(options)), *_baseline(general, method)],
         "bench": _bench(general, _beside(path, scene)),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -157,6 +157,12 @@ def _stated(truth: TruthOptions) -> dict[str, Any]:
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
     """Tell whether an estimator answers all queries of the distribution about all fabrics."""
     return truth.estimator != "table" or not table_refusal(truth, queries, fabrics)
+
+
+def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
+    """Return the option for the largest curvature, for a model that has it, where the scene bends its cloth more."""
+    most = getattr(model.options, "largest_curvature", None)
+    return {"largest_curvature": queries.curvature[1]} if most is not None and most < queries.curvature[1] else {}
 
 
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:

@@ -1,11 +1,11 @@
 """Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators."""
 
-import json
 import tomllib
+
+import tomli_w
 
 from jobs.recipe.load import RECIPES
 from jobs.recipe.recipe import Rows
-from jobs.verbs.toml_text import toml
 from pipeline.models.catalogue import CLASSES
 from pipeline.training.options import TrainingOptions
 from reports.options import BenchOptions
@@ -22,7 +22,7 @@ def write_small(name, folder):
     content["models"] = [_model(entry, folder) for entry in content["models"]]
     content["bench"] = _bench(content.get("bench", {}))
     path = folder / f"{name}.toml"
-    path.write_text(toml(content), encoding="utf-8")
+    path.write_text(tomli_w.dumps(content), encoding="utf-8")
     return path
 
 
@@ -47,7 +47,7 @@ def _model(entry, folder):
 
 def _bench(content):
     """Return measurements of a hundredth of the pixels, a tenth each way, and of the fewest frames and calls."""
-    bench = json.loads(BenchOptions(**content).model_dump_json())
+    bench = BenchOptions(**content).model_dump(mode="json", exclude_none=True)
     for key in ("sphere_size", "plane_size", "frame_size"):
         bench[key] = [max(side // 10, 16) for side in bench[key]]
     bench |= _scaled({key: bench[key] for key in ("rows", "timing_rows")}, {"rows": 64, "timing_rows": 64})

@@ -41,6 +41,12 @@ def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
     assert [fabric.name for fabric in own.fabrics] == ["denim"]
 
 
+def _with_macro(options):
+    """Return measurements whose truth has cosines to the macro normal."""
+    truths = {name: getattr(options, name) for name in ("truth", "frame_truth")}
+    return options.model_copy(update={k: truth.model_copy(update={"frame": "macro"}) for k, truth in truths.items()})
+
+
 def test_physics_and_stated_errors_of_a_truth_are_kept(tmp_path):
     dataset = QUICK.dataset.model_copy(
         update={
@@ -48,7 +54,8 @@ def test_physics_and_stated_errors_of_a_truth_are_kept(tmp_path):
             "training_truth": TruthOptions(relative_error=0.3, frame="macro"),
         }
     )
-    general = dataclasses.replace(QUICK, dataset=dataset, models=QUICK.models[1:2])
+    bench = _with_macro(QUICK.bench.model_copy(update={"scenes": _with_macro(QUICK.bench.scenes)}))
+    general = dataclasses.replace(QUICK, dataset=dataset, models=QUICK.models[1:2], bench=bench)
     own = narrowed(tmp_path / "r.toml", general, "neumip")
     # Points know no other frame, and the general recipe has none.
     assert [model.options.name for model in own.models] == ["neumip"]
