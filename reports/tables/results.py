@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.measure.silhouette import silhouette_table
 from reports.record import TRUTH, Machine, Record
 from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.equal_time import equal_time_table, size_table
@@ -107,6 +108,10 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
     if energy:
         yield "## Energy: largest directional albedo over all fabrics"
         yield _grouped(method_rows.ENERGY, energy)
+    silhouettes = method_rows.silhouette_rows(silhouette_table(records))
+    if silhouettes:
+        yield "## Silhouettes of curved cloth"
+        yield _grouped(method_rows.SILHOUETTE, silhouettes)
     yield from _at_equal_time(records)
 
 
