@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-TRUTH: Final = 4
+TRUTH: Final = 5
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
 TRAINING: Final = 2
@@ -24,8 +24,8 @@ MODELS: Final[dict[str, int]] = {
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-FALLBACK: Final = 2
-"""Answers to queries outside a method's domain (`pipeline.models.fallback`, `fallback_table`)."""
+FALLBACK: Final = 3
+"""Answers to queries outside a method's domain (`pipeline.models.fallback`)."""
 
 SCENES: Final = 1
 """The shipped scenes, and the queries of any scene."""

@@ -112,9 +112,9 @@ class SceneBenchOptions(BaseModel):
     """Frames of the camera's way, from the first on, for aliasing; pictures are compared at the first."""
     options: SceneOptions = SceneOptions(environment_directions=8)
     """How scenes become queries."""
-    truth: TruthOptions = TruthOptions(estimator="elliptic", relative_error=0.03, min_count=256, max_count=1024)
+    truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.03, min_count=256, max_count=1024)
     """How true the first frame is. Below 256 points a question may miss one family of yarns altogether."""
-    frame_truth: TruthOptions = TruthOptions(estimator="elliptic", relative_error=0.1, min_count=256, max_count=256)
+    frame_truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.1, min_count=256, max_count=256)
     """How true the other frames are."""
     footprint: RoundFootprint = "geometric_mean"
     """What stands for an ellipse where a method knows round footprints only."""

@@ -27,7 +27,7 @@ REMOVED: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
     {
         "model": {"table": "use 'soft_nodes' or 'gauss_nodes', or the estimator 'node_table' for the ground truth"},
         SCENE: {},
-        KEY: {},
+        KEY: {"geometry": "yarns are tori"},
     }
 )
 """Alternatives to names without a successor, by kind and old name."""

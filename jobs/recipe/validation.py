@@ -13,7 +13,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 _PLAIN = TruthOptions()
-_LEARNT = ("frame", "normaliser", "geometry", "shadows", "variation")  # physics that not every model can learn
+_LEARNT = ("frame", "normaliser", "shadows", "variation")  # physics that not every model can learn
 
 
 def validate_recipe(recipe: Recipe, where: str) -> None:
@@ -23,7 +23,7 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     ------
     BadInput
         For names given twice, an unseen draft in the population, different physics in two tables of truth options,
-        models that do not know the queries or the physics of the data set, and the estimator `table` for cloth or
+        models that do not know the queries or the physics of the data set, and the estimator `node_table` for cloth or
         queries that it does not know.
     """
     _check_names(recipe, where)
@@ -34,13 +34,13 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
 
 
 def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[Fabric]) -> str:
-    """Return why the estimator `table` cannot answer all queries of a distribution; empty if it can.
+    """Return why the estimator `node_table` cannot answer all queries of a distribution; empty if it can.
 
-    `table` answers from its nodes or not at all, so that tests and timings know what they compare. `auto` takes the
-    same table where it is good enough and samples the rest; with a large `relative_error` it costs the same.
+    `node_table` answers from its nodes or not at all, so that tests and timings know what they compare. `auto` takes
+    the same table where it is good enough and samples the rest; with a large `relative_error` it costs the same.
     """
-    if any(getattr(truth, name) != getattr(_PLAIN, name) for name in ("frame", "geometry", "shadows", "variation")):
-        return "it knows the default frame, geometry, shadows and variation only"
+    if any(getattr(truth, name) != getattr(_PLAIN, name) for name in ("frame", "shadows", "variation")):
+        return "it knows the default frame, shadows and variation only"
     if queries.sigma[0] < TABLE_SIGMA:
         return f"it knows footprints from {TABLE_SIGMA:.3g} yarn spacings on, the queries begin at {queries.sigma[0]:g}"
     if queries.stretch > 1.0 or queries.curvature[1] > 0.0:
@@ -86,11 +86,11 @@ def _check_physics(recipe: Recipe, where: str) -> None:
 
 def _check_estimators(recipe: Recipe, where: str) -> None:
     for key, truth, queries, fabrics in _truths(recipe):
-        if truth.estimator != "table":
+        if truth.estimator != "node_table":
             continue
         reason = table_refusal(truth, queries, fabrics) if queries else "footprints of pictures are not known before"
         if reason:
-            raise BadInput(where, f"{key}.estimator", "table", f"{reason}; take 'auto'")
+            raise BadInput(where, f"{key}.estimator", "node_table", f"{reason}; take 'auto'")
 
 
 def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | None, Sequence[Fabric]]]:

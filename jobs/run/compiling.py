@@ -20,9 +20,9 @@ _SAMPLED: Final = ("mc", "jittered", "r2")
 """Estimators with the kernels of `owen`."""
 
 _IN_SCENES: Final = ("scene", "frame time")
-"""Measurements in which a table, and where it does not reach quadrature, stand in for a method."""
+"""Measurements with the fallback: a node table, and `quadrature` for what it does not know."""
 
-_LONGEST_FIRST: Final = ("table", "quadrature", "soft_nodes", "gauss_nodes", "owen")
+_LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "gauss_nodes", "owen")
 
 
 class KernelGroup(NamedTuple):
@@ -66,8 +66,8 @@ def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
     from weaves.fabric import load_fabric, preset_names
 
     fabric = load_fabric(preset_names()[0])
-    # Round and elliptic footprints take different ways through `elliptic`.
-    kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if group.name == "elliptic" else [QueryOptions()]
+    # Rotated footprints call kernels that round ones do not.
+    kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if group.name == "auto" else [QueryOptions()]
     with announced(ready):
         for kind in kinds:
             queries = draw_queries(kind, fabric.weave.repeat, 0, 0, _ROWS)
@@ -85,7 +85,7 @@ def _estimators(task: Task) -> Iterator[str]:
         yield table["estimator"]
     make = task.setting.get("make")
     if make in _IN_SCENES:
-        yield from ("table", "quadrature")
+        yield from ("node_table", "quadrature")
     if make == "extremes":
         yield "quadrature"
 

@@ -194,7 +194,7 @@ def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> 
     """
     import numpy as np
 
-    from pipeline.models.fallback_table import stand_in
+    from pipeline.models.fallback import fallback
     from pipeline.truth.estimator import estimate
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
@@ -206,11 +206,11 @@ def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> 
         rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(asked)]
         if not rows.size:
             continue
-        stand_in(fabrics[name], queries.take(rows[:2]), 0)  # tables
+        fallback(fabrics[name], queries.take(rows[:2]), 0)  # tables
         start = time.perf_counter()
-        answers = stand_in(fabrics[name], queries.take(rows), 0)
+        answers = fallback(fabrics[name], queries.take(rows), 0)
         seconds, count = seconds + time.perf_counter() - start, count + rows.size
-        truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="elliptic"), 1).mean
+        truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
         colour = truth @ COLOUR_WEIGHTS
         wrong.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
         colours.append(colour)

@@ -2,8 +2,8 @@
 
 Of a general recipe it keeps the truth, the model's options, the training and the measurements, so that a page of either
 says the same of the scene. Fewer fabrics in a narrower domain are learnt from fewer rows in fewer steps; how many is
-the option `effort`. A truth that cannot answer the scene's questions (`table` knows flat cloth and footprints along the
-axes only) makes way for one that samples, at the error that `SAMPLED` states.
+the option `effort`. A truth that cannot answer the scene's questions (`node_table` knows flat cloth
+only) makes way for one that samples, at the error that `SAMPLED` states.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def _stated(truth: TruthOptions) -> dict[str, Any]:
 
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
     """Tell whether an estimator answers all queries of the distribution about all fabrics."""
-    return truth.estimator != "table" or not table_refusal(truth, queries, fabrics)
+    return truth.estimator != "node_table" or not table_refusal(truth, queries, fabrics)
 
 
 def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-PHYSICS: Final = ("footprint", "frame", "normaliser", "geometry", "shadows", "variation")
+PHYSICS: Final = ("footprint", "frame", "normaliser", "shadows", "variation")
 """Options of the truth that decide what is learnt, not how exactly."""
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")

@@ -84,7 +84,7 @@ def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> C
     return ClothSide(
         back if behind else front,
         front if behind else back,
-        Choices(options.frame == "macro", options.geometry == "linear", options.shadows),
+        Choices(options.frame == "macro", options.shadows),
         FOOTPRINTS[options.footprint],
         options.normaliser == "projected",
         options.variation is not None,

@@ -1,8 +1,8 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
 `mc`, `jittered`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
-`table` sums over nodes with horizons; `auto` uses the table where its error is small enough, `elliptic` for rotated
-footprints too (node_table.cascade).
+`node_table` sums over nodes with horizons; `auto` uses it where its error is small enough, and samples otherwise
+(node_table.cascade).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.compiled.arrays import Index
 from pipeline.truth import monte_carlo
 from pipeline.truth.cloth import ClothSide, Columns, Raw, cloth_side, columns_of
-from pipeline.truth.node_table.cascade import auto_rows, elliptic_rows, table_rows
+from pipeline.truth.node_table.cascade import auto_rows, node_table_rows
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature.adaptive import quadrature_rows
 from pipeline.truth.query import Answers, Queries, validate
@@ -45,9 +45,8 @@ ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "r2": partial(_sampled, monte_carlo.R2),
     "owen": partial(_sampled, monte_carlo.OWEN),
     "quadrature": quadrature_rows,
-    "table": table_rows,
+    "node_table": node_table_rows,
     "auto": auto_rows,
-    "elliptic": elliptic_rows,
 }
 """Every estimator by its name in `TruthOptions.estimator`."""
 

@@ -6,17 +6,17 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "table", "auto", "elliptic"]
+EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "node_table", "auto"]
 
 TABLE_CELLS: Final = 96
-"""Most different cells of a cloth that the estimator `table` knows; a table of more would take too long to build."""
+"""Most different cells of a cloth that the estimator `node_table` knows; larger tables take too long to build."""
 
 TABLE_SIGMA: Final = 1.25 / 32
-"""Smallest standard deviation of a footprint, in yarn spacings, that the nodes of the estimator `table` resolve."""
+"""Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
 
 
 class Variation(BaseModel):
-    """How much the floats differ in gloss."""
+    """Random differences in gloss between floats."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -29,7 +29,7 @@ class Variation(BaseModel):
 
 
 class TruthOptions(BaseModel):
-    """How one patch BSDF value is computed."""
+    """Options of the ground truth: how one patch BSDF value is computed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -42,18 +42,15 @@ class TruthOptions(BaseModel):
     absolute_error: float = Field(default=1e-5, ge=0, le=1)
     """Or below this, 1/sr: dark patches need no more."""
     min_count: int = Field(default=256, ge=32)
-    """Points before the first look at the error; a power of two."""
+    """Points before the error is first estimated; a power of two."""
     max_count: int = Field(default=4096, ge=32)
-    """Points after which a query is given up on with the error it has; a power of two. Patches that are all but hidden
-    may take 16 times as many."""
+    """Most points of a query, whatever its error; a power of two. Patches that are almost hidden may take 16 times as
+    many."""
     frame: Literal["ply", "macro"] = "ply"
     """Cosines inside the yarn layer, and of the visible area, are taken to the ply normal or to the macro normal."""
     normaliser: Literal["visible", "projected"] = "visible"
     """The denominator: `visible` is the projected area that the viewer sees, A_P; `projected` is |wo.n_s| times the
     area of the footprint, which restores reciprocity."""
-    geometry: Literal["torus", "linear"] = "torus"
-    """`torus`: yarns are bent, twisted cylinders that form a true height field; `linear`: angles on a yarn grow in
-    proportion to the position, as in published code. Their normals belong to no height field: for comparison only."""
     shadows: bool = True
     """Whether points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
     variation: Variation | None = None

@@ -24,7 +24,7 @@ OVERSTATED: Final = 3.0
 
 def with_noise(answers: Answers, queries: Queries, options: TruthOptions) -> Answers:
     """Return the truth's answers with their errors as they are on average."""
-    if options.estimator not in ("table", "auto", "elliptic"):
+    if options.estimator not in ("node_table", "auto"):
         return answers
     # Curved cloth is sampled.
     share = np.where(queries.curvature > 0.0, 1.0, 1.0 / math.sqrt(OVERSTATED)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The bias of the tabulated answers: what `table` gets wrong on the average over many patches.
+"""The bias of the tabulated answers: what `node_table` gets wrong on the average over many patches.
 
 A table's horizons and nodes are the same for every query, so that its errors need not cancel as those of random points
 do. The bias of a component is <table - reference> / <reference> over queries of the default distribution, with the
@@ -82,7 +82,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             asked = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
             truth = estimate(fabric, asked, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
-            found = estimate(fabric, asked, TruthOptions(estimator="table"), _SEED).mean.astype(np.float64)
+            found = estimate(fabric, asked, TruthOptions(estimator="node_table"), _SEED).mean.astype(np.float64)
             for component, one, other in zip(COMPONENTS, found.T, truth.T, strict=True):
                 value, error = bias_of(one, other)
                 yield Bias(name, side, component, value, error, rows)

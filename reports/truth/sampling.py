@@ -2,8 +2,8 @@
 
 One bounce towards the viewer, L = integral over the whole sphere of f_P(wi, wo) d(wi) in luminance, estimated by one
 direction: f_P / pdf. For each patch the variance over its directions; "saved" is the mean variance of cosine sampling,
-half of its directions on either side of the cloth, over that of the sampler. f_P is the truth's (`table`), so nothing
-but the directions differs. The exact mixture stands for the best that lobes can do: 256 points of the footprint, none
+half of its directions on either side of the cloth, over that of the sampler. f_P is the truth's (`node_table`), so
+nothing but the directions differs. The exact mixture is the best that lobes can do: 256 points of the footprint, none
 of them widened.
 """
 
@@ -93,7 +93,7 @@ def _light(fabric: Fabric, queries: Queries, drawn: Sample) -> npt.NDArray[np.fl
     """Return luminance over density of each direction."""
     wi = drawn.wi.copy()
     wi[:, 2] = np.where(np.abs(wi[:, 2]) < _LEAST_COSINE, _LEAST_COSINE, wi[:, 2])
-    answers = estimate(fabric, queries._replace(wi=wi), TruthOptions(estimator="table"), 1).mean.astype(np.float64)
+    answers = estimate(fabric, queries._replace(wi=wi), TruthOptions(estimator="node_table"), 1).mean.astype(np.float64)
     front = colours(fabric) @ LUMINANCE
     through = [yarn.diffuse_transmission_rgb for yarn in (fabric.warp, fabric.weft)]
     back = np.concatenate([front[:2], np.array(through) @ LUMINANCE])

@@ -43,7 +43,7 @@ def bends() -> list[Finding]:
         own = field.floats[pick, end, heightfield.TOP]
         constants = [own[k] for k in (heightfield.BEND_RADIUS, heightfield.HALF_LENGTH, heightfield.AXIS_DROP)]
         x, y = end + 0.5 + across, pick + 0.5 - own[heightfield.OFFSET] + along
-        seen = [heightfield.surface_at(field, *at, end, pick, False) for at in zip(x, y, strict=True)]
+        seen = [heightfield.surface_at(field, *at, end, pick) for at in zip(x, y, strict=True)]
         height, normal = np.array([s[2] for s in seen]), np.array([s[3:6] for s in seen])
 
         # Single precision of the formulas against the kernel in double.

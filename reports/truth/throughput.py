@@ -19,7 +19,8 @@ import numpy.typing as npt
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
-from pipeline.truth.node_table.build import Table, tabulate
+from pipeline.truth.node_table.build import Table
+from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from reports.measure.timing import set_threads
@@ -100,7 +101,7 @@ def _points() -> Iterator[Rate]:
     """Yield points a second: vectorised kernels, NumPy, and what arithmetic alone could do."""
     fabric = load_fabric("polyester_lining")
     model = cloth_side(fabric, TruthOptions())
-    table = tabulate(model.front, model.back, False)
+    table = FINE.table(model, False)
     queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, _SEED, 0, 2000)
     columns = columns_of(queries)
 
@@ -139,9 +140,9 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
     start = time.perf_counter()
     model = cloth_side(fabric, TruthOptions())
-    tabulate(model.front, model.back, False)
+    FINE.table(model, False)
     built = time.perf_counter() - start
-    settings: tuple[tuple[EstimatorName, float], ...] = (("table", 0.01), ("auto", 0.02), ("auto", 0.01))
+    settings: tuple[tuple[EstimatorName, float], ...] = (("node_table", 0.01), ("auto", 0.02), ("auto", 0.01))
     for estimator, error in settings:
         options = TruthOptions(estimator=estimator, relative_error=error, max_count=1 << 14)
         answers = estimate(fabric, queries, options, _SEED)
@@ -173,7 +174,7 @@ def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
 
 def _two_threads(fabric: Fabric, rows: int) -> Rate:
     """Return how much faster two threads answer than one; kernels run without the interpreter's lock."""
-    options = TruthOptions(estimator="table")
+    options = TruthOptions(estimator="node_table")
     halves = [draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, k * 4 * rows, 4 * rows) for k in range(2)]
 
     def answer(queries: Queries) -> int:
@@ -187,7 +188,7 @@ def _two_threads(fabric: Fabric, rows: int) -> Rate:
 
 def _memory(fabric: Fabric, rows: int) -> Rate:
     """Return what the peak of memory grows by for ten times as many queries, answered in chunks as shards are."""
-    options = TruthOptions(estimator="table")
+    options = TruthOptions(estimator="node_table")
 
     def peak(total: int) -> int:
         for start in range(0, total, rows):

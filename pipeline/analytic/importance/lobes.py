@@ -88,7 +88,7 @@ def find_lobes(
                 model.shape, columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row],
                 columns.angle[row], float(ends), float(picks), first, second,
             )  # fmt: skip
-            family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y), False)
+            family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
             families[k] = family
             if family == GAP:
                 continue

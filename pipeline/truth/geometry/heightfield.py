@@ -193,12 +193,9 @@ def local_position(family: int, offset: float, x: float, y: float, end: int, pic
 
 @inlined_kernel
 def surface_at(
-    field: HeightField, x: float, y: float, end: int, pick: int, linear: bool
+    field: HeightField, x: float, y: float, end: int, pick: int
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
     """Return what is seen from above at (x, y) in cell (pick, end) of the repeat.
-
-    With `linear`, normal and tangent are those of angles proportional to the position, v = pi x / w and
-    u = u_max y / (L/2), as published code has them; they belong to no height field, and the height stays the torus's.
 
     Returns
     -------
@@ -231,13 +228,6 @@ def surface_at(
             bound = field.floats[pick, end, side, HALF_LENGTH] / bend
             sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
     cos_u = math.sqrt((1.0 - sin_u) * (1.0 + sin_u))
-    if linear:
-        v = 0.5 * math.pi * across * field.yarn[family, INVERSE_RADIUS]
-        u = 0.0
-        if bend > 0.0:
-            share = min(max(along / field.floats[pick, end, side, HALF_LENGTH], -1.0), 1.0)
-            u = field.yarn[family, BEND] * (share if side == TOP else -share)
-        sin_v, cos_v, sin_u, cos_u = math.sin(v), math.cos(v), math.sin(u), math.cos(u)
 
     # Normal and twisted tangent of the cylinder, then the relief's stretch along z.
     sin_t, cos_t, beta = field.yarn[family, SIN_TWIST], field.yarn[family, COS_TWIST], field.yarn[family, BETA]

@@ -184,7 +184,7 @@ def horizons(
     """
     slopes = np.zeros((azimuths, len(x)), np.float32)
     for k in range(len(x)):
-        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x[k], y[k], int(x[k]), int(y[k]), False)
+        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
         if family == GAP:
             side, z = UNDER, 0.0
         for a in range(azimuths):

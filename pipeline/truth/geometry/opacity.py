@@ -39,7 +39,7 @@ def _open_at(field: HeightField, x: float, y: float) -> tuple[bool, float]:
     """Return whether (x, y), anywhere on the endless cloth, is a gap, and the height there."""
     picks, ends = field.top.shape
     x, y = wrap(x, ends), wrap(y, picks)
-    family, _, height, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y), False)
+    family, _, height, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y))
     return family == GAP, height
 
 

@@ -1,5 +1,6 @@
-"""The estimators `table` and `auto`: sums over tabulated nodes with exact horizons, and what they cannot answer.
+"""The estimators `node_table` and `auto`: sums over tabulated nodes with exact horizons.
 
-build makes the nodes, weights spreads a footprint over them, kernels are the flat loops, answer sums, refine samples
-doubtful nodes again, cascade is `auto`: coarse table, fine table, sampling.
+build makes the nodes, tables keeps them for the last cloths; weights spreads a footprint over them, kernels are the
+loops over nodes, shares their arrays. answer sums, refine samples nodes on borders of shadows, cascade is `auto`: a
+coarse table, a fine one, sampling.
 """

@@ -1,4 +1,4 @@
-"""The repeat as a table of nodes with horizons: a query of any footprint becomes a sum over some thousand nodes.
+"""A table of nodes with horizons over one repeat: a query is a sum over some thousand nodes.
 
 A cloth whose draft maps onto itself under a translation needs one cell of each orbit only: an 8-end satin is 8 cells,
 not 64. Every piece of yarn seen from above in such a cell is a tensor grid of nodes, x = r sin v across the yarn with v
@@ -9,7 +9,7 @@ Where a highlight is narrower than a node, finer nodes resolve it.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,17 +33,6 @@ from pipeline.truth.geometry.horizon import horizons
 from pipeline.truth.geometry.pieces import cell_pieces
 from pipeline.truth.geometry.symmetry import longest_period, orbits
 
-NODES: Final = 32
-"""Nodes a yarn spacing, across and along; for a cloth of more than `_FEW` different cells, down to three quarters."""
-
-WIDE: Final = 0.3
-"""Smallest standard deviation, in yarn spacings, of a footprint that a coarse table answers about as well."""
-
-AZIMUTHS: Final = 128
-"""Directions in which horizons are known."""
-
-_FEW = 8
-_COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
 _SIDE = 0.25  # share of a node by which the last one along a yarn is cut in two
@@ -68,7 +57,7 @@ class Table(NamedTuple):
     edges : float32 (E, n + 1)
         Borders of nodes within their cell; shorter rows repeat their last value.
     evenly : float32 (N,)
-        Share of the cloth's area that a node and its copies stand for.
+        Share of a node and its copies in the cloth's area.
     normal : float32 (4, N)
         Normal of each node, and 1 / n_z; rows x, y, z, 1 / z.
     fine : float32 (7, F)
@@ -76,7 +65,7 @@ class Table(NamedTuple):
     slope : float32 (A, N)
         Slope of the horizon.
     slope_behind : float32 (A, N)
-        The same at the back of the cloth; no rows if not asked for.
+        The same at the back of the cloth; no rows if there is no need for them.
     uniform : float
         Standard deviation from which on a Gaussian covers the cloth evenly.
     """
@@ -97,9 +86,8 @@ def tabulate(
     front: HeightField,
     back: HeightField,
     behind: bool,
-    coarse: bool = False,
-    nodes: int = 0,
-    azimuths: int = AZIMUTHS,
+    nodes: int,
+    azimuths: int,
 ) -> Table:
     """Build the table of one side of a cloth.
 
@@ -108,16 +96,14 @@ def tabulate(
     front, back : HeightField
         The side that is seen and the other one, reflected in the fabric plane.
     behind : bool
-        Whether light from behind will be asked for; through gaps it always is.
-    coarse : bool
-        Whether fewer nodes will do, since footprints are `WIDE`: where a shadow's border is taken wrongly at one node,
-        as many others make up for it. At 1 % it costs a half to a fifth of the time.
-    nodes, azimuths : int
-        Resolution; 0 nodes: as many as the number of different cells asks for.
+        Whether there may be light from behind; cloth with gaps has horizons at its back in any case.
+    nodes : int
+        Nodes per yarn spacing, across and along.
+    azimuths : int
+        Directions in which horizons are known.
     """
     picks, ends = front.top.shape
     alike = orbits(front)
-    nodes = nodes or _resolution(len(alike), coarse)
     kinds: list[tuple[float, ...]] = []
     rows, copies, grids = [], [], []
     start, fine_start = 0, 0
@@ -158,13 +144,6 @@ def tabulate(
         slope_behind=slope_behind,
         uniform=_FADED * longest_period(front),
     )
-
-
-def _resolution(cells: int, coarse: bool) -> int:
-    """Return the nodes a yarn spacing, an even number: the more different cells, the more borders average out."""
-    if coarse:
-        return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
-    return max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / cells))))
 
 
 def _pieces(
@@ -246,7 +225,7 @@ def _surface(field: HeightField, x: Float64, y: Float64) -> Float32:
     """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
     found = np.zeros((7, len(x)), np.float32)
     for k in range(len(x)):
-        family, _, _, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]), False)
+        family, _, _, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
         if family == GAP:
             nx, ny, nz = 0.0, 0.0, 1.0
         values = (nx, ny, nz, 1.0 / nz, tx, ty, tz)

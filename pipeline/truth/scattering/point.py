@@ -18,8 +18,6 @@ from pipeline.truth.geometry.visibility import Ray, ray, visible
 from pipeline.truth.scattering.microflake import density, sigma
 from pipeline.truth.scattering.slab import reflection, transmission, unscattered
 
-_SHALLOWEST = 0.1  # least n_s.n_p of `geometry = "linear"`, whose mean of 1 / (n_s.n_p) has no limit
-
 
 class Choices(NamedTuple):
     """The options of the model as kernels read them.
@@ -28,14 +26,11 @@ class Choices(NamedTuple):
     ----------
     macro : bool
         Cosines in the slab and in A are taken to n_s instead of n_p.
-    linear : bool
-        Angles on the yarn are proportional to the position.
     shadows : bool
         Whether points can hide one another.
     """
 
     macro: bool
-    linear: bool
     shadows: bool
 
 
@@ -99,7 +94,7 @@ def point_share(
         A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); what goes straight through, times A(wo).
     """
     light, viewer = directions.light, directions.viewer
-    family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y), choices.linear)
+    family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
     if family == GAP:
         # A ray that enters a gap and ends on a yarn further down counts there, not here.
         if choices.shadows and not (
@@ -115,7 +110,7 @@ def point_share(
     if choices.macro:
         cos_o, area = viewer.z, viewer.z
     else:
-        area = cos_o / (max(nz, _SHALLOWEST) if choices.linear else nz)
+        area = cos_o / nz
     alpha, blend = front.yarn[family, ALPHA], front.yarn[family, BLEND]
     sigma_o = sigma(viewer.x, viewer.y, viewer.z, tx, ty, tz, alpha)
     through = area * unscattered(sigma_o, cos_o, front.thickness)
@@ -148,5 +143,5 @@ def _lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices:
     """Return whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
     if not choices.shadows:
         return True
-    _, side, z, nx, ny, nz, _, _, _ = surface_at(back, x, y, int(x), int(y), choices.linear)
+    _, side, z, nx, ny, nz, _, _, _ = surface_at(back, x, y, int(x), int(y))
     return light.x * nx + light.y * ny + light.z * nz > 0.0 and visible(back, x, y, z, side, light)

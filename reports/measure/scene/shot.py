@@ -19,8 +19,7 @@ import numpy.typing as npt
 
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
-from pipeline.models.fallback import Fallback
-from pipeline.models.fallback_table import stand_in
+from pipeline.models.fallback import Fallback, fallback
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
@@ -220,7 +219,7 @@ def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.flo
     """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
-        result[rows] = stand_in(fabric, queries.take(rows), seed)
+        result[rows] = fallback(fabric, queries.take(rows), seed)
     return result
 
 

@@ -61,10 +61,14 @@ def test_a_recipe_of_ones_own(files):
         ),
         (
             "sigma = [0.05, 8.0]\n\n[dataset.truth]",
-            'sigma = [0.03, 8.0]\n\n[dataset.truth]\nestimator = "table"',
-            ["dataset.truth.estimator = 'table'", "footprints from 0.0391 yarn spacings on"],
+            'sigma = [0.03, 8.0]\n\n[dataset.truth]\nestimator = "node_table"',
+            ["dataset.truth.estimator = 'node_table'", "footprints from 0.0391 yarn spacings on"],
         ),
-        ("frames = 4", 'truth = { estimator = "table" }', ["bench.truth.estimator = 'table'", "pictures", "'auto'"]),
+        (
+            "frames = 4",
+            'truth = { estimator = "node_table" }',
+            ["bench.truth.estimator = 'node_table'", "pictures", "'auto'"],
+        ),
         (
             "frames = 4",
             "frame_truth = { shadows = false }",
@@ -77,8 +81,8 @@ def test_a_recipe_of_ones_own(files):
         ),
         (
             'model = "neumip"',
-            'model = "unified_btf"\ntexels_per_yarn = 16\ntruth = { estimator = "table" }',
-            ["models.1.truth.estimator = 'table'", "footprints from 0.0391 yarn spacings on"],
+            'model = "unified_btf"\ntexels_per_yarn = 16\ntruth = { estimator = "node_table" }',
+            ["models.1.truth.estimator = 'node_table'", "footprints from 0.0391 yarn spacings on"],
         ),
         ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
@@ -112,14 +116,14 @@ def test_a_table_is_refused_for_cloth_of_too_many_cells(files):
     rows = ["#" + "." * 9, *["#." * 5] * 9]
     files.exchange('family = "satin"\nends = 5\nmove = 2', f'family = "matrix"\nrows = {json.dumps(rows)}')
     load_recipe(files.write())
-    files.exchange("relative_error = 0.05", 'estimator = "table"')
+    files.exchange("relative_error = 0.05", 'estimator = "node_table"')
     words = "at most 96 different cells, own has 100; take 'auto'"
-    with pytest.raises(BadInput, match=f"tiny.toml: dataset.truth.estimator = 'table': .* {words}"):
+    with pytest.raises(BadInput, match=f"tiny.toml: dataset.truth.estimator = 'node_table': .* {words}"):
         load_recipe(files.write())
     # Only rows that are asked for count.
     files.text = files.text.replace('"own.toml"]', "]").replace('["twill_4_4"]', '["own.toml"]')
     files.text = files.text.replace('model = "neumip"', 'model = "soft_nodes"')
-    files.text = files.text.replace('estimator = "table"', '[dataset.training_truth]\nestimator = "table"')
+    files.text = files.text.replace('estimator = "node_table"', '[dataset.training_truth]\nestimator = "node_table"')
     load_recipe(files.write())
 
 

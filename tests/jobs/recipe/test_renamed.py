@@ -24,10 +24,7 @@ def refusal(files):
     return str(refused.value).removeprefix(f"{path}: ")
 
 
-later = pytest.mark.skipif("table" in KNOWN["estimator"], reason="the estimators keep their old names for now")
-
-
-@pytest.mark.parametrize("kind", ["model", pytest.param("estimator", marks=later), SCENE])
+@pytest.mark.parametrize("kind", ["model", "estimator", SCENE])
 def test_old_names_are_gone_and_new_names_exist(kind):
     assert KNOWN[kind].isdisjoint(RENAMED[kind]) and KNOWN[kind].isdisjoint(REMOVED.get(kind, {}))
     assert KNOWN[kind].issuperset(RENAMED[kind].values())
@@ -46,7 +43,6 @@ def test_old_models_of_another_recipe(files, old):
     assert refusal(files) == said
 
 
-@later
 @pytest.mark.parametrize("section", ["dataset.truth", "dataset.training_truth", "bench.truth", "bench.scenes.truth"])
 @pytest.mark.parametrize("old", RENAMED["estimator"])
 def test_old_estimators(files, old, section):
@@ -54,6 +50,11 @@ def test_old_estimators(files, old, section):
     if section.startswith("bench"):
         files.exchange("[bench]\nframes = 4", "")
     assert refusal(files) == f"{section}.estimator = '{old}': {replacement('estimator', old)}"
+
+
+def test_the_removed_geometry_of_the_truth(files):
+    files.exchange("[dataset.truth]\nrelative_error = 0.05", '[dataset.truth]\ngeometry = "linear"')
+    assert refusal(files).startswith("dataset.truth.geometry = 'linear': unknown key; 'geometry' was removed: ")
 
 
 @pytest.mark.parametrize("old", RENAMED[SCENE])

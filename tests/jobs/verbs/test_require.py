@@ -17,7 +17,7 @@ train = 8192
 sigma = [0.05, 8.0]
 max_angle = 80.0
 [dataset.training_truth]
-estimator = "table"
+estimator = "node_table"
 [[models]]
 model = "woven"
 [models.training]

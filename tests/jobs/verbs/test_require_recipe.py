@@ -71,7 +71,7 @@ def test_physics_and_stated_errors_of_a_truth_are_kept(tmp_path):
 )
 def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp_path, options):
     curved = load_recipe("curved")
-    table = TruthOptions(estimator="table")
+    table = TruthOptions(estimator="node_table")
     general = dataclasses.replace(curved, dataset=curved.dataset.model_copy(update={"training_truth": table}))
     own = narrowed(tmp_path / "r.toml", general, "curved", requirement=require(options))
     assert own.dataset.queries.curvature[1] > 0

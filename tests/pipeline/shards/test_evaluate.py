@@ -150,7 +150,7 @@ def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
 
 def test_what_stops_a_thread_stops_everything(case):
     """The table knows nothing of tiny footprints: the first such row in the file is named, whoever meets it first."""
-    case.options = OPTIONS.model_copy(update={"estimator": "table"})
+    case.options = OPTIONS.model_copy(update={"estimator": "node_table"})
     columns = questions()
     columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 1.0)
     with pytest.raises(BadInput, match="row 150"):

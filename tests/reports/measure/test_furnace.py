@@ -32,7 +32,7 @@ class Truth(Lambertian):
     name = "truth"
 
     def predict(self, fabric, queries, seed=0):
-        return estimate(fabric, queries, TruthOptions(estimator="table"), seed).mean
+        return estimate(fabric, queries, TruthOptions(estimator="node_table"), seed).mean
 
 
 def test_closed_forms():

@@ -16,7 +16,7 @@ from reports.tables import method_rows
 from reports.tables.summary import path_table
 from weaves.fabric import Fabric, load_fabric
 
-TRUTH = TruthOptions(estimator="table")
+TRUTH = TruthOptions(estimator="node_table")
 ASKED = QueryOptions(sigma=(0.3, 4.0))
 
 

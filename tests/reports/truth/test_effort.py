@@ -17,7 +17,7 @@ def test_kinds_are_those_of_the_answers():
     queries = draw_queries(QueryOptions(), FABRIC.weave.repeat, 4, 0, 300)
     kinds = classify(FABRIC, queries, OPTIONS, 4)
     assert set(kinds.tolist()) == {0, 1, 2}
-    table = estimate(FABRIC, queries, OPTIONS.model_copy(update={"estimator": "table"}), 4)
+    table = estimate(FABRIC, queries, OPTIONS.model_copy(update={"estimator": "node_table"}), 4)
     auto = estimate(FABRIC, queries, OPTIONS, 4)
     # What `table` says is said by a table alone, whatever the seed; everything else is not the same with another.
     same = (auto.mean == table.mean).all(axis=1) & (auto.standard_error == table.standard_error).all(axis=1)

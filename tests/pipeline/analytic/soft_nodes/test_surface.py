@@ -40,7 +40,7 @@ def test_nodes_lie_on_the_cloth(name, width):
             for node in range(0, 24, 5):
                 a, b = across.places[node % 8], along.places[node // 8]
                 x, y = (a, b) if piece.family == WARP else (b, a)
-                family, side, _, *vectors = surface_at(field, end + x, pick + y, end, pick, False)
+                family, side, _, *vectors = surface_at(field, end + x, pick + y, end, pick)
                 assert (family, side) == (piece.family, piece.side)
                 np.testing.assert_allclose(rows[:3, node], from_fabric(family, vectors[:3]), atol=1e-6)
                 np.testing.assert_allclose(rows[4:7, node], from_fabric(family, vectors[3:]), atol=1e-6)

@@ -33,7 +33,7 @@ def fabrics():
 def batch_of(fabric, index, seed, rows, answers=None):
     asked = draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
     if answers is None:
-        answers = estimate(fabric, asked, TruthOptions(estimator="table"), 1).mean
+        answers = estimate(fabric, asked, TruthOptions(estimator="node_table"), 1).mean
     columns = (*asked, answers, np.zeros(rows, np.float32))
     return asked, Batch(torch.tensor([index]), *(torch.from_numpy(column)[None] for column in columns))
 

@@ -34,7 +34,7 @@ def test_surface_matches_the_oracle(name):
     ends, picks = fabric.weave.repeat
     x, y = np.random.default_rng(4).random((2, 2000)) * np.array([[ends], [picks]])
     expected = oracle(fabric, x, y)
-    found = np.array([surface_at(field, a, b, int(a), int(b), False) for a, b in zip(x, y, strict=True)])
+    found = np.array([surface_at(field, a, b, int(a), int(b)) for a, b in zip(x, y, strict=True)])
     np.testing.assert_array_equal(found[:, 0], expected.yarn)
     solid = expected.yarn != GAP
     np.testing.assert_array_equal(found[solid, 1] == UNDER, expected.under[solid])
@@ -54,7 +54,7 @@ def test_slopes_are_those_of_the_height(name):
         pick, end = (int(generator.integers(n)) for n in field.top.shape)
         x, y, turn = end + generator.random(), pick + generator.random(), generator.random() * 6.28
         dx, dy = np.cos(turn), np.sin(turn)
-        family, side, _, _, _, nz, *_ = surface_at(field, x, y, end, pick, False)
+        family, side, _, _, _, nz, *_ = surface_at(field, x, y, end, pick)
         if family == GAP or nz < 0.1:
             continue
         _, slope = height_along(field, side, x, y, dx, dy, end, pick, end, pick)

@@ -34,6 +34,6 @@ def test_a_piece_shows_the_yarn_that_is_seen_there(warp, weft):
     for pick, end in ((0, 0), (1, 0), (2, 3)):
         for piece in cell_pieces(field, pick, end):
             x, y = (0.3 * low + 0.7 * high for low, high in piece.box)
-            family, side, *_ = surface_at(field, end + x, pick + y, end, pick, False)
+            family, side, *_ = surface_at(field, end + x, pick + y, end, pick)
             assert family == piece.family
             assert piece.radius == 0.0 or side == piece.side

@@ -40,7 +40,7 @@ def test_visibility_matches_a_march(name, width, degrees):
     azimuth = generator.random() * 2 * math.pi
     sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
     w = (sine * math.cos(azimuth), sine * math.sin(azimuth), cosine)
-    points = [surface_at(field, a, b, int(a), int(b), False) for a, b in zip(x, y, strict=True)]
+    points = [surface_at(field, a, b, int(a), int(b)) for a, b in zip(x, y, strict=True)]
     above = np.array([p[0] != GAP and p[3] * w[0] + p[4] * w[1] + p[5] * w[2] > 1e-3 for p in points])
     exact = np.array([visible(field, a, b, p[2], p[1], ray(*w, 0.0)) for a, b, p in zip(x, y, points, strict=True)])
     marched = _marched(fabric, x, y, np.array([p[2] for p in points]), w)
@@ -52,8 +52,8 @@ def test_visibility_matches_a_march(name, width, degrees):
 
 def test_the_normal_is_always_visible_and_a_crest_sees_the_horizon():
     field = height_field(load_fabric("polyester_lining"))
-    point = surface_at(field, 0.3, 0.4, 0, 0, False)
+    point = surface_at(field, 0.3, 0.4, 0, 0)
     assert visible(field, 0.3, 0.4, point[2], point[1], ray(0.0, 0.0, 1.0, 0.0))
     crest = max(((x + 0.5), (y + 0.5)) for x in range(2) for y in range(2) if field.crown[y, x] == field.highest)
-    height = surface_at(field, *crest, int(crest[0]), int(crest[1]), False)[2]
+    height = surface_at(field, *crest, int(crest[0]), int(crest[1]))[2]
     assert visible(field, *crest, height, 0, ray(math.cos(0.3), math.sin(0.3), 1e-6, 0.0))

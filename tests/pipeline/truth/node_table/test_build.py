@@ -60,7 +60,7 @@ def test_horizons_part_what_is_visible_from_what_is_not(name):
     random = np.random.default_rng(3)
     wrong = asked = 0
     for x, y, turn in zip(random.random(400) * ends, random.random(400) * picks, random.random(400), strict=True):
-        _, side, z, nx, ny, nz, *_ = surface_at(field, x, y, int(x), int(y), False)
+        _, side, z, nx, ny, nz, *_ = surface_at(field, x, y, int(x), int(y))
         dx, dy = math.cos(2 * math.pi * turn), math.sin(2 * math.pi * turn)
         slope = horizon(field, x, y, z, side, dx, dy)
         for asked_slope, expected in ((slope * 1.004 + 2e-3, True), (slope * 0.996 - 2e-3, False)):
@@ -93,7 +93,7 @@ def test_answers_match_converged_ones(fabric, behind, footprint):
     if behind:
         queries = queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
     exact = estimate(fabric, queries, CONVERGED.model_copy(update={"footprint": footprint}), 4)
-    answers = estimate(fabric, queries, TruthOptions(estimator="table", footprint=footprint), 4)
+    answers = estimate(fabric, queries, TruthOptions(estimator="node_table", footprint=footprint), 4)
     errors = (answers.mean.astype(np.float64) - exact.mean) / exact.mean.mean(axis=0)
     bias, spread = errors.mean(axis=0), errors.std(axis=0, ddof=1) / math.sqrt(len(errors))
     assert (np.abs(bias) < 0.003 + 3 * spread).all(), (bias, spread)
@@ -131,8 +131,8 @@ def test_the_table_says_what_it_does_not_know():
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 4)
     curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
-    with pytest.raises(BadInput, match=r"table \(row 2\).*take auto"):
-        estimate(fabric, curved, TruthOptions(estimator="table"), 0)
+    with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
+        estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
     assert np.isfinite(estimate(fabric, curved, TruthOptions(), 0).mean).all()
 
 
@@ -141,7 +141,7 @@ def test_a_viewer_behind_sees_the_back():
     front = draw_queries(QueryOptions(sigma=(0.5, 4.0)), fabric.weave.repeat, 8, 0, 30)
     flip = np.float32([1, 1, -1])
     behind = Queries.round(front.u, front.v, front.sigma, front.wi * flip, front.wo * flip)
-    options = TruthOptions(estimator="table")
+    options = TruthOptions(estimator="node_table")
     np.testing.assert_allclose(
         estimate(fabric, behind, options, 0).mean, estimate(fabric.back(), front, options, 0).mean, rtol=1e-5, atol=1e-7
     )

@@ -111,7 +111,6 @@ def _cases():
     yield "along", "cotton_twill", {}, {}, thin
     yield "across", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, math.pi / 2, np.float32))
     yield "aslant", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, 0.5, np.float32))
-    yield "linear", "polyester_lining", {}, {"geometry": "linear"}, _queries(*aslant, sigma=0.6)
     yield "varied", "polyester_lining", {}, {"variation": Variation(spread=0.5, repeats=2)}, _queries(*aslant)
 
 
