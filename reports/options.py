@@ -1,8 +1,12 @@
-"""What a benchmark measures and how finely; nothing heavy is imported here."""
+"""Options of the benchmark: what it measures and how finely.
+
+Each measurement takes the class of the options that it reads, and no more: what enters the identity of its task is what
+shapes its numbers. `BenchOptions` joins them as the keys of a recipe. Nothing heavy is imported here.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -25,13 +29,21 @@ RuntimeName = Literal["eager-bf16", "eager-fp16", "compile", "compile-bf16", "on
 """Ways to run a trained method, `pipeline.models.runtimes` says which."""
 
 EXTREME_PRECISIONS: Final[tuple[RuntimeName, ...]] = ("eager-bf16", "eager-fp16")
-"""Those in which every trained method is asked the extremes, beside single precision (`reports.measure.extremes`)."""
+"""Precisions that every trained method is measured in at its extremes, beside single precision."""
+
+EXTREME_TRUTH: Final = TruthOptions(estimator="quadrature", relative_error=0.01)
+"""Truth of the extremes: half a second a fabric, and 1 to 3 % from 16,384 points a query at every footprint."""
 
 
-class EdgeOptions(BaseModel):
-    """The edge of a cloth cylinder (`reports.measure.silhouette`): cylinder, camera, light and truth."""
-
+class _Options(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+_Kind = TypeVar("_Kind", bound=_Options)
+
+
+class EdgeOptions(_Options):
+    """The edge of a cloth cylinder (`reports.measure.silhouette`): cylinder, camera, light and truth."""
 
     radius: float = Field(default=10.0, ge=1, le=1e4)
     """Of the boundary, in yarn spacings."""
@@ -50,10 +62,8 @@ class EdgeOptions(BaseModel):
     """Of the truth's points."""
 
 
-class ImageOptions(BaseModel):
+class ImageOptions(_Options):
     """How a picture is compared with the truth's (`reports.measure.scene.image_error`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     exposure: float = Field(default=1.6, gt=0)
     """Factor on linear values before they are shown, as on the page (`tiles`); HDR-FLIP chooses its own."""
@@ -78,10 +88,8 @@ class ImageOptions(BaseModel):
     """Of the resamples and of the noised copy of the truth."""
 
 
-class DisplayOptions(BaseModel):
+class DisplayOptions(_Options):
     """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.fovvideovdp`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     resolution: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = (3840, 2160)
     """Width and height in pixels."""
@@ -99,13 +107,14 @@ class DisplayOptions(BaseModel):
     """Factor on linear values before they are shown."""
 
 
-class SceneBenchOptions(BaseModel):
-    """Scenes that every method renders (`reports.measure.scene.shot`), and how true their truth is."""
+class _SceneSeed(_Options):
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Seed of the truth's points and of the points of random methods."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    names: tuple[str, ...] = ()
-    """Scenes of the package, or paths of scenes as `pipeline.scenes.catalogue` reads them."""
+class ShotOptions(_SceneSeed):
+    """The frames of a scene, and how true their truth is (`reports.measure.scene.shot`)."""
+
     size: tuple[Side, Side] = (96, 72)
     """Width and height of a frame, in pixels."""
     frames: int = Field(default=6, ge=3, le=1024)
@@ -113,23 +122,48 @@ class SceneBenchOptions(BaseModel):
     options: SceneOptions = SceneOptions(environment_directions=8)
     """How scenes become queries."""
     truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.03, min_count=256, max_count=1024)
-    """How true the first frame is. Below 256 points a question may miss one family of yarns altogether."""
+    """How true the first frame is. Below 256 points a query may miss one family of yarns altogether."""
     frame_truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.1, min_count=256, max_count=256)
     """How true the other frames are."""
+
+
+class SceneErrorOptions(_SceneSeed):
+    """How the frames of a method are compared with the truth's."""
+
     footprint: RoundFootprint = "geometric_mean"
-    """What stands for an ellipse where a method knows round footprints only."""
+    """Round footprint that replaces an ellipse where a method answers round footprints only."""
     image: ImageOptions = ImageOptions()
     """How pictures are compared."""
     display: DisplayOptions = DisplayOptions()
-    """On which FovVideoVDP looks at the frames, where it is installed."""
+    """Display of FovVideoVDP, which is measured where it is installed."""
+
+
+class SceneBenchOptions(SceneErrorOptions, ShotOptions):
+    """Scenes that every method renders."""
+
+    names: tuple[str, ...] = ()
+    """Scenes of the package, or paths of scenes as `pipeline.scenes.catalogue` reads them."""
+
+
+class _SeededOptions(_Options):
     seed: int = Field(default=0, ge=0, lt=2**63)
-    """Of the truth's points and of the points of random methods."""
+    """Seed of the truth of the pictures and of the random points of the baseline."""
 
 
-class BenchOptions(BaseModel):
-    """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
+class _ViewedOptions(_SeededOptions):
+    view: ViewOptions = ViewOptions()
+    """Camera, light and scale."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+class ErrorOptions(_SeededOptions):
+    """Errors on held-out queries."""
+
+    rows: int = Field(default=16_384, ge=64)
+    """Most held-out queries of a fabric that errors are measured on."""
+
+
+class PictureOptions(_ViewedOptions):
+    """Pictures of one fabric."""
 
     views: Annotated[tuple[View, ...], Field(min_length=1, max_length=2)] = ("sphere", "plane")
     """Views that every fabric is shown in by itself."""
@@ -137,43 +171,67 @@ class BenchOptions(BaseModel):
     """Width and height of the sphere's picture, in pixels."""
     plane_size: tuple[Side, Side] = (240, 160)
     """Width and height of the plane's picture, in pixels."""
-    view: ViewOptions = ViewOptions()
-    """Camera, light and scale."""
     truth: TruthOptions = TruthOptions(relative_error=0.05, min_count=256, max_count=512)
     """How true the pictures of the truth are; their noise is subtracted from every figure. Below 256 points a pixel
     may miss one family of yarns altogether, and its standard error with it."""
-    frame_truth: TruthOptions = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
-    """The same for the frames of the truth."""
-    picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
-    """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
-    scenes: SceneBenchOptions = SceneBenchOptions()
-    """Scenes with cameras, lights and cloths of their own."""
-    edge: EdgeOptions = EdgeOptions()
-    """The silhouette, measured where the data set's queries are of curved cloth."""
-    rows: int = Field(default=16_384, ge=64)
-    """Most held-out queries a fabric used for the errors."""
-    frames: int = Field(default=6, ge=3, le=1024)
+
+    def size(self, scene: View) -> tuple[int, int]:
+        """Return width and height of a scene's picture, in pixels."""
+        return self.sphere_size if scene == "sphere" else self.plane_size
+
+
+class FrameOptions(_ViewedOptions):
     """Frames of the moving plane, for aliasing."""
+
+    frames: int = Field(default=6, ge=3, le=1024)
+    """Frames of the moving plane."""
     frame_size: tuple[Side, Side] = (80, 60)
     """Width and height of those frames, in pixels."""
-    timing_rows: int = Field(default=4096, ge=64)
-    """Queries a fabric in one timed call; fewer of the same for a method that would take longer than
-    `reports.measure.timing.LONGEST`."""
+    frame_truth: TruthOptions = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
+    """How true the frames of the truth are."""
+
+
+class RepeatOptions(_Options):
+    """How often a timed call is repeated."""
+
     timing_repeats: int = Field(default=25, ge=20, le=10_000)
     """Timed calls of each method, interleaved with those of the others."""
     warm_up: int = Field(default=3, ge=1, le=1000)
     """Calls of each method before the clock counts."""
+
+
+class TimingOptions(RepeatOptions, ErrorOptions):
+    """Times of methods on held-out queries."""
+
+    timing_rows: int = Field(default=4096, ge=64)
+    """Queries a fabric in one timed call; fewer of the same for a method that would take longer than
+    `reports.measure.timing.LONGEST`."""
     threads: Annotated[tuple[Annotated[int, Field(ge=0, le=1024)], ...], Field(min_length=1)] = (1, 0)
     """Numbers of threads that methods are timed with; 0: one a core of the machine. The fewest are what is compared."""
+
+
+class RunOptions(_Options):
+    """Ways to run a trained network that are measured beside the network itself."""
+
     bounds: bool = False
     """Measure every trained network a second time: under the energy bound of `pipeline.models.bounded`, or without it
     if it is bounded by itself. For flat cloth lit from the viewer's side."""
     runtimes: tuple[RuntimeName, ...] = ()
     """Measure every trained network run in these ways too: errors, aliasing and time, of the same weights. What a
     machine cannot run is named on the page with the reason."""
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    """Seed of the truth of the pictures and of the random points of the baseline."""
 
-    def size(self, scene: View) -> tuple[int, int]:
-        """Return width and height of a scene's picture, in pixels."""
-        return self.sphere_size if scene == "sphere" else self.plane_size
+
+class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
+    """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
+
+    picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
+    """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
+    scenes: SceneBenchOptions = SceneBenchOptions()
+    """Scenes with cameras, lights and cloths of their own."""
+    edge: EdgeOptions = EdgeOptions()
+    """The silhouette, measured where the data set's queries are of curved cloth."""
+
+
+def select(kind: type[_Kind], options: _Options) -> _Kind:
+    """Return those of the options that a measurement reads."""
+    return kind(**{name: getattr(options, name) for name in kind.model_fields})

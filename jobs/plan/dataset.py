@@ -7,12 +7,13 @@ are part of the models' identities and not of the data set's: a model more chang
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, ClassVar, Final
 
-from jobs.plan.task import Task, identity
+from jobs.plan.task import Places, Progress, Stage, Task
 from jobs.recipe.recipe import Recipe
+from pipeline import versions
+from pipeline.atomic import link
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
@@ -25,56 +26,91 @@ POINTS_A_ROW: Final = 1700
 BYTES_A_ROW: Final = 62
 
 
-@dataclass(frozen=True)
-class Shard:
-    """A shard and the task that makes it."""
+class Shard(Task):
+    """The task that makes one shard."""
+
+    stage: ClassVar[Stage] = "generate"
 
     question: AnyShardTask
-    task: Task
+    """Which rows of which fabric."""
+    role: str
+    """Role of the fabric in the data set: seen, population or unseen."""
+    folders: Places
+    """Folders of the data sets that hold the shard."""
 
     @property
     def is_extra(self) -> bool:
         """Whether single models alone read its rows."""
         return isinstance(self.question, ExtraShardTask)
 
+    @property
+    def group(self) -> str:
+        """Role and split, or kind of extra rows."""
+        question = self.question
+        what = question.kind.replace("_", " ") if isinstance(question, ExtraShardTask) else question.split
+        return f"{self.role} · {what}"
+
+    @property
+    def title(self) -> str:
+        """Fabric, split and rows."""
+        question = self.question
+        last = question.start + question.rows - 1
+        return f"{question.fabric.name} {question.split} rows {question.start}–{last}"
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """The same shard in every folder."""
+        return tuple(f"{folder}/part-{self.id}.parquet" for folder in self.folders)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return self.rows * SECONDS_A_POINT * _points(self.question)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the shard."""
+        return self.question.rows
+
+    @property
+    def size(self) -> int:
+        """Estimated bytes of the shard."""
+        return self.rows * BYTES_A_ROW
+
+    def versions(self) -> dict[str, int]:
+        """Return the version of the truth."""
+        return {"truth": versions.TRUTH}
+
+    def identity(self) -> dict[str, Any]:
+        """Return the identity that the shard itself holds."""
+        return self.question.identity()
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Write the shard to its first folder and link it into the others."""
+        from pipeline.shards.generate import generate_shard
+
+        first, *others = (out / path for path in self.products)
+        generate_shard(self.question, first, progress)
+        for other in others:
+            link(first, other)
+
 
 def shards(recipe: Recipe) -> list[Shard]:
     """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows; extra rows last."""
-    own: list[tuple[str, AnyShardTask]] = list(_own_rows(recipe))
-    folder = f"datasets/{recipe.name}-{fingerprint(sorted(_id(question) for _, question in own), 8)}"
-    return [_shard(role, question, folder) for role, question in [*own, *_extra_rows(recipe)]]
+    rows: list[tuple[str, AnyShardTask]] = [*_own_rows(recipe), *_extra_rows(recipe)]
+    parts = [Shard(question=question, role=role, folders=()) for role, question in rows]
+    folder = f"datasets/{recipe.name}-{fingerprint(sorted(part.id for part in parts if not part.is_extra), 8)}"
+    return [part.model_copy(update={"folders": (folder,)}) for part in parts]
 
 
 def fingerprint_of(parts: Sequence[Shard]) -> str:
     """Return the data set's fingerprint: that of its own rows' shards, in whatever order."""
-    return fingerprint(sorted(part.task.id for part in parts if not part.is_extra))
+    return fingerprint(sorted(part.id for part in parts if not part.is_extra))
 
 
 def folder_of(parts: Sequence[Shard]) -> str:
     """Return the data set's folder, relative to the output folder."""
-    return str(Path(parts[0].task.products[0]).parent)
-
-
-def _id(question: AnyShardTask) -> str:
-    return identity("generate", question.identity())
-
-
-def _shard(role: str, question: AnyShardTask, folder: str) -> Shard:
-    """Return a shard of a fabric in this role."""
-    rows = f"rows {question.start}–{question.start + question.rows - 1}"
-    what = question.kind.replace("_", " ") if isinstance(question, ExtraShardTask) else question.split
-    task = Task(
-        "generate",
-        f"{role} · {what}",
-        f"{question.fabric.name} {question.split} {rows}",
-        question.identity(),
-        (f"{folder}/part-{_id(question)}.parquet",),
-        cost=question.rows * SECONDS_A_POINT * _points(question),
-        rows=question.rows,
-        size=question.rows * BYTES_A_ROW,
-        setting={"question": question.model_dump(mode="json")},
-    )
-    return Shard(question, task)
+    return parts[0].folders[0]
 
 
 def _own_rows(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:

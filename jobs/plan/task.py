@@ -1,70 +1,131 @@
-"""Task: one piece of work, known by what it computes and not by its rank.
+"""Task: one piece of work, with everything it depends on as typed fields.
 
-The id is the fingerprint of the stage and the specification, which holds the VERSIONs of the code at work. Where its
-inputs lie (`setting`) and where its products go are no part of it: the same work asked for by another recipe, in
-another order or on more workers is the same task.
+A task is known by what it computes: its id is the fingerprint of its stage and its identity. The identity is the task's
+own dump, with the versions of the code at work and without the fields that say where files lie (`Place`). So the same
+work is the same task in another recipe, in another order or on more workers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Final, Literal
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    WrapSerializer,
+    model_serializer,
+)
 
 from pipeline.fingerprint import fingerprint
+from weaves.fabric import Fabric
 
 Stage = Literal["generate", "train", "bench", "report"]
 
 STAGES: Final[tuple[Stage, ...]] = ("generate", "train", "bench", "report")
 """The stages in the order of work; each is a verb of the command line."""
 
+Progress = Callable[[float], None]
+"""Told the share of a task that is done."""
 
-@dataclass(frozen=True)
-class Task:
-    """A piece of work and what is known of it before it runs; paths are relative to the output folder.
+_IDENTITY: Final = "identity"  # context of a dump
 
-    Attributes
-    ----------
-    stage : str
-        The stage that does it.
-    group, title : str
-        What a person calls tasks of its kind, and this one.
-    spec : mapping
-        JSON-able; everything that the products' bytes depend on, VERSIONs included.
-    products : tuple of str
-        Files that exist when it is done.
-    needs : tuple of str
-        Ids of the tasks that must be done before.
-    cost : float
-        Estimated seconds on one core.
-    rows, size : int
-        Estimated rows and bytes of the products.
-    setting : mapping
-        JSON-able; what else it needs to run, such as the folders to read or the device; no part of the identity.
-    alone : bool
-        It measures time, so that nothing else may run beside it.
-    """
+PLACE: Final = "place"
+"""Marks a field that only says where things lie: `Annotated[..., PLACE]`. It is no part of an identity."""
 
-    stage: Stage
-    group: str
-    title: str
-    spec: Mapping[str, Any]
-    products: tuple[str, ...]
-    needs: tuple[str, ...] = ()
-    cost: float = 1.0
-    rows: int = 0
-    size: int = 0
-    setting: Mapping[str, Any] = field(default_factory=dict)
-    alone: bool = False
-    id: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "id", identity(self.stage, self.spec))
+Place = Annotated[str, PLACE]
+"""A path relative to the output folder, or a name that a recipe gives."""
+Places = Annotated[tuple[str, ...], PLACE]
+"""Several of them."""
 
 
-def identity(stage: Stage, spec: Mapping[str, Any]) -> str:
-    """Return the id of the task of a stage with this specification: 16 hexadecimal digits."""
-    return fingerprint([stage, spec])
+class Part(BaseModel):
+    """A part of a task: typed fields, without its places in an identity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    @model_serializer(mode="wrap")
+    def _without_places(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        content: dict[str, Any] = dump(self)
+        if info.context == _IDENTITY:
+            for name, field in type(self).model_fields.items():
+                if PLACE in field.metadata:
+                    del content[name]
+        return content
+
+
+class Made(Part):
+    """What another task makes and this one reads."""
+
+    task: str
+    """Id of that task."""
+    path: Place
+    """Its product, or the folder of its products."""
+
+
+class Task(Part):
+    """A piece of work; the methods that raise NotImplementedError are each kind's to define."""
+
+    stage: ClassVar[Stage]
+    """The stage that does it."""
+    alone: ClassVar[bool] = False
+    """Whether it measures time, so that nothing else may run beside it."""
+
+    @property
+    def group(self) -> str:
+        """Name of the tasks of its kind, for people."""
+        raise NotImplementedError
+
+    @property
+    def title(self) -> str:
+        """Name of this one."""
+        raise NotImplementedError
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """Files that exist when it is done, relative to the output folder."""
+        raise NotImplementedError
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Ids of the tasks that must be done before."""
+        return ()
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 1.0
+
+    @property
+    def rows(self) -> int:
+        """Estimated rows of the products."""
+        return 0
+
+    @property
+    def size(self) -> int:
+        """Estimated bytes of the products."""
+        return 0
+
+    def versions(self) -> dict[str, int]:
+        """Return the version of every piece of code that the result depends on (`pipeline.versions`)."""
+        raise NotImplementedError
+
+    def identity(self) -> dict[str, Any]:
+        """Return everything that the products' bytes depend on, JSON-able."""
+        return {"versions": self.versions(), **self.model_dump(mode="json", context=_IDENTITY)}
+
+    @cached_property
+    def id(self) -> str:
+        """Fingerprint of the stage and the identity: 16 hexadecimal digits."""
+        return fingerprint([self.stage, self.identity()])
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Do the work in a worker process; the products then lie in `out`. Heavy libraries are imported here."""
+        raise NotImplementedError
 
 
 def urgencies(tasks: Sequence[Task]) -> dict[str, float]:
@@ -79,3 +140,23 @@ def urgencies(tasks: Sequence[Task]) -> dict[str, float]:
         for need in after.keys() & set(task.needs):
             after[need] = max(after[need], chain[task.id])
     return chain
+
+
+def _optics(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
+    """Return the fabric; in an identity what shapes its components, and its name, which seeds random points."""
+    return {"name": fabric.name, "optics": fabric.optics()} if info.context == _IDENTITY else dump(fabric)
+
+
+def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
+    """Return the fabric; in an identity what shapes its components and its pictures, and its name."""
+    if info.context != _IDENTITY:
+        return dump(fabric)
+    shown = {"specular", "diffuse", "diffuse_transmission"}
+    colours = fabric.model_dump(mode="json", include={"warp": shown, "weft": shown})
+    return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
+
+
+Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]
+"""A fabric whose colours shape nothing."""
+Coloured = Annotated[Fabric, WrapSerializer(_look)]
+"""A fabric whose colours shape the result."""

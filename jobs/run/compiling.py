@@ -8,19 +8,24 @@ is compiled by the first task that calls it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
+
+from pydantic import BaseModel
 
 from jobs.plan.task import Task
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.options import Options
+from pipeline.truth.options import TruthOptions
+
+_Kind = TypeVar("_Kind")
 
 _ROWS: Final = 8
 
 _SAMPLED: Final = ("mc", "jittered", "r2")
 """Estimators with the kernels of `owen`."""
 
-_IN_SCENES: Final = ("scene", "frame time")
-"""Measurements with the fallback: a node table, and `quadrature` for what it does not know."""
+_FALLBACK: Final = ("node_table", "quadrature")
+"""Estimators that answer queries outside the domain of a method."""
 
 _LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "gauss_nodes", "owen")
 
@@ -47,7 +52,7 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
         for name in _estimators(task):
             name = "owen" if name in _SAMPLED else name
             found[name] = KernelGroup(name, None)
-        for options in _models(task.spec):
+        for options in _models(task):
             # The value of the knob is an argument of the same kernels.
             found.setdefault(
                 options.model_dump_json(exclude={"name", options.knob}), KernelGroup(options.name, options)
@@ -62,7 +67,6 @@ def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
     from pipeline.models.registry import load_methods
     from pipeline.shards.queries import QueryOptions, draw_queries
     from pipeline.truth.estimator import estimate
-    from pipeline.truth.options import TruthOptions
     from weaves.fabric import load_fabric, preset_names
 
     fabric = load_fabric(preset_names()[0])
@@ -80,31 +84,31 @@ def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
 
 
 def _estimators(task: Task) -> Iterator[str]:
-    """Yield the estimators that a task asks."""
-    for table in _tables(task.spec, "estimator"):
-        yield table["estimator"]
-    make = task.setting.get("make")
-    if make in _IN_SCENES:
-        yield from ("node_table", "quadrature")
-    if make == "extremes":
-        yield "quadrature"
+    """Yield the estimators that a task evaluates; a page evaluates none."""
+    if task.stage != "report":
+        yield from (truth.estimator for truth in _held(task, TruthOptions))
+    if "fallback" in task.versions():
+        yield from _FALLBACK
 
 
-def _models(spec: Any) -> Iterator[Options]:
-    """Yield the models without training that a task's specification names, with the first value of their knob alone."""
-    for table in _tables(spec, "model"):
-        if table["model"] == "selvage":  # corrects soft_nodes
+def _models(task: Task) -> Iterator[Options]:
+    """Yield the models without training that a task names, with the first value of their parameter alone."""
+    for options in _held(task, Options):
+        if options.model == "selvage":  # corrects soft_nodes
             yield CLASSES["soft_nodes"]()
-        elif not CLASSES[table["model"]].learns:
-            yield CLASSES[table["model"]].model_validate(table).single()[0]
+        elif not options.learns:
+            yield options.single()[0]
 
 
-def _tables(value: Any, key: str) -> Iterator[Mapping[str, Any]]:
-    """Yield every table within a JSON value that has a key."""
-    if isinstance(value, Mapping):
-        if key in value:
-            yield value
-        value = list(value.values())
-    if isinstance(value, list | tuple):
+def _held(value: object, kind: type[_Kind]) -> Iterator[_Kind]:
+    """Yield every object of a kind in the fields of a task."""
+    if isinstance(value, kind):
+        yield value
+    elif isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from _held(getattr(value, name), kind)
+    elif isinstance(value, Mapping):
+        yield from _held(tuple(value.values()), kind)
+    elif isinstance(value, list | tuple):
         for inner in value:
-            yield from _tables(inner, key)
+            yield from _held(inner, kind)

@@ -8,8 +8,6 @@ state is kept, so nothing has to be repaired after a kill.
 from __future__ import annotations
 
 import json
-import os
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 from filelock import FileLock, Timeout
 
 from jobs.plan.task import Task
-from pipeline.atomic import atomic_path, atomic_write
+from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
@@ -150,13 +148,3 @@ def measure(path: Path) -> Product:
 
 def _heading(task: Task) -> dict[str, str]:
     return {"task": task.id, "stage": task.stage, "title": task.title}
-
-
-def link(source: Path, target: Path) -> None:
-    """Let a second path, whole or not at all, name the same bytes; a copy of them where there are no links."""
-    with atomic_path(target) as temporary:
-        temporary.unlink(missing_ok=True)
-        try:
-            os.link(source, temporary)
-        except OSError:  # another file system, or one without links
-            shutil.copyfile(source, temporary)

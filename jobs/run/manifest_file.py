@@ -18,7 +18,7 @@ class ManifestFile:
     def __init__(self, recipe: Recipe, parts: Sequence[Shard], ledger: Ledger) -> None:
         self._recipe, self._ledger = recipe, ledger
         self._folder = ledger.out / folder_of(parts)
-        self._parts = {part.task.id: part for part in parts}
+        self._parts = {part.id: part for part in parts}
         self._entries: dict[str, Any] = {}
         for part in parts:
             self._enter(part)
@@ -34,16 +34,16 @@ class ManifestFile:
     def _enter(self, part: Shard) -> None:
         from pipeline.shards.manifest import ShardEntry
 
-        name, question = Path(part.task.products[0]).name, part.question
-        if self._ledger.state(part.task) == "done":
-            self._entries[part.task.id] = ShardEntry(
+        name, question = Path(part.products[0]).name, part.question
+        if self._ledger.state(part) == "done":
+            self._entries[part.id] = ShardEntry(
                 file=name,
                 fabric=question.fabric.name,
                 kind=question.kind,
                 split=question.split,
                 start=question.start,
                 rows=question.rows,
-                sha256=self._ledger.products(part.task)[name].sha256,
+                sha256=self._ledger.products(part)[name].sha256,
             )
 
     def _save(self) -> None:

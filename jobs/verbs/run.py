@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from jobs.plan.dataset import shards
+from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
@@ -59,10 +60,10 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
         console.print(f"nothing to do: {len(chosen)} tasks done")
     else:
         console.print(summary_table(chosen, {task.id: ledger.seconds(task) for task in summary.ran}))
-    page = next(task for task in tasks if task.stage == "report")
+    page = next(task for task in tasks if isinstance(task, Page))
     if "report" in stages and ledger.state(page) == "done":
         console.print()
-        console.print(methods_table(summary_of([out / path for path in page.setting["records"]])))
+        console.print(methods_table(summary_of([out / path for path in page.records])))
         console.print(f"\nthe page: {(out / page.products[0]).resolve()}", soft_wrap=True)
     if summary.failed:
         first, *others = summary.failed

@@ -18,8 +18,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from jobs.plan.measurements.scene import OnScene
+from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.plan import plan
 from jobs.plan.task import Task
+from jobs.plan.training import Training
 from jobs.recipe.fallback_share import left_to_quadrature
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
@@ -158,9 +161,10 @@ def _costs(
     if left := [task for task in tasks if ledger.state(task) != "done"]:
         allowed = f"{len(left)} of {len(tasks)} tasks behind {model.options.name} are not done; `twillight run {run}`"
         raise BadInput("savings", "recipe", recipe.name, allowed)
-    shards, trainings = ([task for task in tasks if task.stage == stage] for stage in ("generate", "train"))
+    shards = [task for task in tasks if task.stage == "generate"]
+    trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [json.loads((ledger.out / task.products[1]).read_bytes()) for task in trainings]
-    needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.spec["fabrics"])]
+    needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
     weights = sum(ledger.products(task)[Path(task.products[0]).name].bytes for task in needed)
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
@@ -207,11 +211,14 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     name, setting = model.options.name, _setting(model)
     pictures, frames = [], None
     for task in (task for recipe in recipes for task in plan(recipe)):
-        if task.setting.get("make") == "shot" and task.spec["scene"]["name"] == scene:
-            frames = out / task.products[0]
-        asked = task.setting.get("scene") == scene and task.setting.get("model", {}).get("name") == name
-        if task.setting.get("make") == "scene" and asked and setting in task.setting["pictures_of"]:
-            pictures.append(out / task.setting["pictures_of"][setting])
+        if isinstance(task, SceneShot) and task.scene == scene:
+            frames = out / task.made.path
+        if (
+            isinstance(task, OnScene)
+            and (task.scene, task.model.options.name) == (scene, name)
+            and setting in task.shown
+        ):
+            pictures.append(out / task.picture(setting))
     if len(pictures) != 2 or frames is None or not all(path.is_file() for path in (*pictures, frames)):
         return []
     first = read_shot(frames).first()
@@ -232,9 +239,9 @@ def _elsewhere(
     from reports.measure.scene.shot import read_shot
 
     for task in plan(general):
-        if task.setting.get("make") != "shot" or Ledger(out).state(task) != "done":
+        if not isinstance(task, SceneShot) or Ledger(out).state(task) != "done":
             continue
-        shot = read_shot(out / task.products[0])
+        shot = read_shot(out / task.made.path)
         if shot.name != scene:
             asked = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
             shares = (Value(left_to_quadrature(*of, asked)) for of in ((same, general), (model, own)))

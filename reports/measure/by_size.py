@@ -26,7 +26,7 @@ from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.timing import Contender, affordable, time_side_by_side
 from reports.measure.truth_noise import with_noise
-from reports.options import BenchOptions
+from reports.options import TimingOptions
 from reports.record import Metric, Provenance, Record
 from weaves.fabric import Fabric
 
@@ -62,7 +62,7 @@ def measure_by_size(
     methods: Sequence[Method],
     manifest: Manifest,
     folder: Path,
-    options: BenchOptions,
+    options: TimingOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.

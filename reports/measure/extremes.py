@@ -27,6 +27,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.error import COLOUR_WEIGHTS
+from reports.options import EXTREME_TRUTH
 from reports.record import Metric, Provenance, Record, Role
 from weaves.fabric import Fabric
 
@@ -47,9 +48,6 @@ LUSTROUS: Final = 0.01
 
 FAR: Final = 1e6
 """How far away, in yarn spacings; single precision still holds sixteenths of a yarn there."""
-
-TRUTH: Final = TruthOptions(estimator="quadrature", relative_error=0.01)
-"""How true the truth is: half a second a fabric, and 1 to 3 % from 16,384 points a query at every footprint."""
 
 Array = npt.NDArray[np.float64]
 
@@ -109,7 +107,7 @@ def measure_extremes(
     families: Sequence[Sequence[Method]],
     fabrics: Sequence[tuple[Fabric, Role]],
     provenance: Provenance | None = None,
-    truth: TruthOptions = TRUTH,
+    truth: TruthOptions = EXTREME_TRUTH,
 ) -> list[Record]:
     """Measure methods at their extremes.
 

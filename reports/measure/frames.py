@@ -20,7 +20,7 @@ from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
 from reports.measure.truth_noise import with_noise
-from reports.options import BenchOptions
+from reports.options import FrameOptions
 from reports.record import TRUTH, Provenance, Record, Role
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
@@ -47,7 +47,7 @@ class _Frames(NamedTuple):
         return np.asarray(self.lit.all(axis=1))
 
 
-def render_frames(fabric: Fabric, options: BenchOptions, path: Path) -> None:
+def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
     """Write the truth's frames of the moving plane to `path`."""
     weights = _luminance(fabric)
     values, errors = [], []
@@ -66,7 +66,7 @@ def measure_aliasing(
     method: Method,
     fabric: Fabric,
     role: Role,
-    options: BenchOptions,
+    options: FrameOptions,
     frames: Path,
     provenance: Provenance | None = None,
 ) -> list[Record]:
@@ -101,7 +101,7 @@ def measure_aliasing(
 
 
 def measure_truth_frames(
-    fabric: Fabric, role: Role, options: BenchOptions, frames: Path, provenance: Provenance | None = None
+    fabric: Fabric, role: Role, options: FrameOptions, frames: Path, provenance: Provenance | None = None
 ) -> list[Record]:
     """Measure the truth's own frames: the variance that the motion brings, and their spectrum."""
     reference = _read(frames, options)
@@ -115,11 +115,11 @@ def measure_truth_frames(
     ]
 
 
-def _view(options: BenchOptions, index: int) -> GBuffer:
+def _view(options: FrameOptions, index: int) -> GBuffer:
     return view("plane", *options.frame_size, frame=index, options=options.view)
 
 
-def _read(path: Path, options: BenchOptions) -> _Frames:
+def _read(path: Path, options: FrameOptions) -> _Frames:
     width, height = options.frame_size
     channels = read_exr(path).channels
     truth, noise = (channels[name].astype(np.float64).reshape(-1, height, width) for name in ("Y", "error.Y"))

@@ -26,7 +26,7 @@ from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
 from reports.measure.truth_noise import with_noise
-from reports.options import BenchOptions
+from reports.options import ErrorOptions, TimingOptions
 from reports.record import TRUTH, Metric, Provenance, Record, Role
 from weaves.fabric import Fabric
 
@@ -50,7 +50,7 @@ def measure_errors(
     folder: Path,
     fabric: str,
     role: Role,
-    options: BenchOptions,
+    options: ErrorOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
     """Measure a method on a fabric's held-out queries: MSE in colour, and relative errors (`reports.error`).
@@ -63,7 +63,7 @@ def measure_errors(
         The data set.
     fabric, role : str
         Name of the fabric, and whether general models saw it.
-    options : BenchOptions
+    options : ErrorOptions
         How many rows, and the seed of random methods.
     """
     cloth, queries, stated = _held_out(manifest, folder, fabric, options)
@@ -93,7 +93,7 @@ def measure_truth(
     folder: Path,
     fabric: str,
     role: Role,
-    options: BenchOptions,
+    options: ErrorOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
     """Measure the truth itself on a fabric's held-out queries: median and quartiles of |standard error| / |mean|.
@@ -112,7 +112,7 @@ def measure_timing(
     methods: Sequence[Method],
     manifest: Manifest,
     folder: Path,
-    options: BenchOptions,
+    options: TimingOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
     """Time methods side by side on held-out queries of all named fabrics; note bytes, memory and the cost of a fabric.
@@ -150,7 +150,7 @@ def measure_timing(
     return records + _times(entries, options)
 
 
-def _times(entries: Sequence[tuple[Record, Contender]], options: BenchOptions) -> list[Record]:
+def _times(entries: Sequence[tuple[Record, Contender]], options: TimingOptions) -> list[Record]:
     """Return the times of all contenders on every number of threads, all of them in turns."""
     runs = [
         (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
@@ -186,7 +186,7 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
     return [found]
 
 
-def _held_out(manifest: Manifest, folder: Path, name: str, options: BenchOptions) -> tuple[Fabric, Queries, Answers]:
+def _held_out(manifest: Manifest, folder: Path, name: str, options: ErrorOptions) -> tuple[Fabric, Queries, Answers]:
     queries, answers = manifest.read(folder, name, "test")
     rows = slice(options.rows)
     return manifest.fabrics[name], queries.take(rows), answers.take(rows)

@@ -23,7 +23,7 @@ from pipeline.truth.estimator import estimate
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
 from reports.measure.truth_noise import with_noise
-from reports.options import BenchOptions
+from reports.options import PictureOptions
 from reports.record import TRUTH, Provenance, Record, Role
 from weaves.fabric import Fabric
 
@@ -34,7 +34,7 @@ ERROR: Final = ("error.R", "error.G", "error.B")
 """Channels of its standard error."""
 
 
-def render_truth(fabric: Fabric, scene: View, options: BenchOptions, path: Path) -> None:
+def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Path) -> None:
     """Write the truth's picture of a scene to `path`."""
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
@@ -50,7 +50,7 @@ def render_method(
     fabric: Fabric,
     role: Role,
     scene: View,
-    options: BenchOptions,
+    options: PictureOptions,
     truth: Path,
     path: Path,
     provenance: Provenance | None = None,

@@ -1,4 +1,4 @@
-"""Stages that write a few bytes, for the executor's tests; a module of its own so that workers can import it."""
+"""Tasks that write a few bytes, for the executor's tests; a module of its own so that workers can import it."""
 
 import json
 import os
@@ -6,34 +6,78 @@ import signal
 import sys
 import time
 from pathlib import Path
+from typing import ClassVar
 
-from jobs.plan.task import Task
+from jobs.plan.task import Place, Task
 
 
-def task(name, stage="generate", needs=(), cost=1.0, alone=False, **spec):
-    products = (f"{stage}/{name}.txt",)
-    return Task(
-        stage, stage, name, {"name": name, **spec}, products, tuple(n.id for n in needs), cost=cost, alone=alone
-    )
+class Fake(Task):
+    """Logs, sleeps, dies, fails, writes."""
+
+    stage: ClassVar = "generate"
+
+    name: str
+    after: tuple[str, ...] = ()
+    folder: Place = ""
+    seconds: float = 0
+    dies: bool = False
+    fails: str = ""
+    forgets: bool = False
+
+    @property
+    def group(self):
+        return self.stage
+
+    @property
+    def title(self):
+        return self.name
+
+    @property
+    def products(self):
+        return (f"{self.folder or self.stage}/{self.name}.txt",)
+
+    @property
+    def needs(self):
+        return self.after
+
+    def versions(self):
+        return {"fake": 1}
+
+    def run(self, out, progress):
+        log(out, "start", self)
+        for step in range(10):
+            time.sleep(self.seconds / 10)
+            progress(step / 10)
+        if self.dies and not (out / f"{self.name}.died").exists():
+            (out / f"{self.name}.died").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.fails:
+            raise eval(self.fails)
+        if not self.forgets:
+            path = out / self.products[0]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{self.name}\n" * 100)
+        log(out, "end", self)
+
+
+class FakeTraining(Fake):
+    stage: ClassVar = "train"
+
+
+class FakeBench(Fake):
+    stage: ClassVar = "bench"
+
+
+class FakeTiming(FakeBench):
+    alone: ClassVar = True
+
+
+def task(name, kind=Fake, needs=(), **fields):
+    return kind(name=name, after=tuple(need.id for need in needs), **fields)
 
 
 def run(task, out, progress):
-    """Do what the specification says: log, sleep, die, fail, write."""
-    spec = task.spec
-    log(out, "start", task)
-    for step in range(10):
-        time.sleep(spec.get("seconds", 0) / 10)
-        progress(step / 10)
-    if spec.get("dies") and not (out / f"{spec['name']}.died").exists():
-        (out / f"{spec['name']}.died").touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    if "fails" in spec:
-        raise eval(spec["fails"])
-    if not spec.get("forgets"):
-        path = out / task.products[0]
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"{spec['name']}\n" * 100)
-    log(out, "end", task)
+    task.run(out, progress)
 
 
 def log(out, event, task):
@@ -50,7 +94,7 @@ def events(out):
 def chain():
     """Eight slow shards and a training that needs them."""
     shards = [task(f"shard {index}", seconds=0.4) for index in range(8)]
-    return [*shards, task("net", "train", needs=shards)]
+    return [*shards, task("net", FakeTraining, needs=shards)]
 
 
 if __name__ == "__main__":

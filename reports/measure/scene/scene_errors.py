@@ -29,7 +29,7 @@ from reports.measure.scene.fovvideovdp import fovvideovdp_records
 from reports.measure.scene.image_error import image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
-from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
+from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Metric, Provenance, Record
 from weaves.colour import LUMINANCE
 
@@ -68,7 +68,7 @@ def write_truth(shot: Shot, path: Path) -> None:
 def measure_scene(
     methods: Sequence[Fallback],
     shot: Shot,
-    options: BenchOptions,
+    options: SceneErrorOptions,
     pictures: Mapping[str, Path],
     provenance: Provenance | None = None,
 ) -> list[Record]:
@@ -80,17 +80,17 @@ def measure_scene(
         One a setting; those that do not cover every cloth are left out.
     shot : Shot
         The scene's frames.
-    options : BenchOptions
+    options : SceneErrorOptions
         How pictures are compared, and the seed of random methods.
     pictures : mapping
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
         of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.difference_maps`).
     """
-    image, reference = options.scenes.image, _reference(shot, options.scenes.image)
+    image, reference = options.image, _reference(shot, options.image)
     truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]
     records = []
     for method in (one for one in methods if shot.covered_by(one)):
-        answers = shot.answers(method, options.scenes.seed)
+        answers = shot.answers(method, options.seed)
         shown = shot.pictures(answers)
         errors = image_errors(shown[0], truth, noise, lit, image, reference.floor)
         if method.setting in pictures:
@@ -100,7 +100,7 @@ def measure_scene(
         subject = _subject(method, shot, provenance)
         records += errors.records(subject)
         records.append(_colour(subject, shot, answers, image))
-        records += _over_time(subject, shown, reference, options.scenes)
+        records += _over_time(subject, shown, reference, options)
         strange = [method.strange(cloth.fabric, cloth.queries) for cloth in shot.cloths]
         records.append(subject.of("fallback_share", float(np.concatenate(strange).mean()), sum(map(len, strange))))
     return records
@@ -111,7 +111,7 @@ def _reference(shot: Shot, image: ImageOptions) -> _Reference:
     return _Reference(pictures, noise, lit, noise_floor(pictures[0], noise[0], lit[0], image))
 
 
-def _over_time(subject: Record, shown: Floats, reference: _Reference, options: SceneBenchOptions) -> list[Record]:
+def _over_time(subject: Record, shown: Floats, reference: _Reference, options: SceneErrorOptions) -> list[Record]:
     """Return what a method's frames show of aliasing, and FovVideoVDP's score where that is installed."""
     own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, reference.pictures, reference.noise))
     still, image = np.asarray(reference.lit.all(axis=0)), options.image
@@ -130,7 +130,7 @@ def _over_time(subject: Record, shown: Floats, reference: _Reference, options: S
 
 
 def time_scene(
-    methods: Sequence[Fallback], shot: Shot, options: BenchOptions, provenance: Provenance | None = None
+    methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int, provenance: Provenance | None = None
 ) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
@@ -140,7 +140,7 @@ def time_scene(
     first = shot.first()
     if not (able := [method for method in methods if first.covered_by(method)]):
         return []
-    mixed = np.random.default_rng(options.scenes.seed)
+    mixed = np.random.default_rng(seed)
     contenders = []
     # In a random order, so that the first ones are a fair sample of the frame.
     asked = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]

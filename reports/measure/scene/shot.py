@@ -28,7 +28,7 @@ from pipeline.scenes.shade import colours_of, compose
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
 from reports.measure.truth_noise import with_noise
-from reports.options import SceneBenchOptions
+from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -161,7 +161,7 @@ class Shot:
         return found
 
 
-def shoot(name: str, options: SceneBenchOptions, path: Path) -> None:
+def shoot(name: str, options: ShotOptions, path: Path) -> None:
     """Work out a scene's frames with the truth's answers and write them to `path`.
 
     Raises

@@ -23,9 +23,9 @@ def test_every_row_once_in_tasks_of_shard_rows(tasks):
     rows = {}
     for task in tasks:
         if task.stage == "generate":
-            key = task.spec["name"], task.spec["split"]
-            assert task.spec["start"] == rows.get(key, 0)
-            rows[key] = task.spec["start"] + task.rows
+            key = task.question.fabric.name, task.question.split
+            assert task.question.start == rows.get(key, 0)
+            rows[key] = task.question.start + task.rows
             assert task.rows <= 1000
     named = {(name, split): count for name in ("denim", "own", "twill_4_4") for split, count in SPLITS.items()}
     assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
@@ -49,14 +49,14 @@ def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
         if task.stage == "train":
             assert test.isdisjoint(task.needs)
             assert unseen.isdisjoint(task.needs) == (task.title != "neumip on twill_4_4")
-            assert ("twill_4_4" in task.spec["fabrics"]) == (task.title == "neumip on twill_4_4")
+            assert ("twill_4_4" in task.fabrics) == (task.title == "neumip on twill_4_4")
     woven = next(task for task in tasks if task.title.startswith("woven"))
-    assert woven.spec["fabrics"] == ["denim", "own", "random_000", "random_001", "random_002"]
+    assert list(woven.fabrics) == ["denim", "own", "random_000", "random_001", "random_002"]
 
 
 def test_without_a_model_of_one_material_the_unseen_fabric_has_no_training_rows(files):
     tasks = edited(files, '[[models]]\nmodel = "neumip"\n', "")
-    assert {task.spec["split"] for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
+    assert {task.question.split for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
 
 
 @pytest.mark.parametrize(
@@ -138,8 +138,8 @@ def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
     assert len(edges) == 3
     for task in after:
         if task.stage == "bench" and task.title.endswith(" on denim"):
-            assert edges[0] in task.needs
-            assert task.setting["truth"]["edge"].startswith("records/truth-denim-edge-")
+            assert task.kind == "truth" or edges[0] in task.needs
+            assert task.kind == "truth" or task.edge.path.startswith("records/truth-denim-edge-")
     again = edited(files, "frames = 4", "frames = 4\nedge = { radius = 20.0 }")
     assert set(ids(again, "bench", ", edge")).isdisjoint(edges)
     assert ids(again, "bench", ", sphere") == ids(after, "bench", ", sphere")
@@ -148,12 +148,10 @@ def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
 def test_models_of_one_kind_are_told_apart_on_the_page(files):
     tasks = edited(files, 'model = "neumip"', 'model = "neumip"\n\n[[models]]\nmodel = "neumip"\nname = "fine"')
     page = tasks[-1]
-    notes = {note["name"]: note for note in page.setting["models"]}
-    assert notes["fine"]["kind"] == "neumip" and notes["fine"]["about"].startswith("neumip: ")
-    assert {"neumip", "fine"} <= {picture["method"] for picture in page.setting["pictures"]}
-    assert len({(p["fabric"], p["scene"], p["method"], p["setting"]) for p in page.setting["pictures"]}) == len(
-        page.setting["pictures"]
-    )
+    notes = {note.name: note for note in page.models}
+    assert notes["fine"].kind == "neumip" and notes["fine"].about.startswith("neumip: ")
+    assert {"neumip", "fine"} <= {picture.method for picture in page.pictures}
+    assert len({(p.fabric, p.scene, p.method, p.setting) for p in page.pictures}) == len(page.pictures)
 
 
 def test_truth_of_pictures_is_shared_by_all_models_and_data_sets(files, tasks):
@@ -168,9 +166,9 @@ def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tas
     measured = {task.title: task for task in tasks if task.stage == "bench"}
     for fabric in ("denim", "own", "twill_4_4"):
         for method, trainings in (("woven", ids(tasks, "train", "woven")), ("point_sampled", [])):
-            assert measured[f"{method} on {fabric}"].spec["models"] == trainings
+            assert measured[f"{method} on {fabric}"].model.needs == tuple(trainings)
         neumip = measured[f"neumip on {fabric}"]
-        assert neumip.spec["models"] == ids(tasks, "train", f"neumip on {fabric}")
+        assert list(neumip.model.needs) == ids(tasks, "train", f"neumip on {fabric}")
         assert set(ids(tasks, "generate", f"{fabric} test")) < set(neumip.needs)
     assert [task.title for task in tasks if task.alone] == ["latents of woven", "timing of all methods"]
     assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
@@ -191,7 +189,7 @@ def test_extremes_need_the_trainings_alone_and_know_one_fabric_of_each_role(file
     assert list(found["extremes of woven"].needs) == ids(tasks, "train", "woven")
     ends = ids(tasks, "train", "neumip on denim") + ids(tasks, "train", "neumip on twill_4_4")
     assert list(found["extremes of neumip"].needs) == ends
-    assert [(name, role) for name, _, role in found["extremes of woven"].spec["fabrics"]] == [
+    assert [(fabric.name, role) for fabric, role in found["extremes of woven"].fabrics] == [
         ("denim", "seen"),
         ("twill_4_4", "unseen"),
     ]
@@ -235,9 +233,9 @@ def test_the_full_plan_is_paper_sized():
 def test_rows_that_nobody_learns_from_are_not_drawn():
     quick = load_recipe("quick")
     idle = dataclasses.replace(quick, models=tuple(m for m in quick.models if not m.learns))
-    drawn = {task.setting["question"]["split"] for task in plan(idle) if task.stage == "generate"}
+    drawn = {task.question.split for task in plan(idle) if task.stage == "generate"}
     assert drawn == {"test"}
-    every = {task.setting["question"]["split"] for task in plan(quick) if task.stage == "generate"}
+    every = {task.question.split for task in plan(quick) if task.stage == "generate"}
     assert every == {"train", "validation", "test"}
 
 
@@ -273,14 +271,16 @@ def test_extra_rows_are_tasks_that_equal_models_share(files, tasks):
     recipe = load_recipe(files.write())
     after = plan(recipe)
     extra = {task.id: task for task in after if task.stage == "generate" and "samples" in task.title}
-    names = {task.spec["name"] for task in extra.values()}
+    names = {task.question.fabric.name for task in extra.values()}
     assert names == {fabric.name for fabric in recipe.fabrics}
     for fabric in recipe.fabrics:
         ends, picks = fabric.weave.repeat
-        rows = sum(task.rows for task in extra.values() if task.spec["name"] == fabric.name)
+        rows = sum(task.rows for task in extra.values() if task.question.fabric.name == fabric.name)
         assert rows == 60 * 4 * ends * picks
     trainings = [task for task in after if task.stage == "train"]
-    read = {task.title: {extra[need].spec["name"] for need in task.needs if need in extra} for task in trainings}
+    read = {
+        task.title: {extra[need].question.fabric.name for need in task.needs if need in extra} for task in trainings
+    }
     assert read["unified_btf on 5 fabrics"] == names - {"twill_4_4"}
     assert read["btf_autoencoder on twill_4_4"] == {"twill_4_4"}
     assert read["woven on 5 fabrics"] == set()

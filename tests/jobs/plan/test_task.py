@@ -1,26 +1,87 @@
+import json
+from typing import ClassVar
+
 import pytest
+from pydantic import ValidationError
 
-from jobs.plan.task import Task, urgencies
-
-
-def task(name, stage="generate", **options):
-    return Task(stage, stage, name, {"name": name}, (f"{name}.txt",), **options)
+from jobs.plan.task import Coloured, Made, Place, Task, Uncoloured, urgencies
+from weaves.fabric import load_fabric
 
 
-def test_only_stage_and_specification_make_the_identity():
-    one = Task("train", "group", "a title", {"x": 1}, ("a",), needs=("n",), cost=2.0, setting={"folder": "a"})
-    two = Task("train", "other", "another", {"x": 1}, ("b",))
-    assert one.id == two.id
-    assert one.id != Task("bench", "group", "a title", {"x": 1}, ("a",)).id
-    assert one.id != Task("train", "group", "a title", {"x": 2}, ("a",)).id
+class Example(Task):
+    stage: ClassVar = "train"
+
+    x: float
+    folder: Place = ""
+    network: Made = Made(task="0123", path="models/a")
+    version: Place = "1"
+    seconds: Place = "1"
+    after: tuple[str, ...] = ()
+
+    @property
+    def cost(self):
+        return float(self.seconds)
+
+    @property
+    def needs(self):
+        return self.after
+
+    def versions(self):
+        return {"example": int(self.version)}
 
 
-def test_a_specification_with_nan_is_refused():
-    with pytest.raises(ValueError):
-        Task("train", "group", "title", {"x": float("nan")}, ())
+class Twin(Example):
+    stage: ClassVar = "bench"
+
+
+class Shown(Task):
+    stage: ClassVar = "bench"
+    fabric: Coloured
+
+    def versions(self):
+        return {}
+
+
+class Measured(Shown):
+    fabric: Uncoloured
+
+
+def test_places_are_no_part_of_an_identity():
+    one, two = Example(x=1, folder="a"), Example(x=1, folder="b", network=Made(task="0123", path="models/b"))
+    assert one.id == two.id and "models/a" not in json.dumps(one.identity())
+    assert one.id != Example(x=1, network=Made(task="4567", path="models/a")).id
+
+
+def test_stage_versions_and_every_other_field_make_the_identity():
+    one = Example(x=1)
+    assert one.id not in {Twin(x=1).id, Example(x=2).id, Example(x=1, version="2").id}
+
+
+def test_a_task_is_read_back_from_its_dump():
+    one = Example(x=1.5, folder="a", after=("n",))
+    again = Example.model_validate_json(one.model_dump_json())
+    assert again == one and again.folder == "a" and again.network.path == "models/a"
+
+
+def test_nan_and_unknown_fields_are_refused():
+    with pytest.raises(ValidationError):
+        Example(x=float("nan"))
+    with pytest.raises(ValidationError):
+        Example(x=1, y=2)
+
+
+@pytest.mark.parametrize(("kind", "changes"), [(Shown, True), (Measured, False)])
+def test_colours_are_part_of_an_identity_where_they_shape_the_result(kind, changes):
+    fabric = load_fabric("denim")
+    blue = fabric.model_copy(update={"warp": fabric.warp.model_copy(update={"diffuse": (0.0, 0.0, 1.0)})})
+    assert (kind(fabric=blue).id != kind(fabric=fabric).id) == changes
+    elsewhere = fabric.model_copy(update={"source": "another book"})
+    assert kind(fabric=elsewhere).id == kind(fabric=fabric).id
+    thick = fabric.model_copy(update={"optical_thickness": 3.0})
+    assert kind(fabric=thick).id != kind(fabric=fabric).id
 
 
 def test_the_longest_chain_is_the_most_urgent():
-    short, long = task("short", cost=5), task("long", cost=1)
-    after = task("after", "train", needs=(long.id, "done before"), cost=30)
+    short, long = Example(x=1, seconds="5"), Example(x=2, seconds="1")
+    after = Example(x=3, seconds="30", after=(long.id, "done before"))
     assert urgencies([short, long, after]) == {short.id: 5, long.id: 31, after.id: 30}

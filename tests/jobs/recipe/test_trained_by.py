@@ -108,8 +108,8 @@ def test_the_trainings_are_those_of_the_other_recipe(asks, files):
     theirs = {task.id: task for task in own}
     for key in taught:
         assert trainings[key].products == theirs[key].products
-        assert trainings[key].setting == theirs[key].setting
-        assert trainings[key].setting["dataset"].startswith("datasets/bent-")
+        assert trainings[key] == theirs[key]
+        assert trainings[key].dataset.startswith("datasets/bent-")
     # Of its rows those alone that are learnt from.
     there = {task.id for task in tasks if task.stage == "generate" and task.products[0].startswith("datasets/bent-")}
     assert there == {need for key in taught for need in trainings[key].needs}
@@ -157,10 +157,10 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     tasks = plan(asks())
     titles = {task.title: task for task in tasks if task.stage == "bench"}
     assert "curved on denim" in titles and "curved on own" in titles and "curved on twill_4_4" not in titles
-    assert titles["curved on denim"].spec["models"] == ids(tasks, "train", "curved on denim")
+    assert list(titles["curved on denim"].model.needs) == ids(tasks, "train", "curved on denim")
     assert "curved on the scene curtain" in titles and "curved on the scene dinner_table" not in titles
-    assert [fabric for fabric, *_ in titles["extremes of curved"].spec["fabrics"]] == ["denim"]
-    notes = {note["name"]: note["about"] for note in tasks[-1].setting["models"]}
+    assert [fabric.name for fabric, _ in titles["extremes of curved"].fabrics] == ["denim"]
+    notes = {note.name: note.about for note in tasks[-1].models}
     assert "trained by the recipe bent, on queries of its own" in notes["curved"]
     where = "left out on twill_4_4, in the scene dinner_table"
     assert notes["curved"].endswith(f"{where}: it was not trained on that cloth")
@@ -179,7 +179,7 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files)
     products = [path for task in tasks for path in task.products]
     assert len(set(products)) == len(products)
     shared = [task for task in tasks if task.stage == "generate" and len(task.products) == 2]
-    assert {task.setting["question"]["fabric"]["name"] for task in shared} == {"denim", "twill_4_4"}
+    assert {task.question.fabric.name for task in shared} == {"denim", "twill_4_4"}
     for task in shared:
         first, second = task.products
         assert first.startswith("datasets/tiny-") and second.startswith("datasets/twin-")
@@ -306,7 +306,7 @@ def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):
     tasks = plan(asks(GENERAL, SHEER, "sheer"))
     for fabric in ("denim", "own", "twill_4_4"):
         (task,) = [task for task in tasks if task.title == f"woven_sheer on {fabric}"]
-        assert task.spec["models"] == ids(tasks, "train", "woven_sheer")
+        assert list(task.model.needs) == ids(tasks, "train", "woven_sheer")
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,10 @@ def names(tasks):
 
 
 def test_a_task_asks_for_what_it_uses_alone(tasks):
-    training_rows = [t for t in tasks if t.stage == "generate" and t.spec["truth"]["estimator"] == "node_table"]
+    training_rows = [t for t in tasks if t.stage == "generate" and t.question.truth.estimator == "node_table"]
     assert names(training_rows) == {"node_table"}
     assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
-    assert names(t for t in tasks if t.setting.get("make") == "extremes" and t.group == "prefiltered") == {
-        "quadrature",
-        "prefiltered",
-    }
+    assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"quadrature", "prefiltered"}
 
 
 def test_each_group_is_compiled_once_whatever_the_value_of_a_knob(tasks):

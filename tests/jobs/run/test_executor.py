@@ -11,7 +11,6 @@ import psutil
 import pytest
 from rich.console import Console
 
-from jobs.plan.task import Task
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger, measure
 from weaves.errors import BadInput, WorkFailed
@@ -37,10 +36,10 @@ def hashes(out):
 
 
 def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
-    good, timed = fake.task("good"), fake.task("timed", "bench", alone=True, seconds=0.3)
+    good, timed = fake.task("good"), fake.task("timed", fake.FakeTiming, seconds=0.3)
     bad = fake.task("bad", fails="ZeroDivisionError('by zero')")
     forgetful = fake.task("forgetful", forgets=True)
-    fine, stuck = fake.task("fine", "train", needs=[good]), fake.task("stuck", "train", needs=[bad])
+    fine, stuck = fake.task("fine", fake.FakeTraining, needs=[good]), fake.task("stuck", fake.FakeTraining, needs=[bad])
     slow = [fake.task(f"slow {index}", seconds=0.5) for index in range(2)]
     tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
     recorded = []
@@ -133,10 +132,10 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(tmp_path, fake, blow):
 def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
     """A second data set that shares a shard must hear of it: its manifest was written when the shard was not there."""
     (tmp_path / "datasets" / "a").mkdir(parents=True)
-    (tmp_path / "datasets" / "a" / "part-x.parquet").write_bytes(b"twelve bytes")
-    first, twin = (Task("generate", "shards", "a shard", {"rows": 3}, (f"datasets/{n}/part-x.parquet",)) for n in "ab")
+    (tmp_path / "datasets" / "a" / "x.txt").write_bytes(b"twelve bytes")
+    first, twin = (fake.task("x", folder=f"datasets/{name}") for name in "ab")
     ledger = Ledger(tmp_path)
-    ledger.finish(first, {"part-x.parquet": measure(tmp_path / first.products[0])}, 1.0)
+    ledger.finish(first, {"x.txt": measure(tmp_path / first.products[0])}, 1.0)
     recorded = []
     summary = execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
     assert recorded == [twin] == summary.before and not summary.ran

@@ -1,12 +1,30 @@
 import json
+from typing import ClassVar
 
 import pytest
 
-from jobs.plan.task import Task
+from jobs.plan.task import Place, Task
 from jobs.run.ledger import Ledger, measure
 from weaves.errors import BadInput, WorkFailed
 
-TASK = Task("generate", "shards", "a shard", {"rows": 3}, ("datasets/a-1/part-x.parquet",))
+
+class Shard(Task):
+    stage: ClassVar = "generate"
+    folder: Place
+
+    @property
+    def title(self):
+        return "a shard"
+
+    @property
+    def products(self):
+        return (f"{self.folder}/part-x.parquet",)
+
+    def versions(self):
+        return {}
+
+
+TASK = Shard(folder="datasets/a-1")
 
 
 @pytest.fixture
@@ -59,7 +77,7 @@ def test_a_failure_keeps_its_reason_until_success(tmp_path, done):
 
 
 def test_another_data_set_adopts_a_shard_it_shares(done):
-    twin = Task("generate", "shards", "a shard", {"rows": 3}, ("datasets/b-2/part-x.parquet",))
+    twin = Shard(folder="datasets/b-2")
     assert twin.id == TASK.id
     assert done.state(twin) == "missing"
     assert done.adopt(twin)
@@ -69,7 +87,7 @@ def test_another_data_set_adopts_a_shard_it_shares(done):
 
 def test_a_changed_shard_is_not_adopted(done):
     (done.out / TASK.products[0]).write_bytes(b"other  bytes")  # as long as the right ones
-    twin = Task("generate", "shards", "a shard", {"rows": 3}, ("datasets/b-2/part-x.parquet",))
+    twin = Shard(folder="datasets/b-2")
     assert not done.adopt(twin)
     assert not (done.out / twin.products[0]).exists()
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from jobs.cli import main
+from jobs.plan.measurements.scene import OnScene
+from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger, measure
@@ -72,7 +74,7 @@ class Runs:
             for path in task.products:
                 file = self.out / path
                 file.parent.mkdir(parents=True, exist_ok=True)
-                steps = task.setting.get("training", {}).get("steps")
+                steps = task.training.steps if task.stage == "train" else None
                 file.write_text(json.dumps({"steps_taken": steps}) if path.endswith("card.json") else "1234567")
             files = {(self.out / path).name: measure(self.out / path) for path in task.products}
             ledger.finish(task, files, seconds)
@@ -165,11 +167,11 @@ def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
     cloth = load_fabric("silk_charmeuse")
     for recipe, value in ((runs.general, 0.2), (runs.own, 0.1)):
         for task in plan(load_recipe(recipe)):
-            if task.setting.get("make") == "shot":
+            if isinstance(task, SceneShot):
                 write_frames(runs.out / task.products[0], cloth)
-            elif task.setting.get("make") == "scene" and task.setting["model"]["name"] == "neumip":
+            elif isinstance(task, OnScene) and task.model.options.name == "neumip":
                 mask = np.ones((8, 8), np.bool_)
-                write_picture(runs.out / task.setting["pictures_of"][""], np.full((8, 8, 3), value), mask, {})
+                write_picture(runs.out / task.picture(""), np.full((8, 8, 3), value), mask, {})
     row = by_quantity(runs)[DIFFERENCE]
     assert row.narrow == pytest.approx((-0.03, -0.03, -0.03), rel=1e-5) and math.isnan(row.ratio)
 

@@ -18,14 +18,13 @@ from reports.measure.extremes import (
     FAR,
     FOOTPRINTS,
     LUSTROUS,
-    TRUTH,
     error_name,
     extremes,
     extremes_table,
     lustrous,
     measure_extremes,
 )
-from reports.options import EXTREME_PRECISIONS
+from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH
 from reports.record import Record
 from reports.tables.method_rows import EXTREMES, extreme_rows
 from weaves.fabric import load_fabric
@@ -55,7 +54,7 @@ class Scaled:
                 for axis, period in zip("uv", fabric.weave.repeat, strict=True)
             }
         )
-        return self.spoil(self.factor * estimate(fabric, near, TRUTH, 0).mean, queries)
+        return self.spoil(self.factor * estimate(fabric, near, EXTREME_TRUTH, 0).mean, queries)
 
 
 def measured(*family):

@@ -15,8 +15,9 @@ from reports.measure.pictures import write_picture
 from reports.measure.scene.difference_maps import difference_maps
 from reports.measure.scene.image_error import image_errors
 from reports.options import BenchOptions, SceneBenchOptions
-from reports.page.content import ModelNote, PageInput
+from reports.page.content import PageInput
 from reports.page.filmstrip import GAP
+from reports.page.model_note import ModelNote
 from reports.page.page import write_page
 from reports.page.picture_strips import PictureFile
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine

@@ -16,7 +16,7 @@ from reports.measure.scene import errors as scene_bench
 from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
 from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.timing import Timing
-from reports.options import BenchOptions, ImageOptions, SceneBenchOptions
+from reports.options import ImageOptions, RepeatOptions, SceneBenchOptions
 from reports.tables.summary import SCENE_INTERVALS, scene_table
 from weaves.errors import BadInput
 
@@ -32,7 +32,7 @@ SCENES = SceneBenchOptions(
     frame_truth=COARSE,
     image=ImageOptions(block=4, resamples=100),
 )
-OPTIONS = BenchOptions(scenes=SCENES, timing_repeats=20, warm_up=1)
+REPEATS = RepeatOptions(timing_repeats=20, warm_up=1)
 
 
 class Answers:
@@ -100,8 +100,8 @@ def test_noise_of_many_lights_adds_in_quadrature(shot):
 def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot):
     frames, _ = shot
     methods = [Fallback(Answers(1.0), ALL), Fallback(Answers(1.3), ALL), Fallback(Answers(1.0, covered=False), ALL)]
-    records = measure_scene(methods, frames, OPTIONS, {})
-    records += time_scene(methods, frames, OPTIONS)
+    records = measure_scene(methods, frames, SCENES, {})
+    records += time_scene(methods, frames, REPEATS, 0)
     table = scene_table(records).set_index("setting")
     assert list(table.index) == ["x 1", "x 1.3"]
     good, bad = table.loc["x 1"], table.loc["x 1.3"]
@@ -119,7 +119,7 @@ def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(shot)
 
 def test_pictures_hold_their_frames_and_differences(shot, tmp_path):
     frames, _ = shot
-    measure_scene([Fallback(Answers(1.3), ALL)], frames, OPTIONS, {"x 1.3": tmp_path / "picture.exr"})
+    measure_scene([Fallback(Answers(1.3), ALL)], frames, SCENES, {"x 1.3": tmp_path / "picture.exr"})
     found = read_exr(tmp_path / "picture.exr")
     shown, lit = film(found), frames.lit
     np.testing.assert_allclose(shown[~lit], frames.base[~lit], rtol=2e-3, atol=1e-6)
@@ -146,7 +146,7 @@ def test_what_an_eye_sees_is_scored_where_it_can_be(shot, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyfvvdp", stand_in)
     frames, _ = shot
     methods = [Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)]
-    table = scene_table(measure_scene(methods, frames, OPTIONS, {})).set_index("setting")
+    table = scene_table(measure_scene(methods, frames, SCENES, {})).set_index("setting")
     assert 10 > table.loc["x 1", "fovvideovdp"] > table.loc["x 1.3", "fovvideovdp"]
 
 
@@ -164,12 +164,12 @@ def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
         ]
 
     monkeypatch.setattr(scene_bench, "time_side_by_side", readings)
-    records = time_scene([Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)], frames, OPTIONS)
+    records = time_scene([Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)], frames, REPEATS, 0)
     whole = 1e-3 * sum(count * (1 + index) for index, count in enumerate(counts))
     for record in records:
         assert record.samples == pytest.approx([whole * (1 + turn) for turn in range(20)])
         assert record.value == pytest.approx(10.5 * whole) and record.low < record.value < record.high
-    assert time_scene([Fallback(Answers(1.0, covered=False), ALL)], frames, OPTIONS) == []
+    assert time_scene([Fallback(Answers(1.0, covered=False), ALL)], frames, REPEATS, 0) == []
 
 
 def test_the_truths_picture_holds_its_noise(shot, tmp_path):

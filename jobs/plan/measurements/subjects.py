@@ -1,0 +1,164 @@
+"""Subjects of a recipe's measurements: its fabrics with their test rows, its models with their trained networks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Self
+
+from jobs.plan.dataset import Shard, fingerprint_of, folder_of
+from jobs.plan.task import Made, Part, Place
+from jobs.plan.training import Training
+from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline.models.catalogue import ModelOptions
+from pipeline.models.options import RoundFootprint
+from reports.options import RunOptions
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.models.fallback import Fallback
+    from pipeline.models.method import Method
+    from reports.record import Provenance
+
+Role = Literal["seen", "unseen"]
+"""Whether general models saw a fabric in training."""
+
+
+class Dataset(Part):
+    """A data set's rows that a measurement reads."""
+
+    fingerprint: str
+    """Of the whole data set."""
+    rows: tuple[str, ...]
+    """Ids of the tasks that make the rows."""
+    folder: Place
+    """Its folder."""
+
+
+class Trained(Part):
+    """A model, and the networks that were trained of it."""
+
+    options: ModelOptions
+    """The model."""
+    networks: tuple[Made, ...] = ()
+    """Its trained networks; none where nothing is trained."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Ids of the trainings."""
+        return tuple(network.task for network in self.networks)
+
+    @property
+    def settings(self) -> list[Self]:
+        """The model with one setting each."""
+        return [self.model_copy(update={"options": options}) for options in self.options.single()]
+
+    def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
+        """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
+        knobs = self.options.knobs
+        return tuple(f"k = {knob}" for knob in knobs if knob in counts) if knobs else ("",)
+
+    def provenance(self, dataset: str = "") -> Provenance:
+        """Return the provenance of Records of this model."""
+        from reports.record import Provenance
+
+        return Provenance(dataset=dataset, model=" ".join(self.needs))
+
+    def methods(self, out: Path) -> list[Method]:
+        """Load its methods, one a setting."""
+        from pipeline.models.registry import load_methods
+
+        return load_methods(self.options, [out / network.path for network in self.networks])
+
+    def with_fallback(self, out: Path, footprint: RoundFootprint) -> list[Fallback]:
+        """Load its methods so that they answer any query."""
+        from pipeline.models.fallback import Fallback
+
+        return [Fallback(one, self.options.kinds, footprint) for one in self.methods(out)]
+
+    def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
+        """Return trained methods with or without an energy bound, and in other runtimes."""
+        if not self.networks:
+            return []
+        from pipeline.models.bounded import counterpart
+        from pipeline.models.runtimes import runs
+
+        others = [counterpart(one) for one in methods if ways.bounds]
+        return others + [run for one in methods for run in runs(one, ways.runtimes)]
+
+
+@dataclass(frozen=True)
+class FabricSubject:
+    """A named fabric, its role, and its test rows."""
+
+    fabric: Fabric
+    role: Role
+    dataset: Dataset
+
+
+@dataclass(frozen=True)
+class ModelSubject:
+    """A model of the recipe and its trainings."""
+
+    recipe: ModelRecipe
+    trainings: Mapping[str, Training]
+    """By fabric; the key of a general model's only training is empty."""
+
+    def on(self, fabrics: Sequence[str]) -> Trained | None:
+        """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""
+        options = self.recipe.options
+        if not self.recipe.learns:
+            return Trained(options=options)
+        if "" in self.trainings:
+            return Trained(options=options, networks=(self.trainings[""].made,))
+        if not self.trainings.keys() >= set(fabrics):
+            return None
+        return Trained(options=options, networks=tuple(self.trainings[fabric].made for fabric in fabrics))
+
+    @property
+    def whole(self) -> Trained:
+        """The model with all its networks."""
+        networks = tuple(training.made for training in self.trainings.values())
+        return Trained(options=self.recipe.options, networks=networks)
+
+
+@dataclass(frozen=True)
+class Subjects:
+    """Everything that the measurements of a recipe are planned from."""
+
+    recipe: Recipe
+    shards: Sequence[Shard]
+    """The data set."""
+    trainings: Mapping[str, Mapping[str, Training]]
+    """For each model's name its trainings by fabric."""
+
+    @cached_property
+    def fabrics(self) -> list[FabricSubject]:
+        """The named fabrics: the seen ones, then the unseen ones."""
+        seen = [FabricSubject(fabric, "seen", self.dataset([fabric.name])) for fabric in self.recipe.seen]
+        return seen + [FabricSubject(fabric, "unseen", self.dataset([fabric.name])) for fabric in self.recipe.unseen]
+
+    @cached_property
+    def models(self) -> list[ModelSubject]:
+        """The models, in the order of the recipe."""
+        return [ModelSubject(one, self.trainings.get(one.options.name, {})) for one in self.recipe.models]
+
+    def models_on(self, fabrics: Sequence[str]) -> list[Trained]:
+        """Return the models that answer for all of some fabrics."""
+        return [trained for model in self.models if (trained := model.on(fabrics))]
+
+    def dataset(self, names: Sequence[str]) -> Dataset:
+        """Return the test rows of fabrics."""
+        rows = [
+            part.id
+            for name in names
+            for part in self.shards
+            if part.question.fabric.name == name and part.question.split == "test"
+        ]
+        return Dataset(fingerprint=self._fingerprint, rows=tuple(rows), folder=folder_of(self.shards))
+
+    @cached_property
+    def _fingerprint(self) -> str:
+        return fingerprint_of(self.shards)

@@ -1,0 +1,168 @@
+"""The page of a recipe: the task that writes it from all measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from jobs.plan.dataset import fingerprint_of
+from jobs.plan.measurements.measurement import Measurement, Picture
+from jobs.plan.measurements.scene_shot import SceneShot
+from jobs.plan.measurements.subjects import Role, Subjects
+from jobs.plan.measurements.timing import Timing
+from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
+from jobs.plan.training import Training
+from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
+from reports.options import BenchOptions
+from reports.page.model_note import ModelNote
+from weaves.fabric import Fabric
+
+
+class Page(Task):
+    """The task that writes the page of a recipe."""
+
+    stage: ClassVar[Stage] = "report"
+
+    recipe: str
+    """Name of the recipe."""
+    about: str
+    """Its sentence."""
+    dataset: str
+    """Name and fingerprint of the data set."""
+    fabrics: tuple[tuple[Fabric, Role], ...]
+    """The named fabrics."""
+    models: tuple[ModelNote, ...]
+    """The models."""
+    options: BenchOptions
+    """Options of the measurements."""
+    measured: tuple[str, ...]
+    """Ids of the measurements."""
+    others: dict[str, str]
+    """Files of Records that no task writes, each with its hash."""
+    records: Places
+    """Files of Records of the measurements."""
+    timing: Place
+    """File of the Records of times; the machine beside it is the page's."""
+    pictures: Annotated[tuple[Picture, ...], PLACE]
+    """Pictures of the measurements."""
+
+    @property
+    def group(self) -> str:
+        """Page."""
+        return "page"
+
+    @property
+    def title(self) -> str:
+        """Recipe."""
+        return f"page of {self.recipe}"
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """The page."""
+        return (f"report/{self.recipe}/index.html",)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """All measurements."""
+        return self.measured
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 15.0
+
+    @property
+    def size(self) -> int:
+        """Estimated bytes of the folder."""
+        return 10_000_000
+
+    def versions(self) -> dict[str, int]:
+        """Return the version of the benchmark."""
+        return {"bench": versions.BENCH}
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Write it. Records of other measurements are shown if they existed when the page was planned."""
+        from reports.page.content import PageInput
+        from reports.page.page import write_page
+        from reports.page.picture_strips import PictureFile
+        from reports.record import read_machine, read_records
+
+        # Measurements are the same in every recipe; the page adds the recipe's name.
+        own = {"recipe": self.recipe, "recipe_fingerprint": self.id}
+        content = PageInput(
+            recipe=self.recipe,
+            about=self.about,
+            fingerprint=self.id,
+            dataset=self.dataset,
+            fabrics=self.fabrics,
+            models=self.models,
+            options=self.options,
+            records=[
+                record.model_copy(update={"provenance": record.provenance.model_copy(update=own)})
+                for record in read_records(out / path for path in (*self.records, *self.others))
+            ],
+            machine=read_machine(out / self.timing),
+            pictures=[PictureFile(p.fabric, p.scene, p.method, p.setting, out / p.path) for p in self.pictures],
+        )
+        write_page((out / self.products[0]).parent, content, progress)
+
+
+def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[str, str]) -> Page:
+    """Return the page of all measurements."""
+    recipe = subjects.recipe
+    shots = [task for task in benches if isinstance(task, SceneShot)]
+    return Page(
+        recipe=recipe.name,
+        about=recipe.about,
+        dataset=f"{recipe.name}, {fingerprint_of(subjects.shards)}",
+        fabrics=tuple((subject.fabric, subject.role) for subject in subjects.fabrics),
+        models=tuple(_note(recipe, model.recipe, model.trainings, shots) for model in subjects.models),
+        options=recipe.bench,
+        measured=tuple(task.id for task in benches),
+        others=dict(alone),
+        records=tuple(task.records for task in benches if task.records),
+        timing=next(task.records for task in benches if isinstance(task, Timing)),
+        pictures=tuple(picture for task in benches for picture in task.pictures),
+    )
+
+
+def _note(
+    recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]
+) -> ModelNote:
+    """Return the page's note on a model."""
+    options, training = model.options, model.training
+    about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
+    if trainings:
+        first = next(iter(trainings.values()))
+        what = "each fabric by itself" if model.of_one_material else f"{len(first.fabrics)} fabrics at once"
+        kind = "" if options.name == options.model else f"{options.model}: "
+        about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
+        if options.departures:
+            about += f"; unlike the paper: {', '.join(options.departures)}"
+        about += _taught(recipe, model) + _left_out(recipe, model, trainings, shots)
+    return ModelNote(
+        name=options.name,
+        about=about,
+        fingerprint=" ".join(task.id for task in trainings.values()),
+        per_material=model.of_one_material,
+        kind=options.model,
+    )
+
+
+def _taught(recipe: Recipe, model: ModelRecipe) -> str:
+    """Say which other recipe trains a model."""
+    teacher = recipe.teacher_of(model)
+    own = "" if teacher.dataset.queries == recipe.dataset.queries else ", on queries of its own"
+    return "" if teacher is recipe else f"; trained by the recipe {teacher.name}{own}"
+
+
+def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
+    """Say where a model is left out because it does not know the cloth."""
+    if not model.of_one_material:
+        return ""
+    fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
+    scenes = [f"in the scene {shot.scene}" for shot in shots if not trainings.keys() >= set(shot.fabrics)]
+    where = [f"on {name}" for name in fabrics] + scenes
+    return f"; left out {', '.join(where)}: it was not trained on that cloth" if where else ""

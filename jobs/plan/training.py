@@ -1,0 +1,117 @@
+"""Trainings: one of a model for all fabrics of a recipe, or one a fabric."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from jobs.plan.dataset import Shard, folder_of
+from jobs.plan.task import Made, Place, Progress, Stage, Task
+from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
+from pipeline.models.catalogue import ModelOptions
+from pipeline.shards.extra_rows import set_name
+from pipeline.training.options import TrainingOptions
+
+_WHERE_IT_RUNS = {"device", "checkpoint_every"}  # of the training's options
+
+
+class Training(Task):
+    """The task that trains one network; it reads its fabrics' rows: training, validation, and its extra rows."""
+
+    stage: ClassVar[Stage] = "train"
+
+    options: ModelOptions
+    """The network."""
+    training: TrainingOptions
+    """How it is trained."""
+    fabrics: tuple[str, ...]
+    """Names of the fabrics that it learns."""
+    shards: tuple[str, ...]
+    """Ids of the tasks that make its rows."""
+    dataset: Place
+    """Folder of the data set."""
+
+    @property
+    def group(self) -> str:
+        """Name of the model."""
+        return self.options.name
+
+    @property
+    def title(self) -> str:
+        """Name of the model and its fabrics."""
+        fabrics = self._fabric or f"{len(self.fabrics)} fabrics"
+        return f"{self.options.name} on {fabrics}"
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """Weights and card."""
+        return (f"{self.folder}/model.safetensors", f"{self.folder}/card.json")
+
+    @property
+    def folder(self) -> str:
+        """Folder of the products."""
+        return f"models/{'-'.join(filter(None, (self.options.name, self._fabric)))}-{self.id[:8]}"
+
+    @property
+    def made(self) -> Made:
+        """The trained network, as measurements read it."""
+        return Made(task=self.id, path=self.folder)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The tasks that make its rows."""
+        return self.shards
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return self.training.steps * self.training.batch * self.options.seconds[0]
+
+    @property
+    def size(self) -> int:
+        """Estimated bytes of weights and card."""
+        return 500_000
+
+    @property
+    def _fabric(self) -> str:
+        """The only fabric of a network of one material; else empty."""
+        return self.fabrics[0] if self.options.of_one_material else ""
+
+    def versions(self) -> dict[str, int]:
+        """Return the versions of the model and of the training loop; those of the truth are in the rows."""
+        return {"model": self.options.version, "training": versions.TRAINING}
+
+    def identity(self) -> dict[str, Any]:
+        """Return what the weights depend on: neither the device nor how often they are saved."""
+        content = super().identity()
+        training = {name: value for name, value in content["training"].items() if name not in _WHERE_IT_RUNS}
+        return content | {"training": training}
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Train."""
+        from pipeline.training.loop import train
+
+        train(self.options, self.training, out / self.dataset, list(self.fabrics), out / self.folder, progress)
+
+
+def trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Training]:
+    """Return the trainings of a model: one under the key "", or one a fabric for a model of a single material."""
+    if model.of_one_material:
+        groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
+    else:
+        groups = {"": [fabric.name for fabric in (*recipe.seen, *recipe.population)]}
+    return {key: _training(model, fabrics, parts) for key, fabrics in groups.items()}
+
+
+def _training(model: ModelRecipe, fabrics: Sequence[str], parts: Sequence[Shard]) -> Training:
+    splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
+    read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split in splits]
+    return Training(
+        options=model.options,
+        training=model.training,
+        fabrics=tuple(fabrics),
+        shards=tuple(part.id for part in read),
+        dataset=folder_of(parts),
+    )
