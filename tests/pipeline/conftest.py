@@ -6,7 +6,7 @@ import pytest
 from pipeline.truth.geometry.heightfield import GAP, height_field
 from pipeline.truth.scattering.point import Choices, directions_of, point_share
 
-ALONE = Choices(macro=False, linear=False, shadows=False)
+ALONE = Choices(macro=False, shadows=False)
 
 
 def _shares(fabric, x, y, wi, wo):

@@ -39,7 +39,7 @@ def test_frames_are_those_of_the_height_field(field, kind, rtol):
         own, yarn = field.floats[pick, end, TOP], field.yarn[WARP]
         for across, along in random.uniform(-0.45, 0.45, (20, 2)):
             x, y = end + 0.5 + across * 2 * yarn[RADIUS], pick + 0.5 + along
-            _, _, _, *expected = surface_at(field, x, y, end, pick, False)
+            _, _, _, *expected = surface_at(field, x, y, end, pick)
             sin_v = (x - end - 0.5) / yarn[RADIUS]
             limit = own[HALF_LENGTH] / own[BEND_RADIUS]
             numbers = (sin_v, math.sqrt(1 - sin_v**2), yarn[RADIUS], along + own[OFFSET], 1 / own[BEND_RADIUS], limit)
