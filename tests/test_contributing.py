@@ -94,8 +94,9 @@ def followed(section, folder):
     for room in ROOMS:
         shutil.copytree(ROOT / room, folder / room, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", folder)
-    blocks = re.findall(r"^```(\w+) (\S+)\n(.*?)^```$", section, re.M | re.S)
-    for kind, name, content in blocks:
+    blocks = re.findall(r"^`(\S+)`:\n\n```(\w+)\n(.*?)^```$", section, re.M | re.S)
+    assert len(blocks) == section.count("\n```\n"), "a block lacks the line with its file"
+    for name, kind, content in blocks:
         path = folder / name
         if kind != "diff":
             assert not path.exists(), f"{name} exists already"
@@ -103,7 +104,7 @@ def followed(section, folder):
             path.write_text(content, encoding="utf-8")
             continue
         path.write_text(changed(path.read_text(encoding="utf-8"), content, name), encoding="utf-8")
-    return [name for _, name, _ in blocks]
+    return [name for name, *_ in blocks]
 
 
 def changed(text, diff, name):

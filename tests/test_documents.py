@@ -79,7 +79,12 @@ def test_links_and_paths_exist(path):
     links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text_of(path))]
     wrong = [link for link in links if "://" not in link and not (path.parent / link).exists()]
     assert not wrong, f"links that lead nowhere: {wrong}"
-    paths = [code for code in code_of(path) if re.fullmatch(rf"({'|'.join(ROOMS)}|tests)/[\w./-]+", code)]
+    examples = re.findall(r"^`(\S+)`:$", text_of(path), re.M)  # followed by tests/test_contributing.py
+    paths = [
+        code
+        for code in code_of(path)
+        if code not in examples and re.fullmatch(rf"({'|'.join(ROOMS)}|tests)/[\w./-]+", code)
+    ]
     wrong = [name for name in paths if not (ROOT / name).exists()]
     assert not wrong, f"files that do not exist: {wrong}"
 
@@ -108,6 +113,13 @@ def test_targets_of_make_exist(path):
     (phony,) = re.findall(r"^\.PHONY: (.+)$", text_of(ROOT / "Makefile"), re.M)
     asked = {tokens[0] for tokens in commands_of(path, "make")}
     assert asked - {"VERB"} <= set(phony.split())
+
+
+def test_the_order_of_packages_is_that_of_the_architecture():
+    (order,) = re.findall(r"`(weaves ← [^`]+)`", text_of(ROOT / "CONTRIBUTING.md"))
+    tested = re.findall(r'^    "([\w.]+)",', text_of(ROOT / "tests" / "test_architecture.py"), re.M)
+    places = [tested.index(name) for name in order.split(" ← ")]
+    assert places == sorted(places)
 
 
 def test_every_verb_is_in_the_readme():
