@@ -1,6 +1,6 @@
-"""The measurements that need no recipe: `twillight bench NAME` with one of the names here.
+"""`twillight bench`: measurements of the truth without a recipe, `stability`, `truth` and `sampler`.
 
-They write their Records beside those of the recipes, so that the next page shows them.
+Their Records lie beside those of the recipes, and the next page shows them.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ SAMPLER: Final = "records/sampler.json"
 """File of the Records of `bench sampler`."""
 
 RECORDS: Final = (STABILITY, TRUTH, SAMPLER)
-"""Files of Records that any page shows, if they exist."""
+"""Files of Records that every page shows, if they exist."""
 
 
 def measured_alone(out: Path) -> dict[str, str]:
-    """Return the files of `RECORDS` that exist, each with its hash: a page is made of them."""
+    """Return the files of `RECORDS` that exist, each with its hash: they are inputs of a page."""
     return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
 
 
 def bench_alone(name: str, out: Path, scheduler: str = "", workers: int = 0) -> None:
-    """Do one of `BENCHES`.
+    """Run one of `BENCHES`.
 
     Raises
     ------
     BadInput
         If a scheduler or workers are given.
     WorkFailed
-        If what is measured does not hold.
+        If an expression exceeds its limit.
     """
     for option, value in (("--scheduler", scheduler), ("--workers", workers)):
         if value:
-            raise BadInput(f"bench {name}", option, value, "leave it out: this process on this machine is measured")
+            raise BadInput(f"bench {name}", option, value, "leave it out: the measurement runs in this process")
     BENCHES[name](out)
 
 
@@ -82,7 +82,7 @@ def stability(out: Path) -> None:
 
 
 def truth(out: Path) -> None:
-    """Measure speed, accuracy, bias and where the time goes; print the tables and write the Records."""
+    """Measure speed, accuracy, bias and effort; print the tables and write the Records."""
     from rich.console import Console
 
     from reports.record import this_machine, write_records
@@ -103,7 +103,7 @@ def truth(out: Path) -> None:
         rates = all_of("speed", throughput.measure())
         accuracies = all_of("accuracy", accuracy.measure())
         biases = all_of("bias", bias.measure())
-        efforts = all_of("where the time goes", effort.measure())
+        efforts = all_of("effort", effort.measure())
     records = throughput.RECORDS.to_records(rates) + accuracy.RECORDS.to_records(accuracies)
     records += bias.RECORDS.to_records(biases) + effort.RECORDS.to_records(efforts)
     path = out / TRUTH
@@ -117,7 +117,7 @@ def truth(out: Path) -> None:
 
 
 def sampler(out: Path) -> None:
-    """Measure what drawing directions by lobes saves; print the table and write the Records."""
+    """Measure the variance that importance sampling by lobes saves; print the table and write the Records."""
     from rich.console import Console
 
     from reports.record import this_machine, write_records
@@ -151,7 +151,7 @@ def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableT
 
 
 def _table(findings: Sequence[Finding]) -> RenderableType:
-    """Show findings: worst error, limit, the textbook's error, what cannot be, and where what does not hold fails."""
+    """Return findings as a table: worst error, limit, the textbook's error, invalid values, inputs of failures."""
     from rich.table import Table
 
     from reports.tables.truth_rows import stability_rows
@@ -169,4 +169,4 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
 
 
 BENCHES: Final[dict[str, Callable[[Path], None]]] = {"stability": stability, "truth": truth, "sampler": sampler}
-"""Measurements by name; no recipe of such a name can be asked for."""
+"""Measurements by name; no recipe has such a name."""

@@ -1,4 +1,4 @@
-"""Checking: every shard that a data set's manifest lists is read again, or a fabric is held against the physics."""
+"""`twillight check`: the shards of a data set's manifest, or physical invariants of a fabric's ground truth."""
 
 from __future__ import annotations
 
@@ -23,15 +23,14 @@ WHERE = "check"
 
 
 def resolve(subject: str, out: Path) -> Path | Fabric:
-    """Return what is meant: a data set's own folder, that of a recipe in the output folder, or a fabric.
+    """Return the subject of a name: the folder of a data set, that of a recipe in the output folder, or a fabric.
 
-    A folder is one whatever it is called, unless a recipe or a preset has the same name. A .toml file is known by its
-    tables.
+    A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is.
 
     Raises
     ------
     BadInput
-        If nothing is called so, or more than one thing is, or the file cannot be used.
+        If nothing or more than one thing has this name, or the file cannot be used.
     """
     presets, recipes = preset_names(), recipe_names()
     kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", Path(subject).is_dir())]
@@ -61,7 +60,7 @@ def _dataset_folder(recipe: str, out: Path) -> Path:
 
 
 def check_dataset(folder: Path) -> list[str]:
-    """Check every shard of a data set, print what was found sound, and return the faults as sentences.
+    """Check every shard of a data set and return the faults as sentences; without any, print a summary.
 
     Raises
     ------
@@ -80,7 +79,7 @@ def check_dataset(folder: Path) -> list[str]:
 
 
 def check_fabric(fabric: Fabric) -> None:
-    """Test a fabric's ground truth against the invariants of the physics and print what was found.
+    """Test a fabric's ground truth against physical invariants and print a table.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Comparing two benchmarks: where their Records are, and the table of what differs."""
+"""`twillight compare`: the Records of two benchmarks, and a table of their differences."""
 
 from __future__ import annotations
 
@@ -19,13 +19,12 @@ WHERE = "compare"
 
 
 def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> None:
-    """Print how B differs from A.
+    """Print the differences of B from A.
 
     Raises
     ------
     BadInput
-        If one of them has no Records or no machine, the machines differ and that was not asked for, or nothing can be
-        compared.
+        If one has no Records or no machine, the machines differ without `other_machine`, or no measurement is shared.
     """
     from rich.console import Console
 
@@ -47,16 +46,16 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
         console.print(f"{sentence}.", soft_wrap=True, highlight=False)
     left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
     marked = sum(one.verdict not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
-    said = (
+    summary = (
         f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
     )
-    level = f"the scatter of the readings marks any by chance at most once in {1 / LEVEL:.0f} comparisons (Holm)"
-    load = "Load on the machine is not part of that scatter: compare two runs of A first, on a quiet machine."
-    console.print(f"{said}; {level}.", *([load] if found.times else []), soft_wrap=True, highlight=False)
+    level = f"if nothing changed, any is marked at most once in {1 / LEVEL:.0f} comparisons (Holm)"
+    load = "Load on the machine is not part of this test: first compare two runs of A, on a quiet machine."
+    console.print(f"{summary}; {level}.", *([load] if found.times else []), soft_wrap=True, highlight=False)
 
 
 def records_file(path: Path, recipe: str = "") -> Path:
-    """Return the file of Records that is meant: itself, that of a page's folder, or of a page of a folder of products.
+    """Return the file of Records of a path: itself, that of a page's folder, or of the page in a folder of products.
 
     Raises
     ------
@@ -100,7 +99,7 @@ def _table(title: str, rows: Sequence[Difference]) -> Table:
 
 
 def _what(row: Difference) -> str:
-    """Say what was measured, beside the method."""
+    """Return the subject of a measurement, without the method."""
     one = row.a
     if one.metric == "time":
         return f"a query, {one.threads} thread{'' if one.threads == 1 else 's'}" if one.threads else "a query"

@@ -1,4 +1,4 @@
-"""The work of `twillight evaluate`: options from the command line, a bar while it runs, a summary at the end."""
+"""`twillight evaluate`: options from the command line, a progress bar, and a summary."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WHERE = "evaluate"
 
 
 def truth_options(**chosen: object) -> TruthOptions:
-    """Return the options that were given on the command line; the others keep their defaults.
+    """Return the options of the truth from the command line; those not given have their defaults.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def evaluate(
     skip_bad: bool,
     other: Answerer | None = None,
 ) -> None:
-    """Answer the questions of a file on some threads, 0: one a core, and tell in a few lines what was done.
+    """Evaluate the queries of a file on some threads (0: one per core) and print a summary.
 
-    `other` answers in place of the ground truth.
+    `other`, if given, replaces the ground truth.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def evaluate(
         As `pipeline.shards.evaluate.evaluate_file`, and if the seed or the number of threads cannot be used.
     """
     if workers < 0:
-        raise BadInput(WHERE, "--workers", workers, "must be 0, for one a core, or more")
+        raise BadInput(WHERE, "--workers", workers, "must be 0 (one per core) or more")
     if not 0 <= seed < 2**64:
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
     console = Console(stderr=True)
@@ -85,14 +85,14 @@ def evaluate(
     Console().print(str(out), soft_wrap=True, highlight=False)
     if summary.bad:
         rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
-        told = f"{rows} no answer; see {bad_list(out)}"
-        Console().print(told, soft_wrap=True, highlight=False)
+        note = f"{rows} no answer; see {bad_list(out)}"
+        Console().print(note, soft_wrap=True, highlight=False)
 
 
 def evaluation_table(summary: Summary) -> Table:
     """Show what `twillight evaluate` did."""
     answered = summary.rows - summary.bad
-    table = table_of("rows", "answered", "median relative error", "points a query", "queries a second")
+    table = table_of("rows", "answered", "median relative error", "points per query", "queries per second")
     for column in table.columns:
         column.justify = "right"
     table.add_row(

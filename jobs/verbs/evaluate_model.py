@@ -1,4 +1,4 @@
-"""Trained models as they are asked on the command line: by name, if one comes with the package, or by folder."""
+"""Trained models for `twillight evaluate --model`: by name, for those of the package, or by folder."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from weaves.fabric import Fabric
 
 
 def refuse_truth_options(chosen: Mapping[str, object]) -> None:
-    """Refuse what means nothing to a model: it answers as it was trained."""
+    """Refuse options of the truth, which a model does not have."""
     for name, value in chosen.items():
         if value is not None:
-            allowed = "leave it out with --model: a model answers as it was trained"
+            allowed = "leave it out with --model: it is an option of the ground truth"
             raise BadInput("evaluate", f"--{name.replace('_', '-')}", value, allowed)
 
 
 def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
-    """Return a trained model ready to answer about a fabric.
+    """Return a trained model, prepared for a fabric.
 
     Parameters
     ----------
     model : str
         Name of one that comes with the package, or path of a folder with ``model.safetensors`` and ``card.json``.
     fabric : Fabric
-        What will be asked about.
+        The fabric of the queries.
     extrapolate : bool
-        Ask even if its yarns lie outside of what the model was trained on.
+        Accept yarns outside the training domain.
 
     Raises
     ------
     BadInput
-        If there is no such model, its files are damaged, or it does not know the fabric.
+        If there is no such model, its files are damaged, or it does not cover the fabric.
     """
     known = pretrained_names()
     folder = pretrained_folder(model) if model in known else Path(model)

@@ -1,7 +1,7 @@
-"""What a scene requires: its questions, the method that meets a wish, and a recipe for just that.
+"""`twillight require`: requirements of a scene, the method that meets a limit, and its recipe.
 
-The choice is made from the Records of a page (`reports.tables.method_choice`); the recipe is a file like any other,
-with the fabrics and the distribution of queries narrowed to the scene.
+The method is chosen from the Records of a page (`reports.tables.method_choice`). The recipe is an ordinary file, with
+the fabrics and the distribution of queries narrowed to the scene.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from pipeline.truth.query import Queries
     from reports.options import SceneBenchOptions
 
-_SAMPLE = 2000  # questions by which quadrature is timed
-_JUDGED = 100  # questions a fabric by which its error is judged
+_SAMPLE = 2000  # queries for the time of the fallback
+_JUDGED = 100  # queries per fabric for its error
 
 
 def require(
@@ -45,7 +45,7 @@ def require(
     effort: float = EFFORT,
     changes: Sequence[str] = (),
 ) -> None:
-    """Print what a scene asks and which method meets the wish, and write its recipe.
+    """Print the requirements of a scene and the methods that meet a limit, and write the recipe of the chosen one.
 
     Parameters
     ----------
@@ -56,23 +56,23 @@ def require(
     recipe : str
         General recipe, whose models are chosen from.
     error, ms : float
-        Wish: largest relative RMSE of the colour, longest milliseconds a frame; infinite if there is none.
+        Limits: largest relative RMSE of the colour, longest milliseconds per frame; infinite if there is none.
     frames : int
-        Frames that are looked at, spread over the camera's way.
+        Frames that are analysed, spread over the camera path.
     margin : float
-        By how much ranges are widened (`Requirement.of`).
+        Factor on the ranges (`Requirement.of`).
     method : str
-        Wish: a method of the general recipe; the front's own choice if empty.
+        Method of the general recipe; empty: the cheapest on the front.
     effort : float
-        Share of the general recipe's rows a fabric and of its steps that a training takes.
+        Share of the general recipe's rows per fabric and of its training steps.
     changes : sequence of str
-        Options of the model that are other than there, each as ``key = value`` in TOML.
+        Changed options of the model, each as ``key = value`` in TOML.
 
     Raises
     ------
     BadInput
-        If the scene cannot be used, the page has no errors by size, or nothing meets the wish: then the nearest points
-        of the front are named.
+        If the scene cannot be used, the page has no errors by size, or no method meets the limits. Then the sentence
+        names the nearest points of the front.
     """
     from rich.console import Console
 
@@ -100,20 +100,20 @@ def require(
     records = read_records([records_file(out, general.name)])
     sizes = size_table(records)
     if sizes.empty:
-        raise BadInput(str(out), "recipe", recipe, "its page has no errors by the size of footprints; run it again")
-    asked, worn = _questions(scene, frames, general.bench.scenes)
+        raise BadInput(str(out), "recipe", recipe, "its page has no errors by size of footprint; run the recipe again")
+    queries_by_fabric, worn = _queries_of(scene, frames, general.bench.scenes)
     fabrics = {name: fabric for name, (_, fabric) in worn.items()}
-    requirement = _requirement(scene, asked, frames, margin)
-    left = {model.options.name: _left(model, asked, fabrics, general) for model in general.models}
-    quadrature = _quadrature(asked, fabrics)
-    shares = {name: share for name, share in left.items() if share is not None}
-    table = predictions(sizes, requirement.sizes, requirement.questions, shares, quadrature)
+    requirement = _requirement(scene, queries_by_fabric, frames, margin)
+    found = {one.options.name: _fallback_share(one, queries_by_fabric, fabrics, general) for one in general.models}
+    fallback = _fallback_cost(queries_by_fabric, fabrics)
+    shares = {name: share for name, share in found.items() if share is not None}
+    table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
     table = with_measured(table, scene_table(records), requirement.scene)
     console = Console()
-    console.print(_asked_table(requirement), "")
+    console.print(_requirement_table(requirement), "")
     console.print(_choice_table(rows(table)), "")
     if method and (table := of_method(table, method)).empty:
-        allowed = "it was not measured on footprints of these sizes, or does not know the scene's fabrics"
+        allowed = "it was not measured on footprints of these sizes, or does not cover the fabrics of the scene"
         raise BadInput("require", "--method", method, allowed)
     chosen = cheapest(table, error, ms)
     if chosen is None:
@@ -121,21 +121,20 @@ def require(
             f"{row.method} {row.setting}".strip() + f": {100 * row.error:.2g} % in {row.ms:.3g} ms"
             for row in rows(nearest(table, error, ms))
         )
-        wish = f"{100 * error:g} % in {ms:g} ms a frame"
-        raise BadInput("require", "wish", wish, f"no method meets it; the nearest points of the front are {near}")
+        limits = f"{100 * error:g} % in {ms:g} ms per frame"
+        raise BadInput("require", "limits", limits, f"no method meets them; the nearest points of the front are {near}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
     write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options)
     name = f"{chosen.method} {chosen.setting}".strip()
-    console.print(
-        f"{name}: {100 * chosen.error:.2g} % in {chosen.ms:.3g} ms a frame ({chosen.known}). {savings(path, general)}",
-        f"the recipe: {path}", sep="\n", soft_wrap=True, highlight=False,
-    )  # fmt: skip
+    cost = f"{100 * chosen.error:.2g} % in {chosen.ms:.3g} ms per frame ({chosen.known})"
+    summary = f"{name}: {cost}. {savings(path, general)}"
+    console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True, highlight=False)
 
 
-def _questions(
+def _queries_of(
     scene: str, frames: int, options: SceneBenchOptions
 ) -> tuple[dict[str, Queries], dict[str, tuple[str, Fabric]]]:
-    """Return all questions of some frames about each fabric, by its name; and what names each fabric, and itself."""
+    """Return the queries of some frames on each fabric, and each fabric with its reference (name or path), by name."""
     import numpy as np
 
     from pipeline.scenes.catalogue import load_scene
@@ -158,12 +157,12 @@ def _questions(
     }, fabrics
 
 
-def _requirement(scene: str, asked: Mapping[str, Queries], frames: int, margin: float) -> Requirement:
+def _requirement(scene: str, queries_by_fabric: Mapping[str, Queries], frames: int, margin: float) -> Requirement:
     from pipeline.scenes.catalogue import load_scene
     from pipeline.scenes.requirement import Requirement
     from reports.measure.by_size import EDGES, SIZES
 
-    return Requirement.of(load_scene(scene).name, frames, asked, EDGES[:-1], SIZES, margin)
+    return Requirement.of(load_scene(scene).name, frames, queries_by_fabric, EDGES[:-1], SIZES, margin)
 
 
 def _options(changes: Iterable[str]) -> dict[str, Any]:
@@ -177,20 +176,20 @@ def _options(changes: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-def _left(
-    model: ModelRecipe, asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
+def _fallback_share(
+    model: ModelRecipe, queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
 ) -> float | None:
-    """Return the share of questions that a model leaves to quadrature; None if it cannot answer for the fabrics."""
+    """Return the fallback share of a model; None if it does not cover the fabrics."""
     teacher = general.teacher_of(model)
     if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in teacher.seen + teacher.unseen}:
         return None
-    return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in asked.items()])
+    return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in queries_by_fabric.items()])
 
 
-def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:
-    """Return what quadrature errs (as the colour measure of the benchmark) and its nanoseconds a question.
+def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:
+    """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query.
 
-    It is asked what it will mostly be asked: with light or viewer behind, where a scene has that.
+    Measured on queries with light or viewer behind, if the scene has any: those fall back most often.
     """
     import numpy as np
 
@@ -199,27 +198,27 @@ def _quadrature(asked: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> 
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
 
-    some = any(queries.behind.any() for queries in asked.values())
-    wrong, colours, seconds, count = [], [], 0.0, 0
-    for name, queries in asked.items():
-        rows = np.flatnonzero(queries.behind) if some else np.arange(len(queries.u))
-        rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(asked)]
+    behind = any(queries.behind.any() for queries in queries_by_fabric.values())
+    differences, colours, seconds, count = [], [], 0.0, 0
+    for name, queries in queries_by_fabric.items():
+        rows = np.flatnonzero(queries.behind) if behind else np.arange(len(queries.u))
+        rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(queries_by_fabric)]
         if not rows.size:
             continue
-        fallback(fabrics[name], queries.take(rows[:2]), 0)  # tables
+        fallback(fabrics[name], queries.take(rows[:2]), 0)  # builds the tables
         start = time.perf_counter()
         answers = fallback(fabrics[name], queries.take(rows), 0)
         seconds, count = seconds + time.perf_counter() - start, count + rows.size
         truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
         colour = truth @ COLOUR_WEIGHTS
-        wrong.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
+        differences.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
         colours.append(colour)
-    error, mean = math.sqrt(np.mean(np.square(np.concatenate(wrong)))), float(np.mean(np.concatenate(colours)))
+    error, mean = math.sqrt(np.mean(np.square(np.concatenate(differences)))), float(np.mean(np.concatenate(colours)))
     return error / max(mean, 1e-9), 1e9 * seconds / count
 
 
-def _asked_table(requirement: Requirement) -> Table:
-    """Show what the scene asks."""
+def _requirement_table(requirement: Requirement) -> Table:
+    """Return the requirements of a scene as a table."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
@@ -235,7 +234,7 @@ def _asked_table(requirement: Requirement) -> Table:
     for name, text in (
         (
             "scene",
-            f"{requirement.scene}, {requirement.questions:,} questions a frame",
+            f"{requirement.scene}, {requirement.queries_per_frame:,} queries per frame",
         ),
         ("fabrics", fabrics),
         (
@@ -253,13 +252,13 @@ def _asked_table(requirement: Requirement) -> Table:
 
 
 def _choice_table(found: Iterable[Any]) -> Table:
-    """Show the methods, the fastest first; those on the front in bold."""
+    """Return the methods as a table, the fastest first; those on the front are bold."""
     from rich.table import Table
 
     from reports.tables.number_format import display
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
-    for name in ("method", "error", "ms a frame", "not its own", ""):
+    for name in ("method", "error", "ms per frame", "fallback share", ""):
         table.add_column(name, justify="left" if name in ("method", "") else "right")
     for row in found:
         error = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"

@@ -1,9 +1,9 @@
-"""A recipe for one scene: its fabrics, its distribution of queries, one method, and a training cut down to that.
+"""The recipe that `require` writes: one scene, its fabrics and distribution of queries, one method, a shorter training.
 
 Of a general recipe it keeps the truth, the model's options, the training and the measurements, so that a page of either
 says the same of the scene. Fewer fabrics in a narrower domain are learnt from fewer rows in fewer steps; how many is
-the option `effort`. A truth that cannot answer the scene's questions (`node_table` knows flat cloth
-only) makes way for one that samples, at the error that `SAMPLED` states.
+the option `effort`. A truth that cannot answer the queries of the scene (`node_table` is limited to flat cloth) is
+replaced by one that samples, at the error of `SAMPLED`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EFFORT: Final = 0.25
 """Share of the general recipe's training rows a fabric, and of its steps, that a scene's recipe takes."""
 
 SAMPLED: Final = TruthOptions(relative_error=0.1, min_count=256, max_count=256)
-"""What answers training rows where the general recipe's own estimator cannot: coarse, for a training averages noise."""
+"""Truth of training rows if the general recipe's estimator cannot answer: coarse, because training averages noise."""
 
 _TEST_ROWS: Final = 4096
 _FEWEST_ROWS: Final = 1024
@@ -50,14 +50,14 @@ def write_recipe(
     effort: float = EFFORT,
     options: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write the recipe of one method in the scene's domain, and read it back: it must be one.
+    """Write the recipe of one method in the scene's domain, and load it to check it.
 
     Parameters
     ----------
     path : Path
         Where it goes.
     requirement : Requirement
-        What the scene asks.
+        Requirements of the scene.
     general : Recipe
         Whose method, truth and training are taken.
     method, setting : str
@@ -105,7 +105,7 @@ def alone(general: Recipe, names: set[str]) -> Recipe:
 
 
 def effort_of(recipe: Recipe) -> tuple[int, int]:
-    """Return the rows that a recipe generates, and the queries that its trainings learn from, repeats counted."""
+    """Return the rows that a recipe generates, and the queries that its trainings use, with repetitions."""
     rows = sum(task.rows for task in plan(recipe) if task.stage == "generate")
     learnt = sum(
         model.training.steps * model.training.batch * (len(recipe.seen + recipe.unseen) if model.of_one_material else 1)
@@ -116,7 +116,7 @@ def effort_of(recipe: Recipe) -> tuple[int, int]:
 
 
 def savings(path: Path, general: Recipe) -> str:
-    """Say what the recipe saves against the general one: rows to generate, queries to learn from."""
+    """Return a sentence: rows to generate and queries to train on, compared with the general recipe."""
     own = load_recipe(path)
     same = alone(general, {model.options.name for model in own.models})
     (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
@@ -144,29 +144,29 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
         truth = truth.model_copy(update={"estimator": SAMPLED.estimator})
     if training is not None and not _knows(training, queries, fabrics):
         training = SAMPLED.model_copy(update=physics)
-    found = {"truth": _stated(truth)}
-    return found if training is None else found | {"training_truth": _stated(training)}
+    found = {"truth": _truth_table(truth)}
+    return found if training is None else found | {"training_truth": _truth_table(training)}
 
 
-def _stated(truth: TruthOptions) -> dict[str, Any]:
-    """Return a truth's table: its estimator and error in any case, the rest where it is not the default."""
+def _truth_table(truth: TruthOptions) -> dict[str, Any]:
+    """Return a truth's table: its estimator, its error, and options other than the default."""
     stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
     return stated | truth.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
 
 def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
-    """Tell whether an estimator answers all queries of the distribution about all fabrics."""
+    """Return whether an estimator answers all queries of the distribution on all fabrics."""
     return truth.estimator != "node_table" or not table_refusal(truth, queries, fabrics)
 
 
 def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
-    """Return the option for the largest curvature, for a model that has it, where the scene bends its cloth more."""
+    """Return the option for the largest curvature, if the model has it and the curvature of the scene exceeds it."""
     most = getattr(model.options, "largest_curvature", None)
     return {"largest_curvature": queries.curvature[1]} if most is not None and most < queries.curvature[1] else {}
 
 
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
-    """Return point sampling at 2 points, which others are measured by, where the general recipe has it."""
+    """Return point sampling with 2 points, the baseline, if the general recipe has it."""
     found = [model for model in general.models if model.options.name == _BASELINE != method]
     return [_model(model, "k = 2", 1.0) for model in found]
 
@@ -174,7 +174,7 @@ def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
 def _model(
     model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
-    """Return a model's table, with one setting alone where one is wished, and its training cut down."""
+    """Return a model's table with one setting, if given, and a shortened training."""
     options = model.options.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | dict(other)
     options = {"model": model.options.model, "name": model.options.name} | options
     validated(type(model.options), options, "--set")

@@ -1,4 +1,4 @@
-"""What is no cloth: other shapes, matte in their albedo, and the environment where a pixel's ray leaves the scene.
+"""Everything but cloth: other shapes, matte in their albedo, and the environment where a pixel's ray leaves the scene.
 
 Radiance of a shape = albedo / pi times the sum over the lights in sight of irradiance times cosine, both sides alike:
 the lights and shadows of the cloth itself, without noise. Light that shapes or cloth throw on each other is left out.
@@ -52,9 +52,9 @@ def _seen(loaded: Loaded, world: Any, camera: Camera, size: tuple[int, int], wan
     for light in loaded.lights:
         direction, distance, irradiance = light.reach(position)
         cosine = np.maximum(dot(normal, direction), 0.0)
-        asked = np.flatnonzero((cosine > 0.0) & (dot(geometric, direction) > 0.0))
-        start = position[asked] + off(position[asked])[:, None] * geometric[asked]
-        free = asked[~blocked(mi, world, start, direction[asked], distance[asked] * (1.0 - 1e-4))]
+        facing = np.flatnonzero((cosine > 0.0) & (dot(geometric, direction) > 0.0))
+        start = position[facing] + off(position[facing])[:, None] * geometric[facing]
+        free = facing[~blocked(mi, world, start, direction[facing], distance[facing] * (1.0 - 1e-4))]
         total[free] += irradiance[free] * cosine[free, None]
     picture[mask] = albedo * total / math.pi
     return picture

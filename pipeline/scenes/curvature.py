@@ -1,4 +1,4 @@
-"""Which curvature a point of a curved surface is asked with: the least along the ray's way over the boundary.
+"""Curvature of a query at a point of a curved surface: the least along the ray's way over the boundary.
 
 A query knows one curvature, that of the boundary along the ray. On a cylinder it is Euler's k1 cos^2 + k2 sin^2 in the
 plane of ray and normal. Elsewhere it changes along the way, and a ray that grazes a strongly curved place may still

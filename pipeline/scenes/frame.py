@@ -6,7 +6,7 @@ Footprint: a Gaussian of `pixel_sigma` pixels under J = d(u, v in yarns)/d(pixel
 are J's left singular vectors and its standard deviations pixel_sigma times the singular values. Mitsuba takes them over
 one pixel to the right and one downwards, on the tangent plane [Igehy1999RayDifferentials].
 
-Light: a light in sight of the place, along a straight ray, is a question; one that another surface hides is none. Cloth
+Light: a light in sight of the place, along a straight ray, is a query; one that another surface hides is none. Cloth
 blocks such a ray as if it were opaque. A light on one side of the surface and on the other of its shading normal is
 none either.
 """
@@ -41,7 +41,7 @@ _AOVS: Final = {
     "duv_dy": 2,
     "shape_index": 1,
 }
-"""What Mitsuba is asked for, and how many channels each has."""
+"""AOVs rendered by Mitsuba, and the number of channels of each."""
 _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
@@ -136,10 +136,12 @@ def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats,
         direction, distance, irradiance = light.reach(places.position)
         wi = np.einsum("nij,nj->ni", places.frame, direction)
         facing = dot(places.outward, direction)
-        asked = np.flatnonzero((wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6))
+        candidates = np.flatnonzero((wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6))
         start = places.position + (beside * np.sign(facing))[:, None] * places.outward
-        hidden = blocked(loaded.mi, loaded.world, start[asked], direction[asked], distance[asked] * (1.0 - 1e-4))
-        free = asked[~hidden]
+        hidden = blocked(
+            loaded.mi, loaded.world, start[candidates], direction[candidates], distance[candidates] * (1.0 - 1e-4)
+        )
+        free = candidates[~hidden]
         index.append(free)
         towards.append(wi[free])
         power.append(irradiance[free])

@@ -1,9 +1,9 @@
 """What one fabric's pixels show, as queries: the G-buffer.
 
 A pixel that shows the fabric is a *place*: a footprint on the cloth and a direction to the viewer, in the local frame
-x along the weft, y along the warp, z = normal. A place under one light is a *question*; its answer f_P, which already
+x along the weft, y along the warp, z = normal. A place under one light is a *query*; its answer f_P, which already
 contains the incident cosine (pipeline.truth.conventions), times the light's irradiance is added to the pixel. So N
-places under several lights are M questions, and one light that reaches every place gives M = N.
+places under several lights are M queries, and one light that reaches every place gives M = N.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GBuffer:
-    """N places of one fabric in a picture of H by W pixels, and M questions about them.
+    """N places of one fabric in a picture of H by W pixels, and M queries about them.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class GBuffer:
     wo : float64 (N, 3)
         Unit vectors to the viewer, in the local frame.
     place : int64 (M,)
-        Which place each question is about.
+        Which place each query is about.
     wi : float64 (M, 3)
         Unit vectors to the light, in the place's local frame.
     irradiance : float64 (M, 3)
@@ -62,18 +62,18 @@ class GBuffer:
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:
-        """Pixels that any question is about, (H, W)."""
+        """Pixels that any query is about, (H, W)."""
         lit = np.zeros(self.mask.size, np.bool_)
         lit[self.pixel[self.place]] = True
         return lit.reshape(self.mask.shape)
 
     @property
     def transmitted(self) -> npt.NDArray[np.bool_]:
-        """Questions whose light and viewer are on different sides of the cloth, (M,)."""
+        """Queries whose light and viewer are on different sides of the cloth, (M,)."""
         return cast(npt.NDArray[np.bool_], self.wi[:, 2] * self.wo[self.place, 2] < 0.0)
 
     def queries(self, repeat: tuple[int, int]) -> Queries:
-        """Return the M questions in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
+        """Return the M queries in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
         return self.looks(repeat).take(self.place)._replace(wi=self.wi.astype(np.float32))
 
     def looks(self, repeat: tuple[int, int]) -> Queries:

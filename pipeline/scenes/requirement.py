@@ -1,9 +1,8 @@
-"""What a scene asks of a model: the questions that really occur, as the narrowest distribution that holds them.
+"""Requirements of a scene: the narrowest distribution that contains its queries.
 
-All frames' questions are gathered. Of every quantity the domain takes the range between the `_RARE` quantiles at both
-ends, widened by a margin: footprints and curvatures by a factor, angles by degrees. What never occurs is left out:
-light from behind, curved cloth, stretched footprints. A query outside of the domain is none of the model's business; it
-falls back to quadrature (`pipeline.models.fallback`).
+The queries of all frames are collected. The range of each quantity lies between its `_RARE` quantiles and is widened by
+a margin: footprints and curvatures by a factor, angles by degrees. Kinds that do not occur are left out: light from
+behind, curved cloth, stretched footprints. Queries outside the distribution fall back (`pipeline.models.fallback`).
 """
 
 from __future__ import annotations
@@ -18,24 +17,24 @@ from pipeline.shards.queries import QueryOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.errors import BadInput
 
-_RARE = 5e-4  # share of the questions that may lie beyond either end of a range
+_RARE = 5e-4  # share of the queries beyond either end of a range
 _ROUND = 1.05  # ratio of a footprint's axes up to which it counts as round
 _STEEPEST = 89.9  # degrees
 
 
 class Requirement(BaseModel):
-    """What a scene asks."""
+    """Queries of a scene, summarised."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     scene: str
     """Name of the scene."""
     frames: int = Field(ge=1)
-    """Frames that were looked at."""
-    questions: int = Field(ge=1)
-    """Questions a frame, the mean."""
+    """Frames that were analysed."""
+    queries_per_frame: int = Field(ge=1)
+    """Mean number of queries of a frame."""
     fabrics: dict[str, float]
-    """Share of the questions about each fabric."""
+    """Share of the queries on each fabric."""
     sigma: tuple[float, float]
     """Range of the root of the product of a footprint's axes, in yarn spacings."""
     stretch: float = Field(ge=1)
@@ -45,52 +44,52 @@ class Requirement(BaseModel):
     curvature: tuple[float, float]
     """Range of the curvature where cloth is curved, in 1/yarn spacings; [0, 0] where none is."""
     curved: float = Field(ge=0, le=1)
-    """Share of the questions about curved cloth."""
+    """Share of the queries on curved cloth."""
     behind: float = Field(ge=0, le=1)
-    """Share of the questions with light from the other side of the cloth."""
+    """Share of the queries with light from the other side of the cloth."""
     viewer_behind: float = Field(ge=0, le=1)
-    """Share of the questions about the back of the cloth."""
+    """Share of the queries on the back of the cloth."""
     not_in_front: float = Field(ge=0, le=1)
-    """Share of the questions with light or viewer behind the cloth."""
+    """Share of the queries with light or viewer behind the cloth."""
     sizes: dict[str, float]
-    """Share of the questions in classes of footprints, by the names that `of` was given."""
+    """Share of the queries in each class of footprints, by the names given to `of`."""
 
     @classmethod
     def of(
         cls,
         scene: str,
         frames: int,
-        asked: Mapping[str, Queries],
+        by_fabric: Mapping[str, Queries],
         edges: Sequence[float],
         names: Sequence[str],
         margin: float = 1.25,
     ) -> Requirement:
-        """Return what questions ask.
+        """Return the requirements of queries.
 
         Parameters
         ----------
         scene : str
             Name of the scene.
         frames : int
-            Frames that the questions come from.
-        asked : mapping of Queries
-            All questions about each fabric, by its name.
+            Frames of the queries.
+        by_fabric : mapping of Queries
+            All queries on each fabric, by its name.
         edges, names : sequence
             Edges of the classes of footprints, in yarn spacings, and the classes' names.
         margin : float
-            Factor by which ranges of footprints and curvatures are widened at either end; angles by as many per cent of
-            what is left to 90 degrees, at least 1 degree.
+            Factor by which ranges of footprints and curvatures are widened at either end; angles by
+            that share of their distance to 90 degrees, at least 1 degree.
 
         Raises
         ------
         BadInput
-            If nothing is asked.
+            If there are no queries.
         """
-        counts = {name: len(queries.u) for name, queries in asked.items() if len(queries.u)}
+        counts = {name: len(queries.u) for name, queries in by_fabric.items() if len(queries.u)}
         total = sum(counts.values())
         if not total:
             raise BadInput(scene, "frames", frames, "no cloth that is lit is in sight of the camera")
-        queries = Queries(*(np.concatenate([getattr(q, name) for q in asked.values()]) for name in Queries._fields))
+        queries = Queries(*(np.concatenate([getattr(q, name) for q in by_fabric.values()]) for name in Queries._fields))
         size = np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor)
         low, high = _range(size)
         ratio = _range(queries.sigma / queries.sigma_minor)[1]
@@ -100,7 +99,7 @@ class Requirement(BaseModel):
         return cls(
             scene=scene,
             frames=frames,
-            questions=max(1, round(total / frames)),
+            queries_per_frame=max(1, round(total / frames)),
             fabrics={name: count / total for name, count in counts.items()},
             sigma=(low / margin, high * margin),
             stretch=1.0 if ratio < _ROUND else ratio * margin,
@@ -114,7 +113,7 @@ class Requirement(BaseModel):
         )
 
     def queries(self, kinds: frozenset[str] = frozenset({"behind", "stretch", "curvature"})) -> QueryOptions:
-        """Return the distribution that a model of these kinds is to be taught; what it does not know is left out."""
+        """Return the distribution to train a model of these kinds on; other kinds are left out."""
         return QueryOptions(
             sigma=self.sigma,
             max_angle=max(self.angle),

@@ -65,7 +65,7 @@ def compose(
     gbuffer : GBuffer
         What the fabric's pixels show.
     rgb : array_like (M, 3)
-        Patch BSDF of its M questions.
+        Patch BSDF of its M queries.
     background : array_like
         What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
     transparency : array_like

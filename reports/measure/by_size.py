@@ -55,7 +55,7 @@ LONGEST: Final = 0.02
 FEWEST: Final = 512
 """Least queries a fabric in such a call: what a call itself costs must not stand for what a query costs."""
 
-_Asked = list[tuple[Fabric, Queries, Answers]]
+_Rows = list[tuple[Fabric, Queries, Answers]]
 
 
 def measure_by_size(
@@ -72,13 +72,15 @@ def measure_by_size(
     edge of the class, value); its value is that over all classes.
     """
     classes, shares = _classes(manifest, folder)
-    methods = [one for one in methods if any(one.covers(cloth) for asked in classes.values() for cloth, _, _ in asked)]
+    methods = [
+        one for one in methods if any(one.covers(cloth) for members in classes.values() for cloth, _, _ in members)
+    ]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
     errors: dict[tuple[int, str], list[tuple[float, float]]] = {}
-    for low, asked in classes.items():
+    for low, members in classes.items():
         contenders = []
         for index, method in enumerate(methods):
-            own = [one for one in asked if method.covers(one[0])]
+            own = [one for one in members if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
             asked_of = [(cloth, queries) for cloth, queries, _ in own]
@@ -91,7 +93,9 @@ def measure_by_size(
     records = []
     for index, method in enumerate(methods):
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
-        count = sum(len(queries.u) for asked in classes.values() for cloth, queries, _ in asked if method.covers(cloth))
+        count = sum(
+            len(queries.u) for members in classes.values() for cloth, queries, _ in members if method.covers(cloth)
+        )
         mean = sum(shares[low] * ns for low, ns in times[index])
         records.append(subject.of("size_time", mean, count, unit="ns/query", curve=tuple(times[index])))
         for name, (metric, _) in MEASURES.items():
@@ -102,9 +106,9 @@ def measure_by_size(
     return records
 
 
-def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Asked], dict[float, float]]:
+def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Rows], dict[float, float]]:
     """Return the queries and the truth of each class by its lower edge, and the share of all queries it holds."""
-    classes: dict[float, _Asked] = {}
+    classes: dict[float, _Rows] = {}
     counts: dict[float, int] = {}
     for name in manifest.names("seen", "unseen"):
         queries, stated = manifest.read(folder, name, "test")
@@ -114,17 +118,18 @@ def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Asked], dic
             chosen = np.flatnonzero((size >= low) & (size < high))
             if chosen.size:
                 counts[low] = counts.get(low, 0) + chosen.size
-                asked = (manifest.fabrics[name], queries.take(chosen), answers.take(chosen))
-                classes.setdefault(low, []).append(asked)
+                members = (manifest.fabrics[name], queries.take(chosen), answers.take(chosen))
+                classes.setdefault(low, []).append(members)
     total = sum(counts.values())
     return {low: classes[low] for low in sorted(classes)}, {low: count / total for low, count in counts.items()}
 
 
-def _errors(method: Method, asked: _Asked, seed: int) -> Iterator[tuple[str, float]]:
+def _errors(method: Method, members: _Rows, seed: int) -> Iterator[tuple[str, float]]:
     """Yield the error of each measure, the mean over fabrics; 0 where it is lost in the noise of the truth."""
     values = [
-        method.predict(cloth, queries, int(fingerprint(["size", cloth.name, seed]), 16)) for cloth, queries, _ in asked
+        method.predict(cloth, queries, int(fingerprint(["size", cloth.name, seed]), 16))
+        for cloth, queries, _ in members
     ]
     for name, (_, weights) in MEASURES.items():
-        found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, asked, strict=True)]
+        found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, members, strict=True)]
         yield name, float(np.mean([error.relative_rmse for error in found if error.mean > 0] or [0.0]))

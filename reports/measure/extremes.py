@@ -1,10 +1,10 @@
 """Every method at its extremes: footprints of 1e-4 to 1e4 repeats, 89.9 degrees, far places, half precision.
 
-Methods are asked the same questions of the same cloths, one of them as lustrous as yarns may be (alpha = .01):
+All methods evaluate one set of queries on one set of cloths, one of them as lustrous as yarns may be (alpha = .01):
 
     error       relative RMSE of the colour measure against the truth: at each footprint without grazing angles, and at
                 grazing angles
-    rounding    relative RMSE between the answers of a lower precision and the method's own, at all questions
+    rounding    relative RMSE between the answers of a lower precision and the method's own, at all queries
     far         the same footprints a million yarns away: largest difference, over the largest answer
     large       1e4 repeats against 1e2: both are the average of the repeat
     not finite, negative    answers that none can be
@@ -41,7 +41,7 @@ ANGLES: Final = (0.0, 60.0, 89.9)
 """Of light and viewer, to the normal, in degrees."""
 
 GRAZING: Final = 89.9
-"""Name of the grazing questions among the errors, and their angle."""
+"""Name of the grazing queries among the errors, and their angle."""
 
 LUSTROUS: Final = 0.01
 """Least roughness that a yarn may have."""
@@ -69,7 +69,7 @@ def lustrous(fabric: Fabric) -> Fabric:
 
 
 class Extremes(NamedTuple):
-    """Questions about one fabric."""
+    """Queries about one fabric."""
 
     queries: Queries
     """Of all footprints, angles and places."""
@@ -91,7 +91,7 @@ class Extremes(NamedTuple):
 
 
 def extremes(repeat: tuple[int, int]) -> Extremes:
-    """Return the questions about a fabric of this repeat: 5 footprints x 9 pairs of angles x 2 places."""
+    """Return the queries about a fabric of this repeat: 5 footprints x 9 pairs of angles x 2 places."""
     random = np.random.default_rng(0)
     # Sixteenths of a yarn: what single precision holds far away too.
     places = random.integers(0, np.array(repeat) * _SIXTEENTH, (_PLACES, 2)) / _SIXTEENTH
@@ -129,18 +129,18 @@ def measure_extremes(
     """
     records = []
     for fabric, role in fabrics:
-        asked = extremes(fabric.weave.repeat)
+        inputs = extremes(fabric.weave.repeat)
         covering = [[method for method in family if method.covers(fabric)] for family in families]
         if not any(covering):
             continue
-        true = estimate(fabric, asked.queries, truth, 0).mean.astype(np.float64)
+        true = estimate(fabric, inputs.queries, truth, 0).mean.astype(np.float64)
         about = Record(fabric=fabric.name, role=role, provenance=provenance or Provenance(), method="")
         for family in covering:
             own: Array | None = None
             for method in family:
                 subject = about.model_copy(update={"method": method.name, "setting": method.setting})
                 method.prepare(fabric)
-                answers, found = _measured(subject, method, fabric, asked, true)
+                answers, found = _measured(subject, method, fabric, inputs, true)
                 records += found
                 if own is not None:
                     records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
@@ -149,30 +149,30 @@ def measure_extremes(
 
 
 def _measured(
-    subject: Record, method: Method, fabric: Fabric, asked: Extremes, truth: Array
+    subject: Record, method: Method, fabric: Fabric, inputs: Extremes, truth: Array
 ) -> tuple[Array, list[Record]]:
     """Return a method's answers and what is measured of them alone."""
-    near, far = (_asked(method, fabric, queries) for queries in (asked.queries, asked.far))
-    wide, wider = (_asked(method, fabric, asked.queries.take(asked.size == size)) for size in FOOTPRINTS[-2:])
+    near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))
+    wide, wider = (_evaluated(method, fabric, inputs.queries.take(inputs.size == size)) for size in FOOTPRINTS[-2:])
     every = np.concatenate([near, far])
     lost, count = int((~np.isfinite(every)).any(axis=1).sum()), len(every)
     records = [
         subject.of("extreme_not_finite", lost, count),
         subject.of("extreme_negative", int((every < 0).any(axis=1).sum()), count),
     ]
-    rows = [(size, (asked.size == size) & ~asked.grazing) for size in FOOTPRINTS]
+    rows = [(size, (inputs.size == size) & ~inputs.grazing) for size in FOOTPRINTS]
     curve = tuple((size, _relative(near[chosen], truth[chosen])) for size, chosen in rows)
     curve = tuple(point for point in curve if math.isfinite(point[1]))
     if curve:
         records.append(subject.of("extreme_error", max(error for _, error in curve), len(near), curve=curve))
-    grazing = asked.grazing
+    grazing = inputs.grazing
     records += _of(subject, "extreme_grazing", _relative(near[grazing], truth[grazing]), int(grazing.sum()))
     records += _of(subject, "extreme_far", _largest(far, near), len(far))
     records += _of(subject, "extreme_large", _largest(wider, wide), len(wide))
     return near, records
 
 
-def _asked(method: Method, fabric: Fabric, queries: Queries) -> Array:
+def _evaluated(method: Method, fabric: Fabric, queries: Queries) -> Array:
     with np.errstate(all="ignore"):  # what is not finite is counted
         return method.predict(fabric, queries, 0).astype(np.float64)
 
@@ -200,8 +200,8 @@ def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the extremes, one row a method: the worst over its fabrics, those of alpha = .01 apart.
 
     Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
-    footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative, asked
-    (numbers of answers).
+    footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,
+    asked (numbers of values).
     """
     found: dict[tuple[str, str], list[Record]] = {}
     for record in records:

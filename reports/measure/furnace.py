@@ -38,7 +38,7 @@ _METRICS: Final[tuple[Metric, ...]] = ("furnace_diffuse", "furnace_specular", "f
 
 
 def furnace_queries(repeat: tuple[int, int]) -> Queries:
-    """Return the questions: `DIRECTIONS` lights in turn for every patch."""
+    """Return the queries: `DIRECTIONS` lights in turn for every patch."""
     steps = np.arange(1, DIRECTIONS + 1)[:, None] * (0.7548776662466927, 0.5698402909980532)
     z, turn = (0.5 + steps).T % 1.0
     z = np.maximum(z, 1e-3)

@@ -122,18 +122,18 @@ def measure_timing(
     list of Record
         For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
         thread, where the system tells (`reports.measure.memory`); `prepare_time`, the time until a fabric never seen
-        before can be asked about, where any fabric can be. Then `time` for each method and number of threads, the truth
+        before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the truth
         last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
     """
-    asked = []
+    sample = []
     for name in manifest.names("seen", "unseen"):
         cloth, queries, _ = _held_out(manifest, folder, name, options)
-        asked.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
+        sample.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
 
     truth = TruthOptions.model_validate(manifest.about["truth"])
     entries, records, edits = [], [], count(1)
     for method in methods:
-        covered = [(cloth, queries) for cloth, queries in asked if method.covers(cloth)]
+        covered = [(cloth, queries) for cloth, queries in sample if method.covers(cloth)]
         if not covered:
             continue
         for cloth, _ in covered:
@@ -145,7 +145,7 @@ def measure_timing(
         memory = peak_memory(partial(method.predict, *covered[0]))
         records += [subject.of("peak_memory", memory, 3, unit="B")] if memory is not None else []
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
-    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), asked))
+    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
     entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
     return records + _times(entries, options)
 
@@ -161,7 +161,7 @@ def _times(entries: Sequence[tuple[Record, Contender]], options: TimingOptions) 
     records = []
     for (subject, contender), timing in zip(runs, timings, strict=True):
         low, median, high = timing.quartiles
-        about = subject.model_copy(update={"note": f"{len(contender.questions[0][1].u)} queries a fabric"})
+        about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
         repeats, samples = len(timing.samples), timing.samples
         records.append(about.of("time", median, repeats, unit="ns/query", low=low, high=high, samples=samples))
         if math.isfinite(timing.waited):

@@ -2,7 +2,7 @@
 
 A designer moves a slider, or edits a yarn. Two ways lead from one fabric to another: blend their latents, or encode the
 fabric in between. Both are held against the truth of the fabric in between, at shares t of the way, on the same
-questions. Every number of the yarns is then blended alike, beta(t) = (1 - t) beta_first + t beta_second. Between two
+queries. Every number of the yarns is then blended alike, beta(t) = (1 - t) beta_first + t beta_second. Between two
 drafts there is no draft: the truth in between is the cross-fade (1 - t) f_first + t f_second of both cloths, and there
 is nothing to encode.
 
@@ -91,7 +91,7 @@ def between(pair: Pair, share: float) -> Fabric:
 def measure_paths(
     method: Method,
     chosen: Sequence[Pair],
-    asked: QueryOptions,
+    distribution: QueryOptions,
     truth: TruthOptions,
     rows: int = ROWS,
     provenance: Provenance | None = None,
@@ -104,8 +104,8 @@ def measure_paths(
         Must be one that `Blends`.
     chosen : sequence of Pair
         Paths.
-    asked : QueryOptions
-        Distribution of the questions; the same ones at every share.
+    distribution : QueryOptions
+        Distribution of the queries; the same ones at every share.
     truth : TruthOptions
         How they are answered.
     rows : int
@@ -118,7 +118,7 @@ def measure_paths(
     """
     records = []
     for pair in chosen:
-        queries = draw_queries(asked, pair.first.weave.repeat, _SEED, 0, rows)
+        queries = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows)
         answers = _truths(pair, queries, truth)
         subject = Record(
             method=method.name,

@@ -6,7 +6,7 @@ the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacit
 [Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance pi.
 
 A method without `missed` knows no curved cloth. It is asked as a flat material is used on a curved surface: the
-same questions with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
+same queries with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
 """
 
 from __future__ import annotations
@@ -93,14 +93,14 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
     wi, wo = frame @ light, frame[:, :, 2]
     boundary = np.diag([1.0 / radius**2, 0.0, 1.0 / radius**2])
     curvature = minimum_curvature(boundary, radius * frame[:, 2], np.tile([0.0, 0.0, 1.0], (len(v), 1)))
-    asked = Queries.round(
+    result = Queries.round(
         np.mod(radius * np.arcsin(sine), repeat[0]).astype(np.float32),
         np.mod(v, repeat[1]).astype(np.float32),
         (0.5 * pixel / np.sqrt(cosine)).astype(np.float32),
         wi.astype(np.float32),
         wo.astype(np.float32),
     )
-    return asked._replace(curvature=curvature.astype(np.float32))
+    return result._replace(curvature=curvature.astype(np.float32))
 
 
 def true_edge(fabric: Fabric, options: EdgeOptions) -> Edge:
@@ -118,9 +118,9 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
         coverage = 1.0 - method.missed(fabric, queries)
         return _edge(fabric, queries, coverage, method.predict(fabric, queries, options.seed), options)
     front = np.flatnonzero(queries.wi[:, 2] > 0)
-    asked = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)
+    flat = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)
     components = np.zeros((len(queries.u), 4), np.float32)
-    components[front] = method.predict(fabric, asked, options.seed)
+    components[front] = method.predict(fabric, flat, options.seed)
     return _edge(fabric, queries, np.ones(len(queries.u), np.float32), components, options)
 
 

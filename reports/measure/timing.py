@@ -33,11 +33,11 @@ FEWEST: Final = 16
 
 
 class Contender(NamedTuple):
-    """A method and the questions it is timed on."""
+    """A method and the queries it is timed on."""
 
     predict: Predict
     """Answers queries about a fabric."""
-    questions: Sequence[tuple[Fabric, Queries]]
+    queries: Sequence[tuple[Fabric, Queries]]
     """Fabrics it covers, each with its queries; one timed call answers them all."""
     threads: int = 1
     """Threads that make the call, each for itself, at the same time."""
@@ -45,13 +45,13 @@ class Contender(NamedTuple):
     @property
     def rows(self) -> int:
         """Queries that are answered in one reading of the clock."""
-        return self.threads * sum(len(queries.u) for _, queries in self.questions)
+        return self.threads * sum(len(queries.u) for _, queries in self.queries)
 
     def first(self, rows: int) -> Contender:
         """Return the same with `rows` first queries of the fabric that has most, and of others in proportion."""
-        share = min(1.0, rows / max(len(queries.u) for _, queries in self.questions))
-        cut = [(fabric, queries.take(slice(math.ceil(share * len(queries.u))))) for fabric, queries in self.questions]
-        return self._replace(questions=cut)
+        share = min(1.0, rows / max(len(queries.u) for _, queries in self.queries))
+        cut = [(fabric, queries.take(slice(math.ceil(share * len(queries.u))))) for fabric, queries in self.queries]
+        return self._replace(queries=cut)
 
 
 class Timing(NamedTuple):
@@ -130,7 +130,7 @@ def affordable(
     `fewest` queries a fabric take longer.
     """
     set_threads(1)
-    most = max(len(queries.u) for _, queries in contender.questions)
+    most = max(len(queries.u) for _, queries in contender.queries)
     rows = fewest
     _answer(contender.first(rows))  # warms up
     while rows < most:
@@ -149,9 +149,9 @@ def _took(contender: Contender, clock: Callable[[], int]) -> int:
     return clock() - start
 
 
-def thread_counts(asked: Sequence[int]) -> list[int]:
-    """Return numbers of threads in ascending order, each once; 0 asks for one a core that this process may use."""
-    return sorted({count or cores() for count in asked})
+def thread_counts(requested: Sequence[int]) -> list[int]:
+    """Return numbers of threads in ascending order, each once; 0 means one per core of this process."""
+    return sorted({count or cores() for count in requested})
 
 
 def quartiles(samples: Sequence[float]) -> tuple[float, float, float]:
@@ -182,7 +182,7 @@ def synchronise() -> None:
 
 
 def _call(contender: Contender, pool: ThreadPoolExecutor) -> None:
-    """Answer on as many threads as asked for; a single one is this one."""
+    """Answer on as many threads as requested; a single one is this one."""
     if contender.threads == 1:
         _answer(contender)
     else:
@@ -196,5 +196,5 @@ def _waited(contender: Contender, readings: Sequence[int], ran: int) -> float:
 
 
 def _answer(contender: Contender) -> None:
-    for fabric, queries in contender.questions:
+    for fabric, queries in contender.queries:
         contender.predict(fabric, queries)

@@ -80,9 +80,9 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
         fabric = load_fabric(name)
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-            asked = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
-            truth = estimate(fabric, asked, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
-            found = estimate(fabric, asked, TruthOptions(estimator="node_table"), _SEED).mean.astype(np.float64)
+            lit = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
+            truth = estimate(fabric, lit, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
+            found = estimate(fabric, lit, TruthOptions(estimator="node_table"), _SEED).mean.astype(np.float64)
             for component, one, other in zip(COMPONENTS, found.T, truth.T, strict=True):
                 value, error = bias_of(one, other)
                 yield Bias(name, side, component, value, error, rows)

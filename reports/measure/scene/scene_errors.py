@@ -1,10 +1,10 @@
 """What a method makes of a scene: its picture's errors, what aliases on the camera's way, the time of a frame.
 
 Errors are those of the first frame (`reports.measure.scene.image_error`), over the pixels of lit cloth; the colour's is
-over the questions of all frames. Flicker and excess energy are those of `reports.measure.aliasing` over all frames:
+over the queries of all frames. Flicker and excess energy are those of `reports.measure.aliasing` over all frames:
 flicker where cloth is lit in every one of them, the spectrum of whole frames, whose background is the truth's.
 Intervals are those of `reports.measure.block_bootstrap`, over blocks of pixels with all their frames; excess energy has
-none. Every method is asked as `pipeline.models.fallback` says; how many questions were not its own stands beside its
+none. Every method is wrapped by `pipeline.models.fallback`; its fallback share stands beside its
 numbers.
 """
 
@@ -42,7 +42,7 @@ LONGEST: Final = 0.01
 """Seconds of a timed call."""
 
 FEWEST: Final = 128
-"""Least questions about a cloth in such a call: what a call itself costs must not stand for what a question costs."""
+"""Least queries about a cloth in such a call: what a call itself costs must not stand for what a query costs."""
 
 
 class _Reference(NamedTuple):
@@ -134,8 +134,8 @@ def time_scene(
 ) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
-    Of every cloth as many questions are asked as one call can answer in `LONGEST`, `FEWEST` at least; the time of all
-    of them is in proportion, cloth by cloth: a small one with costly questions counts for no more than it is.
+    Of every cloth as many queries are asked as one call can answer in `LONGEST`, `FEWEST` at least; the time of all
+    of them is in proportion, cloth by cloth: a small one with costly queries counts for no more than it is.
     """
     first = shot.first()
     if not (able := [method for method in methods if first.covered_by(method)]):
@@ -143,18 +143,18 @@ def time_scene(
     mixed = np.random.default_rng(seed)
     contenders = []
     # In a random order, so that the first ones are a fair sample of the frame.
-    asked = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]
+    subjects = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]
     for method in able:
-        for fabric, queries in asked:
+        for fabric, queries in subjects:
             method.prepare(fabric)
-            # Quadrature's own preparation must not look like the time of a question: rare ones come late in a call.
+            # Quadrature's own preparation must not look like the time of a query: rare ones come late in a call.
             rare = np.flatnonzero(method.strange(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
             contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
     records = []
     timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
-    readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(asked), -1)
-    counts = np.array([len(queries.u) for _, queries in asked])
+    readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(subjects), -1)
+    counts = np.array([len(queries.u) for _, queries in subjects])
     for method, frames in zip(able, 1e-6 * np.einsum("mct,c->mt", readings, counts), strict=True):
         samples = tuple(frames.tolist())
         low, median, high = quartiles(samples)
@@ -165,7 +165,7 @@ def time_scene(
 
 
 def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float32]], image: ImageOptions) -> Record:
-    """Return the relative RMSE of the colour measure over the questions of all frames."""
+    """Return the relative RMSE of the colour measure over the queries of all frames."""
     values, truth, noise = (
         np.concatenate(parts).astype(np.float64)
         for parts in (answers, [c.mean for c in shot.cloths], [c.standard_error for c in shot.cloths])
@@ -173,11 +173,11 @@ def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float3
     own, reference = values @ COLOUR_WEIGHTS, truth @ COLOUR_WEIGHTS
     spread = np.sqrt(np.square(noise) @ np.square(COLOUR_WEIGHTS))
     error = squared_error(own, reference, spread, resamples=0)
-    # The mean over questions is the sum over pixels over their number; all questions of a pixel are drawn together.
+    # The mean over queries is the sum over pixels over their number; all queries of a pixel are drawn together.
     pixel, size = np.concatenate([cloth.pixel for cloth in shot.cloths]), shot.base.shape[1:3]
     squares = (np.square(own - reference) - np.square(spread))[:, 0]
-    asked, sums = (np.bincount(pixel, weights, minlength=size[0] * size[1]) for weights in (None, squares))
-    lit = (asked > 0).reshape(size)
+    count, sums = (np.bincount(pixel, weights, minlength=size[0] * size[1]) for weights in (None, squares))
+    lit = (count > 0).reshape(size)
     rows = sums[lit.ravel()] * lit.sum() / len(pixel)
     _, *ends = block_interval(rows, lit, image.block, image.resamples, image.seed)
     low, high = (math.sqrt(max(end, 0.0)) / error.mean for end in ends)

@@ -1,8 +1,8 @@
-"""Frames of a scene by the truth and by methods: what is asked is worked out once and lies in a file.
+"""Frames of a scene: the queries, computed once and stored, and their values by the truth and by methods.
 
-The file, NumPy's npz, holds every question of all frames with the truth's answer, and the pictures without the light
+The file, NumPy's npz, holds every query of all frames with the truth's answer, and the pictures without the light
 that the cloth scatters: the backdrop, and what of it comes straight through the cloth. A method's picture is that plus
-the sum over questions of irradiance times f_P. So methods differ in the patch BSDF alone; what passes straight through
+the sum over queries of irradiance times f_P. So methods differ in the patch BSDF alone; what passes straight through
 cloth is the truth's for all of them, and cloth hides what its mesh covers.
 """
 
@@ -41,15 +41,15 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Questions:
-    """What is asked about one cloth over all F frames: M questions.
+class ClothQueries:
+    """M queries on one cloth over all F frames.
 
     Attributes
     ----------
     fabric : Fabric
         What it is.
     queries : Queries
-        The questions.
+        The queries.
     frame, pixel : int64 (M,)
         Which frame, and which of its H W pixels.
     weight : float32 (M, 3)
@@ -71,7 +71,7 @@ class Questions:
     stand_in: npt.NDArray[np.float32]
 
     def light(self, components: npt.ArrayLike) -> Floats:
-        """Return the light of each question, (M, 3), from components (M, 4)."""
+        """Return the light of each query, (M, 3), from components (M, 4)."""
         return np.asarray(
             self.weight
             * np.einsum("mc,mcx->mx", np.asarray(components, np.float64), colours_of(self.fabric, self.queries))
@@ -84,11 +84,11 @@ class Questions:
             self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(colours_of(self.fabric, self.queries))))
         )
 
-    def of_frame(self, frame: int) -> Questions:
-        """Return the questions of one frame."""
+    def of_frame(self, frame: int) -> ClothQueries:
+        """Return the queries of one frame."""
         rows = np.flatnonzero(self.frame == frame)
         parts = (getattr(self, name)[rows] for name in _COLUMNS)
-        return Questions(self.fabric, self.queries.take(rows), *parts)
+        return ClothQueries(self.fabric, self.queries.take(rows), *parts)
 
 
 @dataclass(frozen=True)
@@ -101,17 +101,17 @@ class Shot:
         Of the scene.
     base : float32 (F, H, W, 3)
         Linear RGB without the light that the cloth scatters.
-    cloths : list of Questions
+    cloths : list of ClothQueries
         In the order of the scene.
     """
 
     name: str
     base: npt.NDArray[np.float32]
-    cloths: list[Questions]
+    cloths: list[ClothQueries]
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:
-        """Pixels that any question is about, (F, H, W)."""
+        """Pixels with at least one query, (F, H, W)."""
         result = np.zeros(self.base.shape[:3], np.bool_)
         for cloth in self.cloths:
             result.reshape(len(result), -1)[cloth.frame, cloth.pixel] = True
@@ -211,7 +211,7 @@ def read_shot(path: Path) -> Shot:
         for key, fabric in about["cloths"].items():
             queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
             rest = (file[f"{key}.{column}"] for column in _COLUMNS)
-            cloths.append(Questions(Fabric.model_validate(fabric), queries, *rest))
+            cloths.append(ClothQueries(Fabric.model_validate(fabric), queries, *rest))
         return Shot(about["name"], file["base"], cloths)
 
 
@@ -224,7 +224,7 @@ def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.flo
 
 
 def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:
-    """Return the transparency of each place: what any of its questions was answered, 0 where nothing is asked."""
+    """Return the transparency of each place, from any of its queries; 0 where there is none."""
     result = np.zeros(len(gbuffer.pixel))
     result[gbuffer.place] = answered
     return result

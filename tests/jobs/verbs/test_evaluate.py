@@ -88,7 +88,7 @@ def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
         (["queries.parquet", "--max-count", "1000"], "must be a power of two"),
         (["queries.parquet", "--seed", "-1"], "--seed = -1: must be from 0"),
         (["queries.parquet", "--seed", "one"], "one"),
-        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be 0, for one a core, or more"),
+        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be 0 (one per core) or more"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, tokens, said):

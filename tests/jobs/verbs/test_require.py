@@ -99,7 +99,7 @@ def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
     pytest.importorskip("mitsuba")
     code, _, told = require("plane", "--error", ".01", "--time", ".001")
     assert code == 2 and told.count("\n") == 1
-    assert "no method meets it" in told and "point_sampled k = 2" in told
+    assert "no method meets them" in told and "point_sampled k = 2" in told
     code, _, told = require("plane", "--method", "woven", "--error", ".01")
     assert code == 2 and "woven: " in told and "point_sampled" not in told
 

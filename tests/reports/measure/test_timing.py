@@ -71,7 +71,7 @@ def test_slow_methods_answer_fewer_queries(cost, rows):
         clock.now += cost * len(queries.u)
 
     chosen = affordable(Contender(predict, questions(1000) * 2), longest=0.05, clock=clock)
-    assert [len(queries.u) for _, queries in chosen.questions] == [rows, rows]
+    assert [len(queries.u) for _, queries in chosen.queries] == [rows, rows]
 
 
 def test_thread_counts_are_said_once():

@@ -157,7 +157,7 @@ def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
     assert len(set(counts)) > 1
 
     def readings(contenders, repeats, warm_up):
-        assert [len(contender.questions) for contender in contenders] == [1] * 2 * len(counts)
+        assert [len(contender.queries) for contender in contenders] == [1] * 2 * len(counts)
         return [
             Timing(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
             for index, _ in enumerate(contenders)
