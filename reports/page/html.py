@@ -32,7 +32,7 @@ from reports.tables.sentences import (
     scene_sentences,
 )
 from reports.truth import accuracy, bias, effort, sampling
-from reports.truth.finding import Finding
+from reports.truth.finding import RECORDS as FINDINGS
 
 SECTIONS: Final = {
     "error": "Error",
@@ -59,9 +59,7 @@ ALWAYS: Final = frozenset({"error", "fabrics", "made", "columns", "limits"})
 """Sections that every page has; the others are left out where nothing was measured."""
 
 
-def page_html(
-    page: PageInput, tables: Mapping[str, pd.DataFrame], findings: Sequence[Finding], plots: Collection[str]
-) -> str:
+def page_html(page: PageInput, tables: Mapping[str, pd.DataFrame], plots: Collection[str]) -> str:
     """Return the HTML of a page.
 
     Parameters
@@ -69,16 +67,14 @@ def page_html(
     page : PageInput
         Its content.
     tables : mapping
-        The condensed tables by name (`reports.tables.summary`).
-    findings : sequence of Finding
-        Of the expressions at their extremes.
+        From `reports.page.page.page_tables`.
     plots : collection of str
         Names of the plots that were drawn.
     """
     content = {
         **_methods(page, tables),
         **_pictures(page, tables),
-        **_truth(page, findings),
+        **_truth(page),
         "page": page,
         "plots": plots,
         "plot_titles": PLOT_TITLES,
@@ -161,12 +157,12 @@ def _pictures(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, 
     }
 
 
-def _truth(page: PageInput, findings: Sequence[Finding]) -> dict[str, Any]:
+def _truth(page: PageInput) -> dict[str, Any]:
     """Return rows about the truth itself: rounding, speed, accuracy, bias, effort, and the sampler of directions."""
     measured = truth_measurements(page.records)
     accuracies = truth_rows.accuracy_rows(measured["truth_accuracy"])
     return {
-        "stability": truth_rows.stability_rows(findings),
+        "stability": truth_rows.stability_rows(FINDINGS.from_records(page.records)),
         "rates": truth_rows.rate_rows(page.records),
         "accuracies": accuracies,
         "reference": percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),

@@ -6,7 +6,7 @@ The same input gives the same bytes. Figures are written first and the page last
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from reports.page.filmstrip import filmstrip, liveliest
 from reports.page.html import page_html, schemes, truth_measurements
 from reports.page.picture_strips import films
 from reports.page.plot_style import render
-from reports.record import OF_A_PAGE, TRUTH, to_table, write_records
+from reports.record import OF_A_PAGE, TRUTH, Record, to_table, write_records
 from reports.tables import summary
 from reports.tables.equal_time import equal_time_table, size_table
 from reports.tables.tradeoff import tradeoff_table
@@ -40,41 +40,16 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     folder : Path
         Created if need be.
     page : PageInput
-        What was measured.
+        Its content.
     progress : callable
-        Told the share that is done.
+        Called with the share that is done.
 
     Raises
     ------
     BadInput
         If a picture is missing, or the folder cannot be written.
     """
-    tables = {
-        "records": to_table(page.records),
-        "errors": summary.error_table(page.records),
-        "errors_by_fabric": summary.fabric_table(page.records),
-        "pictures": summary.picture_table(page.records),
-        "aliasing": summary.aliasing_table(page.records),
-        "timing": summary.timing_table(page.records),
-        "energy": summary.energy_table(page.records),
-        "silhouettes": silhouette_table(page.records),
-    }
-    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"], tables["aliasing"])
-    tables["scenes"] = summary.scene_table(page.records)
-    tables["by_size"] = size_table(page.records)
-    tables["equal_time"] = equal_time_table(tables["by_size"])
-    between = summary.path_table(page.records)
-    if len(between):
-        tables["between"] = between
-    extremes = extremes_table(page.records)
-    if len(extremes):
-        tables["extremes"] = extremes
-    findings = FINDINGS.from_records(page.records)
-    if findings:
-        tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
-    for name, measured in truth_measurements(page.records).items():
-        if measured:
-            tables[name] = pd.DataFrame([asdict(one) for one in measured])
+    tables = page_tables(page.records)
     for name, table in tables.items():
         write_table(folder / "tables" / name, table)
     progress(0.1)
@@ -87,10 +62,38 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         progress(0.4 + 0.6 * min(1.0, (done + 1) / (3 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
     write_records(folder / OF_A_PAGE, page.records, page.machine)
     index = folder / "index.html"
-    atomic_write(
-        index, page_html(page, tables, findings, {name.removesuffix("-light.png") for name in images}).encode()
-    )
+    atomic_write(index, page_html(page, tables, {name.removesuffix("-light.png") for name in images}).encode())
     return index
+
+
+def page_tables(records: Sequence[Record]) -> dict[str, pd.DataFrame]:
+    """Return the condensed tables of a page by name; tables without rows only where the page always shows them."""
+    tables = {
+        "records": to_table(records),
+        "errors": summary.error_table(records),
+        "errors_by_fabric": summary.fabric_table(records),
+        "pictures": summary.picture_table(records),
+        "aliasing": summary.aliasing_table(records),
+        "timing": summary.timing_table(records),
+        "energy": summary.energy_table(records),
+        "silhouettes": silhouette_table(records),
+    }
+    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"], tables["aliasing"])
+    tables["scenes"] = summary.scene_table(records)
+    tables["by_size"] = size_table(records)
+    tables["equal_time"] = equal_time_table(tables["by_size"])
+    between = summary.path_table(records)
+    if len(between):
+        tables["between"] = between
+    extremes = extremes_table(records)
+    if len(extremes):
+        tables["extremes"] = extremes
+    if findings := FINDINGS.from_records(records):
+        tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
+    for name, measured in truth_measurements(records).items():
+        if measured:
+            tables[name] = pd.DataFrame([asdict(one) for one in measured])
+    return tables
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

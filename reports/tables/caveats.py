@@ -15,15 +15,15 @@ from reports.tables.summary import of_baseline
 
 
 def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataFrame) -> list[str]:
-    """Return what a reader must know before quoting a number."""
+    """Return the limits of the numbers that every page names."""
     view = options.view
     notes = [
-        "The conditions of the published table (data set, ranges, training, footprints) are not known. Our ratios are "
-        "the paper's comparison repeated on this project's own ground truth, not a reproduction of its numbers.",
+        "The conditions of the published table (data set, ranges, training, footprints) are not known. The ratios here "
+        "are the paper's comparison repeated on this project's own ground truth, not a reproduction of its numbers.",
         "The truth is that of the model: yarns as bent, twisted cylinders, one layer of fibres scattering once, plus a "
         "diffuse lobe; reflection only. It is not a measurement of real cloth.",
         "Times are those of this machine and of code called from Python, a batch of queries at a time; the paper's are "
-        "of a GPU renderer. Only ratios within one column mean anything.",
+        "of a GPU renderer. Compare only ratios within one column.",
         "One training, one seed: how much another training would differ was not measured.",
         _footprint_note(view),
         f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
@@ -41,7 +41,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
     if per_material:
         names = " and ".join(display(name) for name in per_material)
         notes.append(
-            f"{names} learns every fabric by itself, so no fabric is unseen to it; its rows stand for comparison."
+            f"{names} is trained on every fabric by itself, so no fabric is unseen; the rows are for comparison."
         )
     return notes
 

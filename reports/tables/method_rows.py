@@ -59,13 +59,10 @@ ERROR: Final = (
     "MSE",
     "95 % interval",
     "noise",
-    "× lower",
-    "95 % interval of × lower",
+    f"×{NO_BREAK}lower",
+    f"interval of ×{NO_BREAK}lower",
     "colour",
-    "S warp",
-    "S weft",
-    "C warp",
-    "C weft",
+    *(f"{part}{NO_BREAK}{yarn}" for part in "SC" for yarn in ("warp", "weft")),
 )
 """Columns of `error_rows` after the method."""
 

@@ -1,4 +1,4 @@
-"""Rows of the tables of scenes: a number, its 95 % interval beneath, and last what the truth's noise alone scores."""
+"""Rows of the tables of scenes: numbers with their 95 % intervals; last the errors by the noise of the truth alone."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Column:
     """Column of `summary.scene_table`."""
     worded: Callable[[float], str]
     floor: str = ""
-    """Column of what the truth's noise alone scores."""
+    """Column of the error by the noise of the truth alone."""
     in_powers: bool = False
     """Whether intervals are in powers of ten."""
 
@@ -61,14 +61,14 @@ COLUMNS: Final = (
     Column("flicker", "flicker", signed, in_powers=True),
     Column("excess energy", "excess_energy", signed),
     Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
-    Column("not its own", "fallback_share", lambda value: percent(value, 0)),
+    Column("fallback share", "fallback_share", lambda value: percent(value, 0)),
     Column("ms a frame", "frame_time", significant),
 )
-"""All that there may be; `scene_columns` says which are shown."""
+"""All columns; `scene_columns` leaves out those without numbers."""
 
 
 def scene_columns(table: pd.DataFrame) -> list[Column]:
-    """Return the columns of `scene_rows`: those of `COLUMNS` but FovVideoVDP where nobody measured it."""
+    """Return the columns of `scene_rows`: `COLUMNS`, without FovVideoVDP where it was not measured."""
     return [column for column in COLUMNS if column.metric != "fovvideovdp" or table[column.metric].notna().any()]
 
 

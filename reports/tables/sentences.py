@@ -13,9 +13,9 @@ from reports.tables.tradeoff import FLICKER_LIMITS, LIMITS, cheapest
 
 
 def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) -> list[str]:
-    """Return for each role which method costs least within each error, from `tradeoff.tradeoff_table`.
+    """Return for each role the cheapest method within each error, from `tradeoff.tradeoff_table`.
 
-    Errors that one method is the cheapest for are named together.
+    Errors with the same cheapest method are named together.
     """
     return [
         f"{str(role).capitalize()} fabrics, error of the colour: {_for_errors(group, limits, 'ns')}."
@@ -24,7 +24,7 @@ def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) ->
 
 
 def least_flicker_sentences(table: pd.DataFrame) -> list[str]:
-    """Return the same for the distance of the receding plane's flicker from the truth's."""
+    """Return for each role the cheapest method within each distance of the flicker from the truth's."""
     return [
         f"{str(role).capitalize()} fabrics, flicker: {_for_flicker(group, 'ns')}."
         for role, group in table.groupby("role", sort=False)
@@ -33,7 +33,7 @@ def least_flicker_sentences(table: pd.DataFrame) -> list[str]:
 
 
 def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
-    """Return for each scene which method costs least within errors of the colour and of flicker, and what is noise.
+    """Return for each scene the cheapest methods within errors of the colour and of flicker, and errors in the noise.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
         From `summary.scene_table`.
     """
     result = {}
-    # What is lost in the noise may be as large as the upper end of its interval.
+    # An error in the noise may be as large as the upper end of its interval.
     lost = table["colour_rrmse"] == 0
     error = table["colour_rrmse"].where(~lost, table["colour_rrmse_high"])
     table = table.assign(flicker=table["flicker"].abs(), error=error, lost=lost)
@@ -54,32 +54,32 @@ def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
             found.append(f"Flicker: {_for_flicker(timed, 'frame_time')}.")
         names = [display(row.method, row.setting) for row in rows(group[group["lost"]])]
         if names:
-            found.append(f"The error of {listed(names)} is in the noise: the truth’s own explains it all.")
+            found.append(f"In the noise of the truth: the error of {listed(names)}.")
         result[str(scene)] = found
     return result
 
 
 def _for_errors(table: pd.DataFrame, limits: Sequence[float], cost: str) -> str:
-    """Return what costs least within each `error`."""
-    return _cheapest(table, {limit: f"{100 * limit:g} %" for limit in limits}, cost, "error", "for {}")
+    """Return the cheapest method within each `error`."""
+    return _cheapest(table, {limit: f"{100 * limit:g} %" for limit in limits}, cost, "error", "{}")
 
 
 def _for_flicker(table: pd.DataFrame, cost: str) -> str:
-    """Return what costs least within each distance of `flicker` from the truth's."""
+    """Return the cheapest method within each distance of `flicker` from the truth's."""
     named = {limit: f"{limit:g}".removeprefix("0") for limit in FLICKER_LIMITS}
-    return _cheapest(table, named, cost, "flicker", "within {} of the truth’s")
+    return _cheapest(table, named, cost, "flicker", "{} of the truth")
 
 
 def _cheapest(table: pd.DataFrame, limits: Mapping[float, str], cost: str, fault: str, where: str) -> str:
-    """Return what costs least within each limit; limits that one method is the cheapest for are named together."""
+    """Return the cheapest method within each limit; limits with the same method are named together."""
     said: dict[str, list[str]] = {}
     for limit, name in limits.items():
         best = cheapest(table, limit, cost, fault)
         text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
         said.setdefault(text, []).append(name)
-    parts = [f"{where.format(listed(found))} the cheapest is {text}" for text, found in said.items() if text]
+    parts = [f"cheapest within {where.format(listed(found))}: {text}" for text, found in said.items() if text]
     if missed := said.get(""):
-        parts.append(f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} reached by none")
+        parts.append(f"no method reaches {where.format(' or '.join(missed))}")
     return "; ".join(parts)
 
 
@@ -89,28 +89,32 @@ def _cost(value: float, cost: str) -> str:
 
 
 def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:
-    """Return for each method whether any rival errs less in the same time, and where, from `equal_time_table`."""
+    """Return for each method the rivals with a lower error in the same time, and where, from `equal_time_table`."""
     result = []
     found = table[(table["measure"] == measure) & table["ratio"].notna()]
     for (method, setting), group in found.groupby(["method", "setting"], sort=False):
         name, lost = display(str(method), str(setting)), group[group["ratio"] < 1.0]
         if len(lost):
             parts = [_where(str(rival), part) for rival, part in lost.groupby("rival", sort=False)]
-            result.append(f"{name}: in the same time, less error by {'; '.join(parts)}.")
+            result.append(f"{name}: rivals with a lower error in the same time: {'; '.join(parts)}.")
         else:
             (closest,) = rows(group.nsmallest(1, "ratio"))
-            near = f"{display(closest.rival)}, {closest.ratio:.2f}× its error {_size(closest.size)}"
-            result.append(f"{name}: in the same time no rival errs less at any size; the closest is {near}.")
+            near = f"{display(closest.rival)} with {closest.ratio:.2f}× its error {_size(closest.size)}"
+            result.append(f"{name}: no rival has a lower error in the same time at any size; the closest is {near}.")
     return result
 
 
 def _where(rival: str, lost: pd.DataFrame) -> str:
-    """Return where a rival errs less, and how much at best."""
+    """Return the sizes at which a rival has a lower error, and its lowest ratio."""
     sizes = [size for size in lost["size"] if size != WHOLE]
     places = (
-        "at every size" if len(sizes) == len(SIZES) else f"at {listed(sizes)}" if sizes else "over all sizes together"
+        "at every size"
+        if len(sizes) == len(SIZES)
+        else f"at footprints {listed(sizes)}"
+        if sizes
+        else "over all sizes together"
     )
-    return f"{display(rival)} {places} (down to {lost['ratio'].min():.2f}×)"
+    return f"{display(rival)} {places} (ratio down to {lost['ratio'].min():.2f}×)"
 
 
 def _size(name: str) -> str:
@@ -118,7 +122,7 @@ def _size(name: str) -> str:
 
 
 def beaten(table: pd.DataFrame) -> dict[str, list[str]]:
-    """Return for each role the methods of which no knob is on the front."""
+    """Return for each role the methods without a setting on the front."""
     result = {}
     for role, group in table.groupby("role", sort=False):
         best = set(group.loc[group["front"], "method"])

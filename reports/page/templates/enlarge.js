@@ -1,5 +1,6 @@
 // Pictures in links of class "enlarge" open in the dialog. Escape, the button and a click beside the picture close it;
-// the focus then returns to the link. The arrow keys show the neighbours in the same strip.
+// the focus then returns to the link. The arrow keys show the next picture of the same kind in the
+// strip: the same view by the next method.
 const dialog = document.querySelector("dialog");
 const picture = new Image();
 const words = dialog.querySelector("p");
@@ -9,7 +10,7 @@ dialog.prepend(picture);
 
 function neighbour(step) {
   const group = link.closest(".strip, .views, .tiles");
-  const links = group ? [...group.querySelectorAll("a.enlarge")] : [link];
+  const links = group ? [...group.querySelectorAll(`a.enlarge[data-kind="${link.dataset.kind}"]`)] : [link];
   return links[links.indexOf(link) + step];
 }
 

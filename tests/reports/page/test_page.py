@@ -126,14 +126,14 @@ def test_headline_prints_the_papers_comparison(written):
         "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics and 4.5× lower MSE on the "
         "unseen fabric, at 4.3× its time; the paper reports 4.1× at 0.83× on its own scene and GPU." in words
     )
-    assert "NeuMIP learns every fabric by itself" in words
+    assert "NeuMIP is trained on every fabric by itself" in words
     assert "Point sampling at 2 points answers 0 for 15% of the queries" in words
 
 
 def test_the_front_is_named_and_shown(written):
     """Made up: errors are the root of 2e-3 or 1.5e-3 over k, so that 64 points err half a percent."""
     folder, page = written
-    assert "for 10 %" in page.words and "the cheapest is points, k = 1" in page.words
+    assert "cheapest within 10 %" in page.words and ": points, k = 1 (" in page.words
     assert (
         "Front of error and time, seen fabrics" in page.words
         and "Not on the front, seen fabrics: NeuMIP." in page.words
@@ -326,7 +326,7 @@ def test_scenes_show_intervals_noise_frames_and_maps(scenes, tmp_path):
     truth, woven, points = (rows[top : top + 24, :32].mean() for top in (0, 24 + GAP, 2 * (24 + GAP)))
     assert points < truth < woven
     words = page.words
-    assert "for 10 % the cheapest is woven (21.6 ms); 5 % and 2 % are reached by none" in words
+    assert "cheapest within 10 %: woven (21.6 ms); no method reaches 5 % or 2 %" in words
     assert "noise of the truth" in words and "frame 3" in words and "frame 4" not in words
     assert "pyfvvdp was not installed" in words
 
