@@ -7,7 +7,9 @@ and angle the larger angle by which the surface turns across the part: pi for a 
 mean squares over 40 pairs of directions (seed 19), for three fabrics without shadows, alpha from .1 to .3 and n = 4, 8,
 16, by least squares where the share lies between 1e-8 and .3.
 
-Seen: NOT RUN YET
+Seen: rate 6.8 and factor .22 over 43 rules, in use 14 and 2. At n alpha / angle = .25 that is a share of .04, in use
+.06; at .5 it is .007, in use .002: for fine rules the value in use is too optimistic as a bound on its own. The
+reported error also holds the last change of each part.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.adaptive import _HIGHLIGHT, integrate_rows
 from weaves.fabric import load_fabric
 
-NEVER = 9  # level from which on lines are cut; never reached
+CUT = 1  # level from which on lines are cut where light or view is lost: kinks would hide the rate
 
 
 def main() -> None:
@@ -39,7 +41,7 @@ def main() -> None:
             def specular(level: int, cloth=cloth, columns=columns) -> np.ndarray:
                 limits = 1e-15, 0.0, 32, 1 << 30
                 cells = first_cells(cloth.front)
-                return integrate_rows(cloth, columns, cells, *limits, NEVER, level - 1, level)[0][:, :2]
+                return integrate_rows(cloth, columns, cells, *limits, CUT, level - 1, level)[0][:, :2]
 
             exact = specular(5)
             for level in (1, 2, 3):

@@ -5,7 +5,7 @@ Command: ``python tests/fits/fit_quadrature_safety.py [--rows 100]``
 The fitted value is the 95th percentile of the norm of the true error over the norm of the estimated one, for queries of
 three fabrics (seed 18) at 2 % and .3 %. The reference has rules of 32 and 64 nodes an axis on every part.
 
-Seen: NOT RUN YET
+Seen, with ``--rows 20``: fitted .97, in use 1.5, which covers 96.7 % of 120 answers.
 """
 
 from __future__ import annotations

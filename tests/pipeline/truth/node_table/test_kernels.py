@@ -31,7 +31,7 @@ def cloth():
     changes = {"relief": 1.2, "twist": 30.0}
     yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
     field = height_field(fabric.model_copy(update={**yarns, "optical_thickness": 0.4}))
-    return field, tabulate(field, field, True)
+    return field, tabulate(field, field, True, 32, 128)
 
 
 def pieces(table):
