@@ -13,6 +13,7 @@ from jobs.recipe.load import recipe_names
 from jobs.verbs.bench import BENCHES
 from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
+from pipeline.truth.estimator import ESTIMATORS
 from reports.tables.markdown import block, with_block
 from reports.tables.readme import BLOCK
 from weaves.fabric import PRESETS, load_fabric
@@ -148,6 +149,11 @@ def test_models_are_listed_with_what_they_know():
         kinds = {kind for kind, cell in zip(("behind", "stretch", "curvature"), cells, strict=True) if cell == "yes"}
         known |= dict.fromkeys(re.findall(r"`(\w+)`", names), kinds)
     assert known == {name: set(options().kinds) for name, options in CLASSES.items()}
+
+
+def test_estimators_are_listed():
+    cells = re.findall(r"^\| (`[^|]+`) \|", text_of(ROOT / "pipeline" / "truth" / "README.md"), re.M)
+    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == set(ESTIMATORS)
 
 
 def test_recipes_and_scenes_are_listed():
