@@ -13,6 +13,7 @@ from jobs.recipe.load import recipe_names
 from jobs.verbs.bench import BENCHES
 from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
+from pipeline.shards.schema import SCHEMAS
 from pipeline.truth.estimator import ESTIMATORS
 from reports.tables.markdown import block, with_block
 from reports.tables.readme import BLOCK
@@ -154,6 +155,11 @@ def test_models_are_listed_with_what_they_know():
 def test_estimators_are_listed():
     cells = re.findall(r"^\| (`[^|]+`) \|", text_of(ROOT / "pipeline" / "truth" / "README.md"), re.M)
     assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == set(ESTIMATORS)
+
+
+def test_kinds_of_rows_are_listed():
+    text = text_of(ROOT / "pipeline" / "shards" / "README.md")
+    assert re.findall(r"^\| `(\w+)` \|", text, re.M) == list(SCHEMAS)
 
 
 def test_recipes_and_scenes_are_listed():
