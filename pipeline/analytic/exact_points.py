@@ -20,7 +20,7 @@ class PointSampler:
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     options : TruthOptions
         Footprint, frame, normaliser and geometry; the estimator and its limits play no part. Left out: the defaults.
     """

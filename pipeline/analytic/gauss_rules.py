@@ -1,4 +1,4 @@
-"""Gauss rules of a piece along one axis, the boxes that their nodes stand for, and the grid that horizons come on."""
+"""Gauss rules of a piece along one axis, the boxes of their nodes, and the grids of horizons."""
 
 from __future__ import annotations
 

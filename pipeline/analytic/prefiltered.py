@@ -1,4 +1,4 @@
-"""Normals and tangents averaged over footprints, one evaluation of the point model a family: what MIP maps give.
+"""MIP maps of normals and tangents: one evaluation of the point model for each family.
 
 For each family a pyramid holds the share c of the cloth's area that it covers, and the means over this share of the
 normal n, the tangent t and, for `lean`, the products t t^T; a texel of the next level is the mean of four. It is read

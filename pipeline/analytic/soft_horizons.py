@@ -1,7 +1,7 @@
-"""Soft horizons: a node stands for a box, and what hides it is a ramp as wide as the horizon spreads there, not a step.
+"""Soft horizons: the visibility of a node is a ramp, as wide as the spread of the horizon over the node's box.
 
-How much of a box both viewer and light reach depends on their azimuths: alike (the better hidden one decides), at right
-angles (independently) or opposite (what hides one shows the other).
+How much of a box both viewer and light reach depends on their azimuths: alike (the smaller share decides), at right
+angles (the shares multiply) or opposite (the hidden parts exclude each other).
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def tangent(a: Angles, fibre: Fibre) -> Tangent:
 @inlined_fast_kernel
 def turning(hx: Scalar, hy: Scalar, hz: Scalar, t: Tangent, a: Angles, fibre: Fibre) -> tuple[Scalar, Scalar]:
     """Return the derivatives of h.t by u and by v, for any h."""
-    # Derivatives of T; what only changes its length is taken off below.
+    # Derivatives of T; their part along t is subtracted below.
     uy = a.cos_u * a.sin_v * fibre.sin_twist - a.sin_u * fibre.cos_twist
     uz = -fibre.beta * (a.cos_u * fibre.cos_twist + a.sin_u * a.sin_v * fibre.sin_twist)
     vx, vy = a.sin_v * fibre.sin_twist, a.sin_u * a.cos_v * fibre.sin_twist

@@ -2,8 +2,9 @@
 
 A wide footprint weighs fixed nodes, a tensor rule on every piece of each different cell (x = r sin v across a yarn);
 their weights are the Gaussian at the node, summed over all cells alike and over all images of the repeat, a product
-of one sum an axis. A node stands for a box: its horizon is the mean of the map's over that box, and what hides it is
-a ramp as wide as the horizon spreads there. A narrow footprint places the nodes anew in what it covers of each piece.
+of one sum an axis. Each node represents a box: its horizon is the mean of the map over that box, and its visibility
+is a ramp as wide as the spread of the horizon there. For a narrow footprint nodes are placed in the part of each piece
+that it covers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Nodes placed anew by a narrow footprint, in what it covers of every piece of yarn."""
+"""Nodes placed in a narrow footprint: in the part of every piece of yarn that it covers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def place_nodes(
     line: Float32,
     points: Float32,
 ) -> int:
-    """Place nodes in what a narrow footprint covers of every piece; return how many."""
+    """Place nodes in the part of every piece that a narrow footprint covers; return their number."""
     ends, picks = table.repeat[0], table.repeat[1]
     reach, least = np.float32(REACH) * s, np.float32(_SLIVER) * s
     warp_radius, weft_radius = table.yarn[0, 0], table.yarn[1, 0]

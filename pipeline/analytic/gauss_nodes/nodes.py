@@ -30,7 +30,7 @@ from pipeline.truth.geometry.heightfield import GAP, WEFT, HeightField
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
 from pipeline.truth.geometry.symmetry import orbits
 
-_LEAST: Final = 0.02  # least deviation of a horizon, in sines: what a map of nearest nodes does not know
+_LEAST: Final = 0.02  # least deviation of a horizon, in sines: below the resolution of a map of nearest nodes
 
 # Columns of `GaussNodes.pieces`: first node, nodes along x and y, rules along x and y, first copy and number of copies.
 FIRST, COUNT_X, COUNT_Y, RULE_X, RULE_Y, COPY, COPIES = range(7)

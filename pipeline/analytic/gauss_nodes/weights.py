@@ -1,4 +1,4 @@
-"""Which share of a wide footprint falls on each fixed node.
+"""Weights of the fixed nodes under a wide footprint.
 
 The weight of a node is the Gaussian there, summed over all cells alike and over all images of the repeat: products of
 one sum an axis, or a mixture of these for a rotated footprint (pipeline.truth.footprint.mixture).
@@ -17,7 +17,7 @@ from pipeline.compiled.decorators import fast_kernel
 
 @fast_kernel
 def even_densities(weights: Float32, s: np.float32, out: Float32) -> None:
-    """Write what `axis_densities` tends to for a wide Gaussian: the nodes' weights, as high as its mean."""
+    """Write the limit of `axis_densities` for a wide Gaussian: the nodes' weights, times its mean density."""
     share = s * np.float32(math.sqrt(2.0 * math.pi)) / np.float32(len(out))
     for c in range(len(out)):
         out[c] = weights * share

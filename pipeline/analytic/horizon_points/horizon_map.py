@@ -1,9 +1,9 @@
-"""A horizon map of the repeat: for any point the nearest node's horizon, and what its surface is, without branches.
+"""A horizon map of the repeat: the surface at any point and the horizon of the nearest node, without branches.
 
 Every piece of yarn that is seen from above in a cell is one block of GRID x GRID nodes, evenly spaced in the angle v
 across the yarn and evenly along it; cells that a translation of the cloth carries into one another share their blocks.
-A node knows the sine of its horizon's elevation for evenly spaced azimuths. Memory instead of ray marching, as with
-Max's horizon maps (1988); what it costs in exactness is that borders of shadows move by up to half a node.
+A node holds the sine of its horizon's elevation for evenly spaced azimuths, as in Max's horizon maps (1988): memory
+replaces ray marching. The price is that borders of shadows move by up to half a node.
 """
 
 from __future__ import annotations

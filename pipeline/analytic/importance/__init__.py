@@ -1,1 +1,1 @@
-"""Directions drawn from what a footprint scatters, with their exact density: point, lobes."""
+"""Importance sampling of the light scattered by a footprint, with exact densities: point, lobes."""

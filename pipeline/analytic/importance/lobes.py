@@ -3,13 +3,13 @@
     pdf(wi) = P_front <wi.n_s> / pi + P_back <-wi.n_s> / pi + sum_k P_k D_k(h) / (4 sigma_k(wo))
 
 The points are the first of a low-discrepancy sequence in the footprint, the same at every call, so that the density of
-a sample is known exactly. Each stands for more than itself: where tangents differ from point to point by s, its
+a sample is known exactly. Each represents its surroundings: where tangents differ from point to point by s, its
 roughness is widened to alpha^2 + (widening s / points)^2; and one broad lobe a family, as wide as all its tangents, has
 `BROAD` of its share, so that nothing between the points is without a sample. At a small footprint all points are alike,
 and the mixture is the exact sampler of a point (pipeline.analytic.importance.point) beside the cosines of the diffuse
 light.
 
-A lobe's share is its visible area, times k_s, times what the layer scatters once, about half of 1 - exp(-T Lambda); a
+A lobe's share is its visible area, times k_s, times the light scattered once by the layer, about half of 1 - exp(-T Lambda); a
 cosine's is visible area times k_d, on the other side k_dt. No shadows of the light enter: they change the variance, not
 the density.
 """
@@ -31,7 +31,7 @@ from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
 from pipeline.truth.geometry.visibility import ray, visible
 from pipeline.truth.scattering.microflake import sigma
 
-_SCATTERED: Final = 0.5  # of what meets a flake leaves without a second one, roughly
+_SCATTERED: Final = 0.5  # share of the light that meets a flake and leaves without meeting a second one, roughly
 BROAD: Final = 0.2
 """Share of a family's lobes that its broad one has."""
 

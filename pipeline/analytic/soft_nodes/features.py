@@ -1,4 +1,4 @@
-"""What a network reads of the sums of a query, and the components that the sums alone give.
+"""Features of a query for a network, and the components by the soft nodes alone.
 
 Ratios and bounded numbers only. Mirror images of a query, x -> -x and y -> -y, are the same query of a mirrored cloth:
 the half vector is brought to x, y >= 0, and what remains of the cloth is the sense of its twists. Exchanging x and y
@@ -6,10 +6,10 @@ exchanges warp and weft: that is a permutation of the features and of the compon
 
 The components of a patch hidden almost wholly fade to 0: the truth of most such patches is that nothing at all is seen.
 
-Beside each component stands what it would be without shadows of the light. That is a mean of the point model over nodes
+Each component comes with its value without shadows of the light. That value is a mean of the point model over nodes
 whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
 every node, so the diffuse components without shadows integrate to at most 1, and nothing below them makes light. The
-specular ones, scattered once, stay far below 1 (the slab reflects less than half of what it meets).
+specular ones, scattered once, stay far below 1 (the slab reflects less than half of the light).
 
     0-7, 8-15   of warp, of weft: share of the area seen; how much is seen of the bare area, diffuse and specular; how
                 much of the latter two is in doubt; specular and diffuse component
@@ -59,7 +59,7 @@ EXCHANGED: Final = np.array(
 """Where each feature comes from when x and y are exchanged."""
 
 EXCHANGED_SIGN: Final = np.array([-1.0 if k in (28, 29) else 1.0 for k in range(FEATURES)], np.float32)
-"""What it is then multiplied with: a mirror reverses the twists."""
+"""Its factor then: a mirror reverses the twists."""
 
 _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least
@@ -84,7 +84,7 @@ def _assemble(
     components: Float32,
     bounds: Float32,
 ) -> None:
-    """Turn sums into features (N, FEATURES), components (N, 4), and what these are without shadows (N, 4)."""
+    """Turn sums into features (N, FEATURES), components (N, 4), and components without shadows (N, 4)."""
     for n in range(len(found)):
         bare = found[n, 0, BARE_AREA] + found[n, 1, BARE_AREA] + gaps[n]
         area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], _LEAST * bare) + _TINY
@@ -126,14 +126,14 @@ def _assemble(
 
 
 class Reading(NamedTuple):
-    """What is read of N queries.
+    """Features and components of N queries.
 
     Attributes
     ----------
     features : float32 (N, FEATURES)
         For the network.
     components : float32 (N, 4)
-        What the sums alone answer.
+        By the soft nodes alone.
     bounds : float32 (N, 4)
         The same without shadows of the light.
     """
@@ -144,7 +144,7 @@ class Reading(NamedTuple):
 
 
 def cloth_features(table: Table) -> Float32:
-    """Return what is the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
+    """Return the features that are the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
     yarn = table.yarn.astype(np.float64)
     by_family = [
         np.log(yarn[:, ALPHA]) / 2.0 + 0.5,

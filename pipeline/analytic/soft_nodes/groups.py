@@ -18,11 +18,11 @@ MOST_NODES: Final = {TOP: 256, UNDER: 128}
 """Nodes of all groups on top, and of all beneath, above which groups are merged."""
 
 COLUMNS: Final = 8
-"""Nodes across a yarn: a line of them is half of what the vector units take at a time."""
+"""Nodes across a yarn: half the width of the vector units."""
 
 _ALONG = ((1.5, 4), (2.5, 3))  # nodes along a cell of a float shorter than
 _LONG = 2  # and of any longer one
-_STRIP = 3.0  # nodes a yarn spacing along what shows beneath, and along gaps
+_STRIP = 3.0  # nodes a yarn spacing along the visible part of a yarn beneath, and along gaps
 
 Cell = tuple[int, int]
 

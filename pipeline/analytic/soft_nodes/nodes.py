@@ -69,7 +69,7 @@ class Table(NamedTuple):
     nodes : float32 (B, ROWS, BLOCK_NODES)
         See `surface`.
     evenly : float32 (B, BLOCK_NODES)
-        Share of the cloth's area that a node stands for.
+        Share of the cloth's area that a node represents.
     mean, sharpness : float32 (AZIMUTHS, B, BLOCK_NODES)
         Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
     groups : uint32 (K, 5)
@@ -160,10 +160,10 @@ def tabulate(fabric: Fabric) -> Table:
     evenly, mean = np.zeros(stop), np.zeros((AZIMUTHS, stop))
     variance = np.ones((AZIMUTHS, stop))
     for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
-        lanes = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
-        nodes[:, lanes] = piece_rows(front.yarn, group.piece, across, along)
-        evenly[lanes] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
-        mean[:, lanes], variance[:, lanes] = _soft_horizons(group, across, along, grid)
+        indices = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
+        nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
+        evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
+        mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
     used = list({id(one): one for pair in rules for one in pair}.values())
     number = {id(one): index for index, one in enumerate(used)}
     waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))

@@ -32,7 +32,7 @@ STEEPEST: Final = 0.999
 
 
 def piece_rows(yarn: Float64, piece: Piece, across: Rule, along: Rule) -> Float64:
-    """Return what nodes know of the surface, (ROWS, nodes); nodes across the yarn follow each other.
+    """Return the surface at nodes, (ROWS, nodes); nodes across the yarn follow each other.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.geometry.heightfield import WEFT
 
 MOST_WAVES: Final = 24
-"""Waves kept: as many cost about what the densities of all cells do."""
+"""Most waves kept: they cost about as much time as the densities of all cells."""
 
 HIGHEST: Final = 10
 """Largest number of periods in a repeat, along x and along y."""
@@ -41,7 +41,7 @@ class Waves(NamedTuple):
     nodes : float32 (H, 2, nodes)
         Twice the cosine and the sine at the nodes, mean over all cells of a group.
     enough_from : float
-        Deviation from which on what is missing is faint.
+        Deviation from which on the missing waves are faint.
     """
 
     periods: Index
@@ -69,7 +69,7 @@ def tabulate_waves(
     groups, rules, starts
         Kinds, their rules across and along, and the first node of each.
     nodes : int
-        Nodes of all groups and of what fills their blocks.
+        Nodes of all groups, those that fill up blocks included.
     repeat : (ends, picks)
         Extent of the repeat.
     """
