@@ -153,9 +153,9 @@ def _note(
 
 def _taught(recipe: Recipe, model: ModelRecipe) -> str:
     """Say which other recipe trains a model."""
-    teacher = recipe.teacher_of(model)
-    own = "" if teacher.dataset.queries == recipe.dataset.queries else ", on queries of its own"
-    return "" if teacher is recipe else f"; trained by the recipe {teacher.name}{own}"
+    trainer = recipe.trainer_of(model)
+    own = "" if trainer.dataset.queries == recipe.dataset.queries else ", on queries of its own"
+    return "" if trainer is recipe else f"; trained by the recipe {trainer.name}{own}"
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:

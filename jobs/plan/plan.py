@@ -31,11 +31,11 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
     own = parts[id(recipe)]
     rows, trained = list(own), {}
     for model in (model for model in recipe.models if model.learns):
-        teacher = recipe.teacher_of(model)
-        tasks = trained[model.options.name] = trainings(teacher, model, parts[id(teacher)])
+        trainer = recipe.trainer_of(model)
+        tasks = trained[model.options.name] = trainings(trainer, model, parts[id(trainer)])
         # Of another recipe's rows those that its model learns from.
         read = {need for task in tasks.values() for need in task.needs}
-        rows += [part for part in parts[id(teacher)] if part.id in read]
+        rows += [part for part in parts[id(trainer)] if part.id in read]
     subjects = Subjects(recipe, own, trained)
     benches = measurements(subjects)
     every = [task for tasks in trained.values() for task in tasks.values()]

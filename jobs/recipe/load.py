@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from jobs.recipe.recipe import Recipe, RecipeFile
-from jobs.recipe.trained_by import refuse_unlike, with_teachers
+from jobs.recipe.trained_by import check_trained_by, with_trained_by
 from jobs.recipe.validation import validate_recipe
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.shipped import SHIPPED
@@ -62,7 +62,7 @@ def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
         read[found] = _load(found, chain[:-1])
         return read[found]
 
-    content, teachers = with_teachers(read_toml(path), where, load)
+    content, trained_by = with_trained_by(read_toml(path), where, load)
     file = validated(RecipeFile, content, where)
     dataset = file.dataset
     recipe = Recipe(
@@ -74,10 +74,10 @@ def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
         seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
         population=tuple(population_fabrics(dataset.population)),
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
-        teachers=teachers,
+        trained_by=trained_by,
     )
     validate_recipe(recipe, where)
-    refuse_unlike(recipe, where)
+    check_trained_by(recipe, where)
     return recipe
 
 

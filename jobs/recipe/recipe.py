@@ -59,8 +59,8 @@ class DatasetOptions(_Section):
     truth: TruthOptions = TruthOptions()
     """How they are answered."""
     training_truth: TruthOptions | None = None
-    """How training rows are answered; left out: as all others. A training averages noise away that a measurement must
-    not have, so that for the same time many coarse rows teach more than few fine ones."""
+    """How training rows are answered; left out: as all others. A training averages over the noise of its rows, so many
+    coarse rows give a better model than the few exact ones that take the same time."""
 
     def truth_of(self, split: str) -> TruthOptions:
         """Return how the rows of a split are answered."""
@@ -145,7 +145,7 @@ class Recipe:
         Measurements.
     seen, population, unseen : tuple of Fabric
         The fabrics in the order of the recipe.
-    teachers : mapping
+    trained_by : mapping
         From the names of models that another recipe trains to that recipe.
     """
 
@@ -157,7 +157,7 @@ class Recipe:
     seen: tuple[Fabric, ...]
     population: tuple[Fabric, ...]
     unseen: tuple[Fabric, ...]
-    teachers: Mapping[str, Recipe] = field(default_factory=dict)
+    trained_by: Mapping[str, Recipe] = field(default_factory=dict)
 
     @property
     def fabrics(self) -> tuple[Fabric, ...]:
@@ -167,13 +167,13 @@ class Recipe:
     @property
     def own_models(self) -> list[ModelRecipe]:
         """The models that no other recipe trains."""
-        return [model for model in self.models if model.options.name not in self.teachers]
+        return [model for model in self.models if model.options.name not in self.trained_by]
 
     @property
     def together(self) -> list[Recipe]:
         """The recipes whose rows are read: itself and those that train models of it, each once."""
-        return list({id(recipe): recipe for recipe in (self, *self.teachers.values())}.values())
+        return list({id(recipe): recipe for recipe in (self, *self.trained_by.values())}.values())
 
-    def teacher_of(self, model: ModelRecipe) -> Recipe:
+    def trainer_of(self, model: ModelRecipe) -> Recipe:
         """Return the recipe that trains a model: this one, unless the model names another."""
-        return self.teachers.get(model.options.name, self)
+        return self.trained_by.get(model.options.name, self)

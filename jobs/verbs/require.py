@@ -180,8 +180,8 @@ def _fallback_share(
     model: ModelRecipe, queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
 ) -> float | None:
     """Return the fallback share of a model; None if it does not cover the fabrics."""
-    teacher = general.teacher_of(model)
-    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in teacher.seen + teacher.unseen}:
+    trainer = general.trainer_of(model)
+    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in trainer.seen + trainer.unseen}:
         return None
     return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in queries_by_fabric.items()])
 

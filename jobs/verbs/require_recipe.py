@@ -77,7 +77,7 @@ def write_recipe(
         If the model has no such options, or the recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
-    general = general.teacher_of(model)
+    general = general.trainer_of(model)
     queries = requirement.queries(model.options.kinds)
     worn = {name: fabrics[name] for name in requirement.fabrics}
     table: dict[str, Any] = {

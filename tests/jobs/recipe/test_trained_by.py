@@ -12,7 +12,7 @@ from jobs.run.ledger import Ledger
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput
 
-TEACHER = """
+TRAINER = """
 name = "bent"
 
 [dataset]
@@ -80,8 +80,8 @@ SHEER = '\n[[models]]\nname = "woven_sheer"\nrecipe = "sheer.toml"\n'
 def asks(files):
     """The recipe `tiny`, which has `curved` trained by the recipe `bent` beside it."""
 
-    def write(teacher=TEACHER, entry=OTHER, name="bent"):
-        (files.folder / f"{name}.toml").write_text(teacher, encoding="utf-8")
+    def write(trainer=TRAINER, entry=OTHER, name="bent"):
+        (files.folder / f"{name}.toml").write_text(trainer, encoding="utf-8")
         files.text = files.recipe.replace("[bench]", f"{entry}\n[bench]")
         return load_recipe(files.write())
 
@@ -96,7 +96,7 @@ def test_the_other_recipe_says_everything(asks, files):
     recipe = asks()
     bent = load_recipe(files.folder / "bent.toml")
     assert recipe.models[-1] == bent.models[0]
-    assert recipe.teachers.keys() == {"curved"} and recipe.teachers["curved"].name == "bent"
+    assert recipe.trained_by.keys() == {"curved"} and recipe.trained_by["curved"].name == "bent"
     assert [model.options.name for model in recipe.own_models] == ["woven", "neumip", "point_sampled"]
 
 
@@ -143,8 +143,8 @@ def test_this_recipes_own_rows_and_trainings_stay_what_they_are(asks, files):
     ],
 )
 def test_what_is_trained_again(asks, old, new, retrained):
-    assert TEACHER.count(old) == 1
-    before, after = plan(asks()), plan(asks(TEACHER.replace(old, new)))
+    assert TRAINER.count(old) == 1
+    before, after = plan(asks()), plan(asks(TRAINER.replace(old, new)))
     assert (ids(before, "train", "curved") != ids(after, "train", "curved")) == retrained
     assert ids(before, "train", "woven") == ids(after, "train", "woven")
     changed = ids(before, "bench", "curved on denim") != ids(after, "bench", "curved on denim")
@@ -223,7 +223,7 @@ def test_a_recipe_may_pass_on_what_a_third_one_trains(asks, files):
     middle = files.recipe.replace('name = "tiny"', 'name = "middle"').replace("[bench]", f"{OTHER}\n[bench]")
     entry = '\n[[models]]\nname = "curved"\nrecipe = "middle.toml"\n'
     recipe = asks(middle, entry, "middle")
-    assert recipe.teachers["curved"].name == "bent"
+    assert recipe.trained_by["curved"].name == "bent"
 
 
 def test_ways_to_run_are_this_recipes_to_say(asks, files):
@@ -277,7 +277,7 @@ def test_bad_input_is_one_sentence(asks, entry, words):
 
 
 def test_recipes_that_wait_for_one_another(asks):
-    back = TEACHER + '\n[[models]]\nmodel = "woven"\nrecipe = "tiny.toml"\n'
+    back = TRAINER + '\n[[models]]\nmodel = "woven"\nrecipe = "tiny.toml"\n'
     with pytest.raises(BadInput, match="wait for one another: tiny → bent → tiny"):
         asks(back)
 
@@ -286,7 +286,7 @@ def test_another_cloth_of_the_same_name(asks, files):
     (files.folder / "other").mkdir()
     (files.folder / "other" / "own.toml").write_text(files.fabric.replace("roughness = 0.3", "roughness = 0.31"))
     with pytest.raises(BadInput, match="another cloth is called own there"):
-        asks(TEACHER.replace('"own.toml"', '"other/own.toml"'))
+        asks(TRAINER.replace('"own.toml"', '"other/own.toml"'))
 
 
 BENCH_WITHOUT_SHADOWS = """

@@ -118,9 +118,12 @@ def test_a_model_can_be_made_smaller(tmp_path):
 
 
 def test_options_of_a_model_are_kept(tmp_path):
+    """But for the largest curvature, where the scene's is beyond it: the rows would be refused in training."""
     curved = load_recipe("curved")
     own = narrowed(tmp_path / "r.toml", curved, "curved_grazing", requirement=require(curved.dataset.queries))
-    assert own.models[0].options == CurvedOptions(name="curved_grazing", silhouette="grazing")
+    bent = own.dataset.queries.curvature[1]
+    assert bent > CurvedOptions().largest_curvature
+    assert own.models[0].options == CurvedOptions(name="curved_grazing", silhouette="grazing", largest_curvature=bent)
 
 
 def test_scenes_and_fabrics_by_path_are_found_from_anywhere(tmp_path, monkeypatch, files):
