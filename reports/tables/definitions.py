@@ -54,7 +54,7 @@ DEFINITIONS: Final = {
     "bytes stored. Not of a GPU.",
     "× time": "That time over the time of point sampling at 2 points.",
     "front": "The methods that no other beats on both error (relative RMSE of the colour; in scenes, MSE) and time, in "
-    "other plots on both axes. Only methods that cover the same fabrics are compared; errors in the noise are left out.",
+    "other plots on both axes. Only methods that cover the same fabrics are compared, without errors in the noise.",
     "eager-bf16, eager-fp16, compile, onnx, onnx-int8": "A trained network with the same weights in another runtime: "
     "products of matrices in half precision, compiled by torch, by ONNX Runtime, with weights and activations of 8 "
     "bits. Runtimes in single precision agree with the network itself to 1e-4.",
