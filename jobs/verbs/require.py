@@ -193,7 +193,7 @@ def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[st
     """
     import numpy as np
 
-    from pipeline.models.fallback import fallback
+    from pipeline.models.fallback import fallback_answers
     from pipeline.truth.estimator import estimate
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
@@ -205,9 +205,9 @@ def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[st
         rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(queries_by_fabric)]
         if not rows.size:
             continue
-        fallback(fabrics[name], queries.take(rows[:2]), 0)  # builds the tables
+        fallback_answers(fabrics[name], queries.take(rows[:2]), 0)  # builds the tables
         start = time.perf_counter()
-        answers = fallback(fabrics[name], queries.take(rows), 0)
+        answers = fallback_answers(fabrics[name], queries.take(rows), 0)
         seconds, count = seconds + time.perf_counter() - start, count + rows.size
         truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
         colour = truth @ COLOUR_WEIGHTS

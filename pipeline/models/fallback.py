@@ -48,7 +48,7 @@ FLAT: Final = 0.1
 answers by .1 to .3 % with the light behind and by 1 % with it in front; at grazing angles by up to 7 %."""
 
 
-def fallback(fabric: Fabric, queries: Queries, seed: int) -> Float32:
+def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     """Answer N queries of any kind, float32 (N, 4); `seed` names the points of what is sampled."""
     turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
     flat = queries._replace(curvature=np.where(turned <= FLAT, np.float32(0.0), queries.curvature))
@@ -103,7 +103,7 @@ class Fallback:
         if not strange.any():
             return self._method.predict(fabric, self._known(fabric, queries), seed)
         result = np.empty((len(strange), 4), np.float32)
-        result[strange] = fallback(fabric, queries.take(strange), seed)
+        result[strange] = fallback_answers(fabric, queries.take(strange), seed)
         if not strange.all():
             result[~strange] = self._method.predict(fabric, self._known(fabric, queries.take(~strange)), seed)
         return result

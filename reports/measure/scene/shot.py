@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
-from pipeline.models.fallback import Fallback, fallback
+from pipeline.models.fallback import Fallback, fallback_answers
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
@@ -219,7 +219,7 @@ def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.flo
     """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
-        result[rows] = fallback(fabric, queries.take(rows), seed)
+        result[rows] = fallback_answers(fabric, queries.take(rows), seed)
     return result
 
 

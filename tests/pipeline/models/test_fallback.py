@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.models.domain import Domain
-from pipeline.models.fallback import FLAT, Fallback, fallback
+from pipeline.models.fallback import FLAT, Fallback, fallback_answers
 from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
 from pipeline.models.soft_nodes.model import SoftNodes
@@ -96,7 +96,7 @@ def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
     queries = draw_queries(QueryOptions(sigma=(0.5, 1.0)), denim.weave.repeat, 3, 0, 20)
     assert not fallback.strange(denim, queries).any() and fallback.strange(rough, queries).all()
     found = fallback.predict(rough, queries)
-    np.testing.assert_array_equal(found, fallback(rough, queries, 0))
+    np.testing.assert_array_equal(found, fallback_answers(rough, queries, 0))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT, 0.03), (3.0 * FLAT, 0.1)])
@@ -109,7 +109,7 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
     queries = queries._replace(curvature=(turned / size).astype(np.float32))
     truth = TruthOptions(estimator="owen", min_count=4096, max_count=4096, relative_error=1e-6)
     reference = estimate(fabric, queries, truth, 1).mean
-    wrong = fallback(fabric, queries, 0) - reference
+    wrong = fallback_answers(fabric, queries, 0) - reference
     mean = reference.sum(axis=1).mean()
     assert np.sqrt(np.square(wrong).sum(axis=1).mean()) < bound * mean
 
@@ -128,7 +128,7 @@ def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_met
     assert not strange[~small & ~steep].any()
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
-    np.testing.assert_array_equal(found[strange], fallback(fabric, queries.take(strange), 0))
+    np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
     (asked,) = method.asked
     assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
 
