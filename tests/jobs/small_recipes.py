@@ -17,7 +17,8 @@ def write_small(name, folder):
     """Write the recipe and those that it names into a folder; return its path."""
     content = tomllib.loads((RECIPES / f"{name}.toml").read_text(encoding="utf-8"))
     dataset = content["dataset"]
-    dataset["rows"] = _scaled(Rows(**dataset["rows"]).model_dump(), {"train": 128, "validation": 64, "test": 128})
+    least = {"train": 128, "population": 64, "validation": 64, "test": 128}
+    dataset["rows"] = _scaled(Rows(**dataset["rows"]).model_dump(), least)
     dataset["shard_rows"] = 4096  # each shard is a task
     content["models"] = [_model(entry, folder) for entry in content["models"]]
     content["bench"] = _bench(content.get("bench", {}))

@@ -15,7 +15,8 @@ def test_small_recipes_keep_fabrics_and_models(name, tmp_path):
     assert small.fabrics == whole.fabrics
     assert [model.options.name for model in small.models] == [model.options.name for model in whole.models]
     assert small.dataset.truth == whole.dataset.truth and small.bench.runtimes == whole.bench.runtimes
-    assert small.dataset.rows.train <= max(whole.dataset.rows.train // 100, 128)
+    for split, least in (("train", 128), ("population", 64), ("validation", 64), ("test", 128)):
+        assert getattr(small.dataset.rows, split) <= max(getattr(whole.dataset.rows, split) // 100, least)
 
 
 @pytest.mark.slow
