@@ -175,7 +175,7 @@ names = []
 with announced(names.append):
     small.fast(np.ones(61, np.float32))
 small.plain(np.ones(61, np.float32))
-print(*sorted(name.rpartition("-")[0].rpartition(".")[2] for name in names))
+print(*sorted({name.rpartition("-")[0].rpartition(".")[2] for name in names}))
 """
 
 
