@@ -14,13 +14,14 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from pipeline import versions
 from pipeline.atomic import atomic_write
+from reports.catalogue import METRICS
 from reports.error import Error
 from weaves.errors import BadInput
 
@@ -49,87 +50,16 @@ OF_A_PAGE: Final = "records.json"
 Role = Literal["seen", "unseen"]
 """Whether general models saw the fabric in training."""
 
-Metric = Literal[
-    "mse",
-    "mse_measured",
-    "truth_noise",
-    "colour_rrmse",
-    "rrmse_specular_warp",
-    "rrmse_specular_weft",
-    "rrmse_diffuse_warp",
-    "rrmse_diffuse_weft",
-    "zero_answers",
-    "furnace_diffuse",
-    "furnace_specular",
-    "furnace_colour",
-    "truth_relative_error",
-    "flicker",
-    "motion",
-    "excess_energy",
-    "spectrum",
-    "time",
-    "waited",
-    "bytes_stored",
-    "peak_memory",
-    "prepare_time",
-    "worst_error",
-    "listed_error",
-    "naive_error",
-    "not_finite",
-    "negative",
-    "naive_not_finite",
-    "rate",
-    "true_rmse",
-    "true_error",
-    "stated_error",
-    "points",
-    "query_rate",
-    "points_saved",
-    "reference_error",
-    "bias",
-    "kind_share",
-    "kind_points",
-    "kind_time",
-    "variance_saved",
-    "sample_time",
-    "path_error",
-    "reencode_error",
-    "encode_time",
-    "silhouette_coverage",
-    "silhouette_displacement",
-    "silhouette_light",
-    "size_colour",
-    "size_specular",
-    "size_diffuse",
-    "size_time",
-    "mse_relative",
-    "psnr",
-    "ssim",
-    "flip_ldr",
-    "flip_hdr",
-    "delta_e",
-    "mse_relative_floor",
-    "psnr_floor",
-    "ssim_floor",
-    "flip_ldr_floor",
-    "flip_hdr_floor",
-    "delta_e_floor",
-    "fovvideovdp",
-    "frame_time",
-    "fallback_share",
-    "not_run",
-    "extreme_error",
-    "extreme_grazing",
-    "extreme_rounding",
-    "extreme_far",
-    "extreme_large",
-    "extreme_not_finite",
-    "extreme_negative",
-]
-"""Everything that is measured; defined in the page, from `worst_error` on in `reports.truth.stability`, `throughput`,
-`accuracy`, `bias`, `effort`, `latents`, `silhouette` and `equal_time`, from `mse_relative` on in `image_error`,
-`fovvideovdp` and `scene_bench`, from `extreme_error` on in `stability_methods`; `not_run` is 1 for a runtime that the
-machine lacks, its `note` the reason."""
+
+def _known(metric: str) -> str:
+    """Return a metric of the catalogue; ValueError if there is no such row."""
+    if metric not in METRICS:
+        raise ValueError(f"{metric!r} is no metric of reports.catalogue")
+    return metric
+
+
+Metric = Annotated[str, AfterValidator(_known)]
+"""Name of a metric, a key of `reports.catalogue.METRICS`."""
 
 
 class Provenance(BaseModel):
@@ -195,16 +125,15 @@ class Record(BaseModel):
         value: float,
         count: int,
         *,
-        unit: str = "1",
         standard_error: float | None = None,
         low: float | None = None,
         high: float | None = None,
         curve: tuple[tuple[float, float], ...] = (),
         samples: tuple[float, ...] = (),
     ) -> Record:
-        """Return another number measured on the same subject."""
-        number = {"metric": metric, "value": value, "count": count, "unit": unit, "curve": curve, "samples": samples}
-        bounds = {"standard_error": standard_error, "low": low, "high": high}
+        """Return another number measured on the same subject, in the unit of its metric."""
+        number = {"metric": metric, "value": value, "count": count, "unit": METRICS[metric].unit}
+        bounds = {"standard_error": standard_error, "low": low, "high": high, "curve": curve, "samples": samples}
         return Record.model_validate(self.model_dump() | number | bounds)
 
     def of_error(self, error: Error) -> list[Record]:

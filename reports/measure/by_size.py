@@ -97,7 +97,7 @@ def measure_by_size(
             len(queries.u) for members in classes.values() for cloth, queries, _ in members if method.covers(cloth)
         )
         mean = sum(shares[low] * ns for low, ns in times[index])
-        records.append(subject.of("size_time", mean, count, unit="ns/query", curve=tuple(times[index])))
+        records.append(subject.of("size_time", mean, count, curve=tuple(times[index])))
         for name, (metric, _) in MEASURES.items():
             curve = errors[index, name]
             # Squared errors add up: over all classes they weigh as their queries occur.

@@ -141,9 +141,9 @@ def measure_timing(
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
         entries.append((subject, affordable(Contender(method.predict, covered))))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
-        records.append(subject.of("bytes_stored", stored, len(covered), unit="B"))
+        records.append(subject.of("bytes_stored", stored, len(covered)))
         memory = peak_memory(partial(method.predict, *covered[0]))
-        records += [subject.of("peak_memory", memory, 3, unit="B")] if memory is not None else []
+        records += [subject.of("peak_memory", memory, 3)] if memory is not None else []
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
     exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
     entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
@@ -163,7 +163,7 @@ def _times(entries: Sequence[tuple[Record, Contender]], options: TimingOptions) 
         low, median, high = timing.quartiles
         about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
         repeats, samples = len(timing.samples), timing.samples
-        records.append(about.of("time", median, repeats, unit="ns/query", low=low, high=high, samples=samples))
+        records.append(about.of("time", median, repeats, low=low, high=high, samples=samples))
         if math.isfinite(timing.waited):
             records.append(subject.of("waited", timing.waited, repeats))
     return records
@@ -182,7 +182,7 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
             return []
         times.append(milliseconds(partial(method.prepare, new)))
     low, median, high = quartiles(times)
-    found = subject.of("prepare_time", median, len(times), unit="ms", low=low, high=high, samples=tuple(times))
+    found = subject.of("prepare_time", median, len(times), low=low, high=high, samples=tuple(times))
     return [found]
 
 

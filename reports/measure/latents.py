@@ -155,7 +155,7 @@ def measure_edits(
         times = tuple(milliseconds(partial(method.prepare, one)) for one in edited)[1:]
         low, median, high = quartiles(times)
         found = subject.model_copy(update={"note": about})
-        records.append(found.of("encode_time", median, repeats, unit="ms", low=low, high=high, samples=times))
+        records.append(found.of("encode_time", median, repeats, low=low, high=high, samples=times))
     return records
 
 

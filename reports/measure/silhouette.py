@@ -178,7 +178,7 @@ def measure_silhouette(
     pixels = reference.coverage.size
     return [
         subject.of("silhouette_coverage", found.coverage_rmse, pixels),
-        subject.of("silhouette_displacement", found.displacement, options.rows, unit="yarn spacings"),
+        subject.of("silhouette_displacement", found.displacement, options.rows),
         subject.of("silhouette_light", found.light_rmse, pixels),
     ]
 

@@ -20,7 +20,7 @@ from reports.page.picture_strips import films, strips
 from reports.record import TRUTH, Record
 from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.caveats import caveats, lacking, unseen_by_eye
-from reports.tables.definitions import DEFINITIONS
+from reports.tables.definitions import definitions
 from reports.tables.headline import headline, learnt
 from reports.tables.machine_load import waiting
 from reports.tables.number_format import display, percent, plain
@@ -44,6 +44,7 @@ SECTIONS: Final = {
     "latents": "Between fabrics",
     "silhouettes": "Silhouettes",
     "time": "Time and storage",
+    "other": "Other measurements",
     "stability": "Stability",
     "rates": "Speed of the truth",
     "accuracy": "Cost of accuracy",
@@ -79,7 +80,7 @@ def page_html(page: PageInput, tables: Mapping[str, pd.DataFrame], plots: Collec
         "plots": plots,
         "plot_titles": PLOT_TITLES,
         "alt_texts": alt_texts(tables),
-        "definitions": DEFINITIONS,
+        "definitions": definitions(),
         "schemes": schemes(page),
         "display": display,
         "table_names": sorted(tables),
@@ -97,7 +98,7 @@ def page_html(page: PageInput, tables: Mapping[str, pd.DataFrame], plots: Collec
 
 def _methods(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """Return sentences and rows about the methods."""
-    errors, timing = tables["errors"], tables["timing"]
+    errors, timing, other = tables["errors"], tables["timing"], summary.other_table(page.records)
     per_material = [note.name for note in page.models if note.per_material]
     without_training = untrained(page)
     return {
@@ -125,6 +126,8 @@ def _methods(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, A
         "shares": [f"t = {share:g}" for share in latents.SHARES],
         "extremes": method_rows.extreme_rows(extremes_table(page.records)),
         "extreme_columns": method_rows.EXTREMES,
+        "other": method_rows.other_rows(other),
+        "other_columns": method_rows.other_columns(other),
         "caveats": [
             *caveats(page.options, per_material, errors),
             *waiting(page.records),

@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 
 from pipeline.atomic import atomic_write
+from reports.catalogue import OTHER
 from reports.images import tiles
 from reports.images.exr import read_exr
 from reports.images.film import film
@@ -85,6 +86,9 @@ def page_tables(records: Sequence[Record]) -> dict[str, pd.DataFrame]:
     between = summary.path_table(records)
     if len(between):
         tables["between"] = between
+    other = summary.other_table(records)
+    if len(other):
+        tables[OTHER] = other
     extremes = extremes_table(records)
     if len(extremes):
         tables["extremes"] = extremes

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from reports.catalogue import METRICS, MetricRow
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
 from reports.record import TRUTH, Record
@@ -24,7 +25,7 @@ from reports.tables.number_format import (
     percent,
     plain,
     scientific,
-    signed,
+    shown,
     significant,
     size,
     times,
@@ -74,13 +75,13 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
         known = row.role == "unseen" and row.method in per_material
         line = row_of(row.method, row.setting) | {
             "cells": [
-                scientific(row.mse),
+                shown("mse", row.mse),
                 f"{scientific(row.low)} … {scientific(row.high)}",
                 percent(row.noise_share),
                 times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
                 interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
-                fixed(row.colour_rrmse),
-                *(fixed(getattr(row, f"rrmse_{name}")) for name in COMPONENTS),
+                shown("colour_rrmse", row.colour_rrmse),
+                *(shown(metric, getattr(row, metric)) for metric in (f"rrmse_{name}" for name in COMPONENTS)),
             ],
         }
         line["label"] += " *" if known else ""
@@ -141,7 +142,9 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     roles = list(dict.fromkeys(aliasing["role"])) if len(aliasing) else []
     found: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in rows(aliasing):
-        found.setdefault((row.method, row.setting), {})[row.role] = [signed(row.flicker), signed(row.excess_energy)]
+        found.setdefault((row.method, row.setting), {})[row.role] = [
+            shown(metric, getattr(row, metric)) for metric in ("flicker", "excess_energy")
+        ]
     lines = [
         row_of(*key) | {"cells": [text for role in roles for text in by_role.get(role, [NONE, NONE])]}
         for key, by_role in found.items()
@@ -149,7 +152,7 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     return {
         "groups": groups(lines),
         "columns": [f"{name}, {role}" for role in roles for name in ("flicker", "excess energy")],
-        "motion": scientific(float(np.mean(motion))) if motion else NONE,
+        "motion": shown("motion", float(np.mean(motion))) if motion else NONE,
     }
 
 
@@ -214,9 +217,9 @@ def timing_rows(timing: pd.DataFrame) -> list[Row]:
                     significant(row.frame_ms),
                     significant(row.most_threads_ns),
                     significant(row.most_threads_frame_ms),
-                    significant(row.prepare_ms),
-                    size(row.memory) if not row.memory < UNSURE else "below " + size(UNSURE),
-                    NONE if row.method == TRUTH else size(row.bytes_stored),
+                    shown("prepare_time", row.prepare_ms),
+                    shown("peak_memory", row.memory) if not row.memory < UNSURE else "below " + size(UNSURE),
+                    NONE if row.method == TRUTH else shown("bytes_stored", row.bytes_stored),
                 ],
             }
             for row in rows(timing)
@@ -297,6 +300,26 @@ def edit_rows(records: Sequence[Record]) -> list[list[str]]:
         for record in records
         if record.metric == "encode_time"
     ]
+
+
+def other_columns(table: pd.DataFrame) -> list[str]:
+    """Return the columns of `other_rows` after the method: title, unit, and which direction is better."""
+    return [_heading(METRICS[name]) for name in table.columns[2:]]
+
+
+def other_rows(table: pd.DataFrame) -> list[Row]:
+    """Return the rows of the metrics without a table of their own, in groups."""
+    metrics = table.columns[2:]
+    lines = [
+        row_of(line["method"], line["setting"]) | {"cells": [shown(metric, line[metric]) for metric in metrics]}
+        for line in table.to_dict("records")
+    ]
+    return groups(lines)
+
+
+def _heading(metric: MetricRow) -> str:
+    unit = "" if metric.unit == "1" else f", {metric.unit}"
+    return f"{metric.title}{unit}" + (f" ({metric.better} is better)" if metric.better else "")
 
 
 def _split(label: str) -> tuple[str, str]:

@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from reports.catalogue import METRICS, Format
+
 NONE = "–"
 
 NO_BREAK: Final = "\N{NO-BREAK SPACE}"
@@ -113,3 +115,22 @@ def listed(words: Sequence[str]) -> str:
 def missing(value: float | None) -> bool:
     """Say whether there is no finite number."""
     return value is None or not math.isfinite(value)
+
+
+_FORMATS: Final[dict[Format, Callable[[float], str]]] = {
+    "scientific": scientific,
+    "signed": signed,
+    "percent": percent,
+    "whole percent": lambda value: percent(value, 0),
+    "three decimals": fixed,
+    "two decimals": lambda value: fixed_to(value, 2),
+    "one decimal": lambda value: fixed_to(value, 1),
+    "significant": significant,
+    "grouped": grouped,
+    "bytes": size,
+}
+
+
+def shown(metric: str, value: float) -> str:
+    """Return the value of a metric in its format (`reports.catalogue`)."""
+    return _FORMATS[METRICS[metric].format](value)

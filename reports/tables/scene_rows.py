@@ -9,19 +9,17 @@ from typing import Any, Final
 
 import pandas as pd
 
+from reports.catalogue import METRICS
 from reports.tables.method_rows import Row, groups, row_of
 from reports.tables.number_format import (
     NO_BREAK,
     NONE,
     beyond_noise,
-    fixed,
-    fixed_to,
     missing,
     percent,
     scientific,
     scientific_interval,
-    signed,
-    significant,
+    shown,
     times,
 )
 from reports.tables.summary import rows
@@ -49,20 +47,27 @@ class Column:
         return " … ".join("0" if end <= 0 else self.worded(end).removesuffix(" %") for end in (low, high))
 
 
+def _of_metric(metric: str, floor: str = "", in_powers: bool = False) -> Column:
+    """Return the column of a metric: title, unit and format are those of the catalogue."""
+    row = METRICS[metric]
+    title = f"{row.title}, {row.unit}" if row.unit in ("dB", "JOD") else row.title
+    return Column(title, metric, lambda value: shown(metric, value), floor, in_powers)
+
+
 COLUMNS: Final = (
     Column("colour", "colour_rrmse", lambda value: beyond_noise(value, percent)),
     Column("MSE", "mse", lambda value: beyond_noise(value, scientific), "truth_noise", in_powers=True),
     Column(f"×{NO_BREAK}lower", "ratio", times),
-    Column("PSNR, dB", "psnr", lambda value: fixed_to(value, 1), "psnr_floor"),
-    Column("SSIM", "ssim", fixed, "ssim_floor"),
-    Column("FLIP", "flip_ldr", fixed, "flip_ldr_floor"),
-    Column("HDR-FLIP", "flip_hdr", fixed, "flip_hdr_floor"),
-    Column("ΔE", "delta_e", lambda value: fixed_to(value, 2), "delta_e_floor"),
-    Column("flicker", "flicker", signed, in_powers=True),
-    Column("excess energy", "excess_energy", signed),
-    Column("FovVideoVDP, JOD", "fovvideovdp", lambda value: fixed_to(value, 2)),
-    Column("fallback share", "fallback_share", lambda value: percent(value, 0)),
-    Column("ms a frame", "frame_time", significant),
+    _of_metric("psnr", "psnr_floor"),
+    _of_metric("ssim", "ssim_floor"),
+    _of_metric("flip_ldr", "flip_ldr_floor"),
+    _of_metric("flip_hdr", "flip_hdr_floor"),
+    _of_metric("delta_e", "delta_e_floor"),
+    _of_metric("flicker", in_powers=True),
+    _of_metric("excess_energy"),
+    _of_metric("fovvideovdp"),
+    _of_metric("fallback_share"),
+    _of_metric("frame_time"),
 )
 """All columns; `scene_columns` leaves out those without numbers."""
 

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from reports.catalogue import METRICS, OTHER
 from reports.error import ratio
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -212,6 +213,17 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     base = result.loc[of_baseline(result), "median_ns"]
     result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
     return result
+
+
+def other_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the metrics without a table of their own: one row a method, one column a metric, means over Records."""
+    table = to_table(records)
+    names = [name for name, row in METRICS.items() if row.table == OTHER and (table["metric"] == name).any()]
+    if not names:
+        return pd.DataFrame(columns=_KEYS)
+    chosen = table[table["metric"].isin(names)]
+    wide = chosen.pivot_table("value", _KEYS, "metric", "mean", sort=False)[names]
+    return wide.reset_index().rename_axis(columns=None)
 
 
 def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float, float]]]:

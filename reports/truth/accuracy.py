@@ -141,13 +141,13 @@ def _spread(random: Sequence[Accuracy]) -> float:
 RECORDS: Final = RowRecords(
     Accuracy,
     {
-        "rmse": ("true_rmse", "1"),
-        "true_error": ("true_error", "1"),
-        "stated_error": ("stated_error", "1"),
-        "points": ("points", "points/query"),
-        "rate": ("query_rate", "queries/s"),
-        "saved": ("points_saved", "1"),
-        "reference": ("reference_error", "1"),
+        "rmse": "true_rmse",
+        "true_error": "true_error",
+        "stated_error": "stated_error",
+        "points": "points",
+        "rate": "query_rate",
+        "saved": "points_saved",
+        "reference": "reference_error",
     },
     setting=("setting",),
 )

@@ -103,7 +103,7 @@ def bias_of(found: Floats, truth: Floats) -> tuple[float, float]:
 
 RECORDS: Final = RowRecords(
     Bias,
-    {"value": ("bias", "1")},
+    {"value": "bias"},
     setting=("side", "component"),
     once={"standard_error": "standard_error"},
     joint=": ",

@@ -106,7 +106,7 @@ def _seconds(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
 
 RECORDS: Final = RowRecords(
     Effort,
-    {"share": ("kind_share", "1"), "points": ("kind_points", "points/query"), "seconds": ("kind_time", "s/query")},
+    {"share": "kind_share", "points": "kind_points", "seconds": "kind_time"},
     setting=("kind",),
 )
 """Efforts as Records."""

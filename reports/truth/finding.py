@@ -170,12 +170,12 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
 RECORDS: Final = RowRecords(
     Finding,
     {
-        "worst": ("worst_error", "1"),
-        "listed": ("listed_error", "1"),
-        "naive": ("naive_error", "1"),
-        "not_finite": ("not_finite", "1"),
-        "negative": ("negative", "1"),
-        "naive_not_finite": ("naive_not_finite", "1"),
+        "worst": "worst_error",
+        "listed": "listed_error",
+        "naive": "naive_error",
+        "not_finite": "not_finite",
+        "negative": "negative",
+        "naive_not_finite": "naive_not_finite",
     },
     setting=("expression", "corner"),
     method_field="arithmetic",

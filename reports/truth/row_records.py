@@ -1,6 +1,6 @@
 """Dataclasses as Records and back: one Record for each measured field of a row.
 
-`RowRecords` describes a class of rows once: the fields that name what was measured, and the metric and unit of each
+`RowRecords` describes a class of rows once: the fields that name what was measured, and the metric of each
 measured field. A field that is NaN has no Record; reading gives it the default of its class.
 """
 
@@ -22,8 +22,8 @@ class RowRecords(Generic[Row]):
 
     row: type[Row]
     """A dataclass."""
-    metrics: Mapping[str, tuple[Metric, str]]
-    """Metric and unit of each measured field."""
+    metrics: Mapping[str, Metric]
+    """Metric of each measured field."""
     setting: tuple[str, ...]
     """Fields that together are the setting, joined by `joint`; only the last one may hold the separator."""
     method: str = TRUTH
@@ -44,7 +44,7 @@ class RowRecords(Generic[Row]):
 
         A row is left out if a field without a default has no Record.
         """
-        names = {metric: name for name, (metric, _) in self.metrics.items()}
+        names = {metric: name for name, metric in self.metrics.items()}
         first = next(iter(names))
         found: dict[tuple[str, str, str], dict[str, Any]] = {}
         for record in records:
@@ -68,10 +68,10 @@ class RowRecords(Generic[Row]):
             fabric=row.get("fabric", ""),
         )
         once = {attribute: row[name] for attribute, name in self.once.items()}
-        for index, (name, (metric, unit)) in enumerate(self.metrics.items()):
+        for index, (name, metric) in enumerate(self.metrics.items()):
             value = float(row[name])
             if not math.isnan(value):
-                record = subject.of(metric, value, row["count"], unit=unit)
+                record = subject.of(metric, value, row["count"])
                 yield record if index else record.model_copy(update=once)
 
     def _named(self, record: Record) -> dict[str, Any]:

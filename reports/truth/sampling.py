@@ -64,7 +64,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Sav
 
 RECORDS: Final = RowRecords(
     Saving,
-    {"variance_saved": ("variance_saved", "1"), "sample_time": ("sample_time", "1")},
+    {"variance_saved": "variance_saved", "sample_time": "sample_time"},
     setting=("sampler",),
     method="sampler",
 )

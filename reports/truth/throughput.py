@@ -78,7 +78,7 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
 
 RECORDS: Final = RowRecords(
     Rate,
-    {"value": ("rate", "1")},
+    {"value": "rate"},
     setting=("what",),
     once={"low": "low", "high": "high", "unit": "unit", "note": "note"},
 )

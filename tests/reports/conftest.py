@@ -133,13 +133,13 @@ def made_up():
             records.append(plane.of("spectrum", 1e-3, 3, curve=curve))
         subject = Record(method=method, setting=setting)
         time = 400 * count + 10 * index
-        records.append(subject.of("time", time, 25, low=0.97 * time, high=1.05 * time, unit="ns/query"))
-        records.append(subject.of("bytes_stored", 2000.0 + index, 3, unit="B"))
+        records.append(subject.of("time", time, 25, low=0.97 * time, high=1.05 * time))
+        records.append(subject.of("bytes_stored", 2000.0 + index, 3))
     for fabric, role in fabrics:
         truth = Record(method="truth", fabric=fabric, role=role)
         records.append(truth.of("truth_relative_error", 0.0151, 400, low=0.01, high=0.02))
         curve = tuple((0.05 + 0.1 * i, 1e-3 * 2.0**-i) for i in range(5))
         plane = truth.model_copy(update={"scene": "plane"})
         records += [plane.of("motion", 0.01, 3), plane.of("spectrum", 1e-3, 3, curve=curve)]
-    records.append(Record(method="truth").of("time", 2e5, 25, low=1.9e5, high=2.1e5, unit="ns/query"))
+    records.append(Record(method="truth").of("time", 2e5, 25, low=1.9e5, high=2.1e5))
     return records

@@ -30,7 +30,7 @@ RECORDS = [
     SUBJECT.of("flicker", -0.125, 8),
     SUBJECT.of("spectrum", 0.5, 8, curve=((0.1, 1.0), (0.2, 0.25))),
     SUBJECT.of("mse", 0.0, 1),
-    SUBJECT.model_copy(update={"threads": 2}).of("time", 1.5, 2, unit="ns/query", samples=(1.0, 2.0)),
+    SUBJECT.model_copy(update={"threads": 2}).of("time", 1.5, 2, samples=(1.0, 2.0)),
 ]
 
 

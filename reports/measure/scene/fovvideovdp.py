@@ -10,7 +10,7 @@ than the quarter of a second that the metric looks back: the first one is taken 
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,6 @@ import numpy.typing as npt
 from reports.options import DisplayOptions
 from reports.record import Record
 from weaves.errors import BadInput
-
-UNIT: Final = "JOD"
 
 
 def absence() -> str:
@@ -65,7 +63,7 @@ def fovvideovdp_records(
 ) -> list[Record]:
     """Return the score as a Record of `subject`; none where pyfvvdp is not installed."""
     score = fovvideovdp(frames, truth, options)
-    return [] if score is None else [subject.of("fovvideovdp", score, len(np.asarray(truth)), unit=UNIT)]
+    return [] if score is None else [subject.of("fovvideovdp", score, len(np.asarray(truth)))]
 
 
 def _metric(options: DisplayOptions) -> Any:

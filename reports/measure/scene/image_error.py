@@ -34,14 +34,8 @@ from weaves.errors import BadInput
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-PERCEIVED: Final[dict[Metric, tuple[Metric, str]]] = {
-    "psnr": ("psnr_floor", "dB"),
-    "ssim": ("ssim_floor", "1"),
-    "flip_ldr": ("flip_ldr_floor", "1"),
-    "flip_hdr": ("flip_hdr_floor", "1"),
-    "delta_e": ("delta_e_floor", "1"),
-}
-"""Measures of what an eye sees: the metric of the noise floor and the unit."""
+PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e")
+"""Perceptual measures; the metric of the noise floor is `<metric>_floor`."""
 
 
 class Measure(NamedTuple):
@@ -76,13 +70,13 @@ class ImageErrors:
             subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
         )
         found.append(subject.of("mse_relative_floor", r.noise, r.count))
-        for metric, (floor, unit) in PERCEIVED.items():
+        for metric in PERCEIVED:
             m = self.perceived[metric]
             low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
             if math.isfinite(m.value):
-                found.append(subject.of(metric, m.value, m.pixels, unit=unit, low=low, high=high))
+                found.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
             if math.isfinite(m.floor):
-                found.append(subject.of(floor, m.floor, m.pixels, unit=unit))
+                found.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
         return found
 
 

@@ -160,7 +160,7 @@ def time_scene(
         low, median, high = quartiles(samples)
         subject = _subject(method, shot, provenance)
         repeats = len(samples)
-        records.append(subject.of("frame_time", median, repeats, unit="ms/frame", low=low, high=high, samples=samples))
+        records.append(subject.of("frame_time", median, repeats, low=low, high=high, samples=samples))
     return records
 
 

@@ -8,7 +8,7 @@ from reports.record import OF_A_PAGE, Record, machine_path, this_machine, write_
 
 def records(time, mse, samples=25):
     readings = tuple(time * (1 + 1e-3 * index) for index in range(samples))
-    cost = Record(method="woven", threads=1).of("time", time, samples, unit="ns/query", samples=readings)
+    cost = Record(method="woven", threads=1).of("time", time, samples, samples=readings)
     error = Record(method="woven", fabric="denim", role="seen", scene="queries")
     return [cost, error.of("mse", mse, 400, standard_error=mse / 20)]
 

@@ -12,14 +12,14 @@ MACHINE = Machine(cpu="Test CPU", cores=2, threads=2, system="", python="", pack
 @pytest.fixture
 def out(tmp_path):
     subject = Record(method="point_sampled", setting="k = 2", provenance=Provenance(recipe="smoke"))
-    records = [subject.of("time", 500.0, 25, low=490.0, high=510.0, unit="ns/query")]
+    records = [subject.of("time", 500.0, 25, low=490.0, high=510.0)]
     for fabric, role in (("denim", "seen"), ("twill_4_4", "unseen")):
         queries = subject.model_copy(update={"fabric": fabric, "role": role, "scene": "queries"})
         records += [queries.of("mse", 1e-3, 400, standard_error=1e-5), queries.of("mse_measured", 1e-3, 400)]
         records += [queries.of("truth_noise", 1e-6, 400), queries.of("colour_rrmse", 0.3, 400)]
         records.append(queries.model_copy(update={"scene": "plane"}).of("flicker", 0.5, 3))
         records.append(queries.model_copy(update={"scene": "plane"}).of("excess_energy", 0.5, 3))
-    records.append(subject.of("bytes_stored", 2000.0, 2, unit="B"))
+    records.append(subject.of("bytes_stored", 2000.0, 2))
     records += [r.model_copy(update={"metric": "zero_answers", "value": 0.0}) for r in records if r.metric == "mse"]
     records += [
         r.model_copy(update={"metric": f"rrmse_{name}"})

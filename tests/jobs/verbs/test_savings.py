@@ -88,10 +88,10 @@ class Runs:
             one.of("colour_rrmse", math.sqrt(mse), 100),
             one.of("flicker", 0.1, 3),
             one.of("fallback_share", 0.0, 100),
-            one.of("frame_time", ms, 20, unit="ms/frame", low=ms, high=ms),
+            one.of("frame_time", ms, 20, low=ms, high=ms),
         ]
         base = Record(method="point_sampled", setting="k = 2", scene="sphere", threads=1)
-        records.append(base.of("frame_time", 10.0, 20, unit="ms/frame"))
+        records.append(base.of("frame_time", 10.0, 20))
         if setting == "k = 2":
             records.pop(-2)
         # Another setting of the method, which does not count.

@@ -246,7 +246,7 @@ def test_what_lies_between_fabrics_is_shown_where_it_was_measured(written, page_
     curve = tuple(zip(SHARES, (0.01, 0.15, 0.2, 0.1, 0.02), strict=True))
     records = [path.of("path_error", 0.2, 64, curve=curve), path.of("reencode_error", 0.2, 64, curve=curve[::-1])]
     edit = subject.model_copy(update={"note": "a colour"})
-    records.append(edit.of("encode_time", 0.25, 25, unit="ms", low=0.24, high=0.31))
+    records.append(edit.of("encode_time", 0.25, 25, low=0.24, high=0.31))
     more = PageInput(**{**page_input.__dict__, "records": [*page_input.records, *records]})
     page = Page(write_page(tmp_path, more).read_text(encoding="utf-8"))
     assert "latents" in page.ids and "#latents" in page.targets
@@ -303,7 +303,7 @@ def scenes(tmp_path):
             found = image_errors(factor * truth[0], truth[0], 0.01 * truth[0], lit)
             layers |= difference_maps(factor * truth[0], truth[0], found)
             subject = Record(method=method, setting=setting, scene="attic")
-            records += [*found.records(subject), subject.of("frame_time", 20.0 * factor, 25, unit="ms/frame")]
+            records += [*found.records(subject), subject.of("frame_time", 20.0 * factor, 25)]
             records += [subject.of("colour_rrmse", abs(factor - 1), 900), subject.of("flicker", factor - 1, 3)]
         write_picture(path, factor * truth[0], np.ones_like(lit), {}, layers=layers)
         pictures.append(PictureFile("", "attic", method, setting, path))

@@ -20,4 +20,4 @@ def test_a_measure_that_was_not_installed_is_said_where_scenes_were_measured():
     (text,) = unseen_by_eye([frame])
     assert "pyfvvdp was not installed" in text
     assert unseen_by_eye([]) == []
-    assert unseen_by_eye([frame, frame.of("fovvideovdp", 9.0, 4, unit="JOD")]) == []
+    assert unseen_by_eye([frame, frame.of("fovvideovdp", 9.0, 4)]) == []

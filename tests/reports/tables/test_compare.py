@@ -14,7 +14,7 @@ REPEATS, NOISE = 25, 0.02
 
 def time_of(method, samples, **about):
     subject = Record(method=method, threads=1, **about)
-    return subject.of("time", float(np.median(samples)), len(samples), unit="ns/query", samples=tuple(samples))
+    return subject.of("time", float(np.median(samples)), len(samples), samples=tuple(samples))
 
 
 def readings(random, median=1000.0, methods=20):
@@ -78,7 +78,7 @@ def test_like_is_compared_with_like():
     fast, slow = [1.0 + 0.01 * i for i in range(9)], [2.0 + 0.01 * i for i in range(9)]
     one, two = time_of("m", fast), time_of("m", slow).model_copy(update={"threads": 2})
     edits = [
-        Record(method="m", note=note).of("encode_time", 1.0, 9, unit="ms", samples=tuple(times))
+        Record(method="m", note=note).of("encode_time", 1.0, 9, samples=tuple(times))
         for note, times in (("a yarn", slow), ("a colour", fast))
     ]
     other = [error_of("m", 1.0, 0.1, scene="sphere"), Record(method="m").of("bytes_stored", 7.0, 1)]

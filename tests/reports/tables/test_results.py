@@ -11,7 +11,7 @@ MACHINE = Machine(
 
 def test_the_file_says_where_its_numbers_come_from(made_up):
     named = Provenance(recipe="standard", recipe_fingerprint="0123456789abcdef" * 4)
-    rate = Record(method="truth").of("rate", 4.5e8, 1, unit="points/s").model_copy(update={"setting": "everything"})
+    rate = Record(method="truth").of("rate", 4.5e8, 1).model_copy(update={"setting": "everything", "unit": "points/s"})
     page = results_page([r.model_copy(update={"provenance": named}) for r in [*made_up, rate]], MACHINE, "file")
     head = page.partition("## ")[0]
     for said in ("`standard`", "`0123456789abcdef`", "Test CPU, 2 cores", "numpy 2.0", "Measured on 2026-01-01"):

@@ -118,7 +118,7 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
         subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
         for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
     ]
-    records += [subject.of("prepare_time", 12.5, 9, unit="ms"), subject.of("peak_memory", 3e7, 3, unit="B")]
+    records += [subject.of("prepare_time", 12.5, 9), subject.of("peak_memory", 3e7, 3)]
     table = timing_table(records)
     (found,) = rows(table)
     assert (found.threads, found.median_ns, found.most_threads, found.most_threads_ns) == (1, 400, 4, 120)

@@ -23,7 +23,7 @@ class Row:
 
 ROWS = RowRecords(
     Row,
-    {"value": ("worst_error", "1"), "failures": ("not_finite", "1"), "rival": ("naive_error", "1")},
+    {"value": "worst_error", "failures": "not_finite", "rival": "naive_error"},
     setting=("light", "part"),
     once={"note": "at"},
 )
@@ -68,6 +68,6 @@ def test_records_that_are_no_row_are_left_out(stray):
 
 
 def test_the_method_can_be_a_field():
-    by_part = RowRecords(Row, {"value": ("mse", "1")}, setting=("light",), method_field="part")
+    by_part = RowRecords(Row, {"value": "mse"}, setting=("light",), method_field="part")
     (record,) = by_part.to_records(FOUND[:1])
     assert (record.method, record.setting) == ("warp", "front")
