@@ -9,9 +9,9 @@ roughness is widened to alpha^2 + (widening s / points)^2; and one broad lobe a 
 and the mixture is the exact sampler of a point (pipeline.analytic.importance.point) beside the cosines of the diffuse
 light.
 
-A lobe's share is its visible area, times k_s, times the light scattered once by the layer, about half of 1 - exp(-T Lambda); a
-cosine's is visible area times k_d, on the other side k_dt. No shadows of the light enter: they change the variance, not
-the density.
+A lobe's share is its visible area, times k_s, times the light scattered once by the layer, about half of
+1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt. No shadows of the light enter: they
+change the variance, not the density.
 """
 
 from __future__ import annotations
