@@ -11,7 +11,7 @@ import psutil
 import pytest
 from rich.console import Console
 
-from jobs.run.executor import execute
+from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger, measure
 from weaves.errors import BadInput, WorkFailed
 
@@ -65,6 +65,21 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     again = execute(tasks, tmp_path, fake.run, workers=1, console=quiet())
     assert {task.title for task in again.ran + again.failed} == {"bad", "forgetful"}
     assert len(again.before) == 5
+
+
+def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake):
+    done, bad = fake.task("done"), fake.task("bad", fails="ValueError('no kernel')")
+    execute([done], tmp_path, fake.run, workers=1, console=quiet())
+    tasks = [done, bad, *(fake.task(f"new {index}") for index in range(3))]
+
+    def prepare(todo):
+        return [Preparation(task.title, fake.prepare, (tmp_path, task)) for task in todo]
+
+    summary = execute(tasks, tmp_path, fake.run, workers=2, prepare=prepare, console=quiet())
+    events = [(event["event"], event["name"]) for event in fake.events(tmp_path)][2:]
+    assert {name for event, name in events[:3] if event == "prepared"} == {"new 0", "new 1", "new 2"}
+    # What cannot be compiled is told by the task that needs it.
+    assert [task.title for task in summary.failed] == ["bad"]
 
 
 def test_a_killed_worker_costs_one_retry(tmp_path, fake):
