@@ -6,9 +6,9 @@ A query is covered if the norm of its true error lies within three reported ones
 Each constant is fitted with the other at its value in use: the smallest value with which 99 % of the queries are
 covered. Fabrics are random (seed 77), most with gaps; queries are those of the default distribution (seed 78).
 
-Seen, with ``--fabrics 4 --queries 60 --points 4096``: both constants are fitted as 0, because 99.58 % of 240 queries are
-covered with the values in use and without either of them. So few queries, with so rough a reference, only show that the
-values in use (.0005 and .002) are not too small; the size by default tells more.
+Seen, with ``--fabrics 4 --queries 60 --points 4096``: both constants are fitted as 0, because 99.58 % of 240 queries
+are covered with the values in use and without either of them. So few queries, with so rough a reference, only show that
+the values in use (.0005 and .002) are not too small; the size by default tells more.
 """
 
 from __future__ import annotations
