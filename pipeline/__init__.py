@@ -1,1 +1,1 @@
-"""What light does to a fabric, and what a network learns of it."""
+"""Light on woven cloth: ground truth, approximations, data sets, scenes, models and their training."""

@@ -68,7 +68,7 @@ class ImageOptions(_Options):
     exposure: float = Field(default=1.6, gt=0)
     """Factor on linear values before they are shown, as on the page (`tiles`); HDR-FLIP chooses its own."""
     relative_epsilon: float = Field(default=0.01, gt=0)
-    """What keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
+    """Constant that keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
     ssim_sigma: float = Field(default=1.5, ge=0.5, le=8)
     """Standard deviation of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them."""
     pixels_per_degree: float = Field(default=67.0, ge=1, le=200)

@@ -48,7 +48,7 @@ OF_A_PAGE: Final = "records.json"
 """File in a page's folder that holds all its Records; the machine of the times lies beside it."""
 
 Role = Literal["seen", "unseen"]
-"""Whether general models saw the fabric in training."""
+"""True if general models saw the fabric in training."""
 
 
 def _known(metric: str) -> str:
@@ -63,7 +63,7 @@ Metric = Annotated[str, AfterValidator(_known)]
 
 
 class Provenance(BaseModel):
-    """What was measured: names and fingerprints that are the same for a task's records."""
+    """Subject of a measurement: names and fingerprints common to a task's records."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
@@ -87,15 +87,15 @@ class Record(BaseModel):
     method: str
     """Name of the method as the recipe names it; ``truth`` for the reference itself."""
     setting: str = ""
-    """What tells variants of one method apart, such as ``k = 2``."""
+    """Variant of the method, such as ``k = 2``."""
     fabric: str = ""
     """Name of the fabric; empty where several are meant together."""
     role: Role | Literal[""] = ""
-    """Whether general models saw the fabric in training."""
+    """True if general models saw the fabric in training."""
     scene: str = ""
     """`queries`: held-out queries; otherwise the view of a fabric, or, where no fabric is named, the scene."""
     metric: Metric = "mse"
-    """What was measured."""
+    """Subject of the measurement."""
     value: float = 0.0
     """The number; the median for times."""
     standard_error: float | None = None
@@ -115,9 +115,9 @@ class Record(BaseModel):
     samples: tuple[float, ...] = ()
     """Every reading behind a time, in `unit`, in the order they were taken."""
     note: str = ""
-    """What else there is to say of `value`, such as the input that gave it."""
+    """Further information on `value`, such as the input that gave it."""
     provenance: Provenance = Provenance()
-    """What was measured."""
+    """Subject of the measurement."""
 
     def of(
         self,

@@ -27,7 +27,11 @@ REMOVED: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
     {
         "model": {"table": "use 'soft_nodes' or 'gauss_nodes', or the estimator 'node_table' for the ground truth"},
         SCENE: {},
-        KEY: {"geometry": "yarns are tori"},
+        KEY: {
+            "geometry": "yarns are tori",
+            "narrow_nodes": "one rule serves all footprints",
+            "seam": "one rule serves all footprints",
+        },
     }
 )
 """Alternatives to names without a successor, by kind and old name."""

@@ -40,7 +40,7 @@ class Shard(Task):
 
     @property
     def is_extra(self) -> bool:
-        """Whether single models alone read its rows."""
+        """True if single models alone read its rows."""
         return isinstance(self.question, ExtraShardTask)
 
     @property

@@ -152,14 +152,14 @@ def _note(
 
 
 def _taught(recipe: Recipe, model: ModelRecipe) -> str:
-    """Say which other recipe trains a model."""
+    """Return which other recipe trains a model."""
     trainer = recipe.trainer_of(model)
     own = "" if trainer.dataset.queries == recipe.dataset.queries else ", on queries of its own"
     return "" if trainer is recipe else f"; trained by the recipe {trainer.name}{own}"
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
-    """Say where a model is left out because it does not know the cloth."""
+    """Return a note on fabrics and scenes that a model does not cover."""
     if not model.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]

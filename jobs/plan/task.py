@@ -59,7 +59,7 @@ class Part(BaseModel):
 
 
 class Made(Part):
-    """What another task makes and this one reads."""
+    """Products of another task that this one reads."""
 
     task: str
     """Id of that task."""
@@ -73,7 +73,7 @@ class Task(Part):
     stage: ClassVar[Stage]
     """The stage that does it."""
     alone: ClassVar[bool] = False
-    """Whether it measures time, so that nothing else may run beside it."""
+    """True if it measures time, so that nothing else may run beside it."""
 
     @property
     def group(self) -> str:

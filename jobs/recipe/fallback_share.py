@@ -1,4 +1,4 @@
-"""What a method would leave to quadrature in a scene, told from what it was taught, before it is loaded or trained."""
+"""Fallback share of a method in a scene, predicted from its domain before it is trained or loaded."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from weaves.fabric import Fabric
 
 
-class _Taught:
-    """A method of which no more is known than its domain."""
+class _DomainOnly:
+    """A method with a domain only."""
 
     name = setting = ""
 
@@ -21,40 +21,40 @@ class _Taught:
         self.domain = domain
 
 
-def left_to_quadrature(model: ModelRecipe, recipe: Recipe, asked: Iterable[tuple[Fabric, Queries]]) -> float:
-    """Return the share of questions that a model of a recipe does not answer itself, as a benchmark would find it.
+def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterable[tuple[Fabric, Queries]]) -> float:
+    """Return the share of queries that fall back for a model of a recipe, as a benchmark would measure it.
 
     Parameters
     ----------
     model : ModelRecipe
-        One of the recipe's.
+        A model of the recipe.
     recipe : Recipe
-        Whose data it is trained on.
-    asked : iterable
-        Fabrics and the questions about each; all about a fabric that a model of one material was not trained on are
-        left.
+        Recipe of its training data.
+    queries_by_fabric : iterable
+        Fabrics and the queries on each. All queries fall back on a fabric that a model of one material was not
+        trained on.
     """
     import numpy as np
 
     from pipeline.models.fallback import Fallback
 
-    asked = list(asked)
-    fabrics = [fabric for fabric, _ in asked]
+    queries_by_fabric = list(queries_by_fabric)
+    fabrics = [fabric for fabric, _ in queries_by_fabric]
     known = fabrics
     if model.of_one_material:
         optics = [fabric.optics() for fabric in recipe.seen + recipe.unseen]
         known = [fabric for fabric in fabrics if fabric.optics() in optics]
-    method: Any = _Taught(_domain(model, recipe))
+    method: Any = _DomainOnly(_domain(model, recipe))
     fallback = Fallback(method, model.options.kinds, recipe.bench.scenes.footprint)
-    left = [
-        fallback.strange(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
-        for fabric, queries in asked
+    fallback_rows = [
+        fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
+        for fabric, queries in queries_by_fabric
     ]
-    return float(np.concatenate(left).mean())
+    return float(np.concatenate(fallback_rows).mean())
 
 
 def _domain(model: ModelRecipe, recipe: Recipe) -> Domain | None:
-    """Return what a model is taught, as its card will say; None if nothing is trained."""
+    """Return the domain that a training of the model will have; None if it is not trained."""
     from pipeline.models.domain import Domain
 
     if not model.learns:

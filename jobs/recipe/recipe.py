@@ -40,7 +40,7 @@ class Rows(_Section):
 
 
 class DatasetOptions(_Section):
-    """What is computed once, for all models."""
+    """Data set of a recipe: computed once, for all models."""
 
     seen: tuple[StrictStr, ...] = Field(min_length=1)
     """Fabrics to train on and measure: preset names, or paths to TOML files relative to the recipe."""
@@ -82,7 +82,7 @@ class ModelRecipe(_Section):
 
     @property
     def of_one_material(self) -> bool:
-        """Whether a trained model knows a single fabric."""
+        """True if a trained model knows a single fabric."""
         return self.options.of_one_material
 
     @property
@@ -94,7 +94,7 @@ class ModelRecipe(_Section):
 
     @property
     def learns(self) -> bool:
-        """Whether there is anything to train."""
+        """True if there is anything to train."""
         return self.options.learns
 
     @model_validator(mode="before")

@@ -53,9 +53,9 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
             name = "owen" if name in _SAMPLED else name
             found[name] = KernelGroup(name, None)
         for options in _models(task):
-            # The value of the knob is an argument of the same kernels.
+            # The value of the parameter is an argument of the same kernels.
             found.setdefault(
-                options.model_dump_json(exclude={"name", options.knob}), KernelGroup(options.name, options)
+                options.model_dump_json(exclude={"name", options.parameter}), KernelGroup(options.name, options)
             )
     order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
     return sorted(found.values(), key=lambda group: order.get(group.name, len(order)))

@@ -34,7 +34,7 @@ _SECONDS_TO_RESTART = 600  # on a busy machine a worker takes minutes to load wh
 
 
 class Outcome(NamedTuple):
-    """What a worker sends back: the products of a task, or the reason why there are none."""
+    """Result of a task from a worker: its products, or the reason of its failure."""
 
     files: dict[str, Product]
     seconds: float
@@ -43,7 +43,7 @@ class Outcome(NamedTuple):
 
 
 class Preparation(NamedTuple):
-    """What a worker does once before the tasks: compile a group of kernels.
+    """Preparation of a worker: compile a group of kernels.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Preparation(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What a run did: tasks that were done before, tasks done by it, and those that failed."""
+    """Tasks of a run: done before, done by it, failed, and waiting for failed ones."""
 
     before: list[Task]
     ran: list[Task]
@@ -314,6 +314,6 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _sentence(error: BaseException) -> str:
-    """Say in one line what an unexpected exception was."""
+    """Return in one line what an unexpected exception was."""
     lines = str(error).strip().splitlines() or [""]
     return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__

@@ -1,4 +1,4 @@
-"""What is done, what failed and why, and what is missing: read from the files alone.
+"""Ledger: which tasks are done, failed or missing, from the files alone.
 
 A receipt ``ledger/<task id>.json`` lists a task's products with their sizes and hashes; it is written after them,
 whole or not at all. A task is done exactly when its receipt and every product, of the listed size, are there. No other

@@ -1,4 +1,4 @@
-"""What a run shows while it works: the kernels being compiled, then one progress bar a stage.
+"""Progress of a run: kernels being compiled, then one bar per stage.
 
 Bars are weighted by what each task is expected to cost.
 """

@@ -164,7 +164,7 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
         table.add_row(f"[bold]{arithmetic}")
         for row in rows:
             where = "" if row["holds"] else f"\nat {row['at']}"
-            table.add_row(row["expression"], f"{row['corner']}{where}", *row["cells"], row["verdict"])
+            table.add_row(row["expression"], f"{row['corner']}{where}", *row["cells"], row["result"])
     return table
 
 

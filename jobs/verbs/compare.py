@@ -45,7 +45,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     for sentence in [*unlike, *found.unlike, *busy(first, second)]:
         console.print(f"{sentence}.", soft_wrap=True, highlight=False)
     left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
-    marked = sum(one.verdict not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
+    marked = sum(one.result not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
     summary = (
         f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
     )
@@ -81,7 +81,7 @@ def records_file(path: Path, recipe: str = "") -> Path:
 
 
 def _table(title: str, rows: Sequence[Difference]) -> Table:
-    """Show differences: what was measured, A, B, B over A, p-value and verdict, what differs in bold."""
+    """Return differences as a table: subject, A, B, B over A, p-value and result; significant ones are bold."""
     from rich.table import Table
 
     from reports.tables.number_format import display
@@ -91,10 +91,10 @@ def _table(title: str, rows: Sequence[Difference]) -> Table:
         table.add_column(name, justify="right" if name in ("A", "B", "B / A", "p") else "left")
     for row in rows:
         p = "" if math.isnan(row.p) else f"{row.p:.2g}" if row.p >= 1e-3 else "< .001"
-        style = "" if row.verdict in ("no difference shown", "not tested") else "bold"
+        style = "" if row.result in ("no difference shown", "not tested") else "bold"
         values = [_value(one) for one in (row.a, row.b)]
         method = display(row.a.method, row.a.setting)
-        table.add_row(method, _what(row), *values, _number(row.ratio), p, row.verdict, style=style)
+        table.add_row(method, _what(row), *values, _number(row.ratio), p, row.result, style=style)
     return table
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jobs.recipe.fallback_share import left_to_quadrature
+from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.verbs.compare import records_file
@@ -183,7 +183,7 @@ def _fallback_share(
     trainer = general.trainer_of(model)
     if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in trainer.seen + trainer.unseen}:
         return None
-    return left_to_quadrature(model, general, [(fabrics[name], queries) for name, queries in queries_by_fabric.items()])
+    return fallback_share(model, general, [(fabrics[name], queries) for name, queries in queries_by_fabric.items()])
 
 
 def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:

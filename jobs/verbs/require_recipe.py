@@ -179,7 +179,7 @@ def _model(
     options = {"model": model.options.model, "name": model.options.name} | options
     validated(type(model.options), options, "--set")
     if setting.startswith("k = "):
-        options[model.options.knob] = [int(setting.removeprefix("k = "))]
+        options[model.options.parameter] = [int(setting.removeprefix("k = "))]
     if model.learns:
         training = model.training
         # The running average of the weights spans the same share of the training.

@@ -1,4 +1,4 @@
-"""What a scene's own recipe saves against the general one, measured: both have run, and nothing is computed here.
+"""`twillight savings`: measured savings of a scene's own recipe against the general one, both finished.
 
 Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
 errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
@@ -23,7 +23,7 @@ from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.plan import plan
 from jobs.plan.task import Task
 from jobs.plan.training import Training
-from jobs.recipe.fallback_share import left_to_quadrature
+from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
@@ -106,7 +106,7 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     for rows in found.values():
         console.print(_table(rows), "")
     for rows in found.values():
-        console.print(verdict(rows), soft_wrap=True, highlight=False)
+        console.print(conclusion(rows), soft_wrap=True, highlight=False)
     path = out / "report" / "savings.csv"
     atomic_write(path, _csv([row for rows in found.values() for row in rows]).encode())
     console.print(f"the numbers: {path}", soft_wrap=True, highlight=False)
@@ -134,8 +134,8 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]
     return found + list(_elsewhere(scene, out, general, same, own, model))
 
 
-def verdict(rows: Sequence[Saving]) -> str:
-    """Say in a sentence what a scene's recipe saves, and at which error."""
+def conclusion(rows: Sequence[Saving]) -> str:
+    """Return in a sentence what a scene's recipe saves, and at which error."""
     by = {row.quantity: row for row in rows}
     generated, learnt, error = by["queries generated"], by["queries learnt from"], by["mse"]
     fewer = [f"{generated.ratio:.1f} times fewer queries to generate"]
@@ -229,7 +229,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
 
 def _setting(model: ModelRecipe) -> str:
     """Return the first of a model's settings, of which a scene's recipe has one."""
-    return f"k = {model.options.knobs[0]}" if model.options.knobs else ""
+    return f"k = {model.options.settings[0]}" if model.options.settings else ""
 
 
 def _elsewhere(
@@ -244,7 +244,7 @@ def _elsewhere(
         shot = read_shot(out / task.made.path)
         if shot.name != scene:
             asked = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
-            shares = (Value(left_to_quadrature(*of, asked)) for of in ((same, general), (model, own)))
+            shares = (Value(fallback_share(*of, asked)) for of in ((same, general), (model, own)))
             yield Saving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
 
 

@@ -1,16 +1,14 @@
-"""What a trained model was taught: kinds of questions and cloths outside of it are refused, never guessed at.
+"""Domain of a trained model: the queries, physics and yarns of its training; others are refused.
 
-The domain is on the model card. Two things may be asked of a model.
+The domain is on the model card. It limits two uses of a model.
 
-- Its answer to a file of queries (`twillight evaluate`): kinds and yarns that it never saw are refused; within a kind
-  it is asked beyond the trained ranges, for whoever wrote the file wants this model's answer.
-- Its share of a scene (`pipeline.models.fallback`): there the ranges hold as well, and what lies beyond them is
-  `strange`. Footprints may be smaller or larger than those trained on by `_SLACK` of the range's logarithm, and
-  directions `ANGLE` degrees steeper, so that a model trained up to 89 degrees is asked about all of them; cloth bent
-  more than any that was seen is strange at once. Of one thing the answer beyond is known: a footprint of `AVERAGED`
-  repeats sees the repeat's average, so that where training reached that far, larger footprints are asked as the largest
-  one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what varies with period 1: at
-  .5 less than a hundredth.
+- A file of queries (`twillight evaluate`): kinds and yarns that were not trained on are refused. Within a kind the
+  model is evaluated beyond the trained ranges too.
+- A scene (`pipeline.models.fallback`): queries beyond the trained ranges are `out_of_domain`. Footprints may exceed the
+  range by `_SLACK` of its logarithm, directions may be `ANGLE` degrees steeper, curvature may not exceed it. A
+  footprint of `AVERAGED` repeats sees the average of the repeat; if training reached that size, larger footprints are
+  replaced by the largest one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what
+  varies with period 1: at .5 less than a hundredth.
 """
 
 from __future__ import annotations
@@ -48,7 +46,7 @@ class Domain(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     queries: QueryOptions
-    """Distribution of the questions."""
+    """Distribution of the queries."""
     physics: dict[str, Any]
     """Options of the truth named in `PHYSICS`."""
     yarns: dict[str, tuple[float, float]]
@@ -79,13 +77,13 @@ class Domain(BaseModel):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Which of `behind`, `stretch` and `curvature` were trained on."""
+        """Kinds of queries trained on, of `behind`, `stretch` and `curvature`."""
         queries = self.queries
         taught = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
         return frozenset(kind for kind, there in taught.items() if there)
 
-    def strange(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
-        """Say which queries about a fabric lie beyond the ranges trained on, (N,); all if its yarns do.
+    def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+        """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.
 
         Kinds that were not trained on at all are no matter of ranges (`faults`).
         """
@@ -114,7 +112,7 @@ class Domain(BaseModel):
         return queries._replace(sigma=queries.sigma * shrunk, sigma_minor=queries.sigma_minor * shrunk)
 
     def _averaged(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
-        """Say which footprints, larger than any trained on, would see the average of the repeat at that size, (N,)."""
+        """Return which footprints are larger than those trained on and see the average of the repeat, (N,)."""
         size, high = _size(queries), self.queries.sigma[1]
         narrow = high * queries.sigma_minor / size
         return np.asarray((size > high) & (narrow >= AVERAGED * max(fabric.weave.repeat)))
@@ -145,7 +143,7 @@ class Domain(BaseModel):
                     raise BadInput(fabric.name, name, value, allowed)
 
     def knows(self, fabric: Fabric) -> bool:
-        """Tell whether a fabric's yarns lie within those trained on."""
+        """Return whether the yarns of a fabric lie within the ranges trained on."""
         try:
             self.refuse_fabric(fabric, "")
         except BadInput:

@@ -99,24 +99,24 @@ class Fallback:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries of any kind, float32 (N, 4)."""
-        strange = self.strange(fabric, queries)
-        if not strange.any():
+        outside = self.out_of_domain(fabric, queries)
+        if not outside.any():
             return self._method.predict(fabric, self._known(fabric, queries), seed)
-        result = np.empty((len(strange), 4), np.float32)
-        result[strange] = fallback_answers(fabric, queries.take(strange), seed)
-        if not strange.all():
-            result[~strange] = self._method.predict(fabric, self._known(fabric, queries.take(~strange)), seed)
+        result = np.empty((len(outside), 4), np.float32)
+        result[outside] = fallback_answers(fabric, queries.take(outside), seed)
+        if not outside.all():
+            result[~outside] = self._method.predict(fabric, self._known(fabric, queries.take(~outside)), seed)
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes; all methods share the tables of the fallback."""
         return self._method.bytes_stored(fabric)
 
-    def strange(self, fabric: Fabric, queries: Queries) -> Mask:
+    def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which queries about a fabric are out of the method's domain, (N,)."""
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
         behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
-        return behind if self._domain is None else behind | self._domain.strange(fabric, self._nearest(queries))
+        return behind if self._domain is None else behind | self._domain.out_of_domain(fabric, self._nearest(queries))
 
     def _known(self, fabric: Fabric, queries: Queries) -> Queries:
         """Return queries in the nearest form, no larger than where the method learnt the average."""

@@ -75,17 +75,19 @@ class Options(BaseModel):
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
-    knob: ClassVar[str] = ""
-    """Name of the field that holds the values of the speed-accuracy knob; empty if there is none."""
+    parameter: ClassVar[str] = ""
+    """Name of the field with the settings k, which trade speed for accuracy; empty if there is none."""
 
     @property
-    def knobs(self) -> tuple[int, ...]:
-        """Values k of the speed-accuracy knob, each a method of its own with the setting ``k = ...``; none: one method.
+    def settings(self) -> tuple[int, ...]:
+        """Settings k, each a method of its own named ``k = ...``; empty for a model without them.
 
-        The seconds of a prediction are then those of k = 1.
+        The seconds of a prediction are those of k = 1.
         """
-        return tuple(getattr(self, self.knob)) if self.knob else ()
+        return tuple(getattr(self, self.parameter)) if self.parameter else ()
 
     def single(self) -> list[Self]:
-        """Return options of one setting each: these, or for every value of the knob these with that value alone."""
-        return [self.model_copy(update={self.knob: [value]}) for value in self.knobs] if self.knob else [self]
+        """Return options with one setting each: one for every k, or these if the model has no settings."""
+        if not self.parameter:
+            return [self]
+        return [self.model_copy(update={self.parameter: [k]}) for k in self.settings]

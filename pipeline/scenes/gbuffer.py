@@ -1,4 +1,4 @@
-"""What one fabric's pixels show, as queries: the G-buffer.
+"""G-buffer: the pixels of one fabric as queries.
 
 A pixel that shows the fabric is a *place*: a footprint on the cloth and a direction to the viewer, in the local frame
 x along the weft, y along the warp, z = normal. A place under one light is a *query*; its answer f_P, which already

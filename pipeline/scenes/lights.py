@@ -27,7 +27,7 @@ class Light(NamedTuple):
     """A light without extent."""
 
     distant: bool
-    """Whether it shines from one direction everywhere."""
+    """True if it shines from one direction everywhere."""
     place: Floats
     """Unit vector to it if distant, else its position, (3,)."""
     power: Floats

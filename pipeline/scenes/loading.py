@@ -187,7 +187,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
 
 
 def _has_uv(mi: Any, mesh: Any) -> bool:
-    """Say whether a mesh has uv coordinates that vary in both directions."""
+    """Return whether a mesh has uv coordinates that vary in both directions."""
     if not mesh.has_vertex_texcoords():
         return False
     found = mi.traverse(mesh)

@@ -25,7 +25,7 @@ class Hits(NamedTuple):
 
 
 def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
-    """Say which of N rays hit anything nearer than `distance` (inf: anything)."""
+    """Return which of N rays hit anything nearer than `distance` (inf: anything)."""
     if mi.variant().startswith("scalar") or not len(origin):
         rays = zip(origin.tolist(), direction.tolist(), distance.tolist(), strict=True)
         hits = (world.ray_test(mi.Ray3f(o, d, t, 0.0, [])) for o, d, t in rays)

@@ -24,7 +24,7 @@ Length = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Cloth(BaseModel):
-    """What shapes with one BSDF id wear."""
+    """Cloth of the shapes with one BSDF id."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -46,7 +46,7 @@ class Scene(BaseModel):
     source: Path | Callable[[Any], dict[str, Any]]
     """A Mitsuba XML file; or a function that is given the module mitsuba and returns a dictionary."""
     cloths: dict[str, Cloth] = Field(default_factory=dict)
-    """What `fabric_<key>` stands for; a key that is not here is a preset with the default yarns."""
+    """Cloth of each ``fabric_<key>``; a key that is not listed is a preset with the default yarns."""
     frames: int = Field(default=24, ge=1, le=100_000)
     """Length of the camera's way."""
     step: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What a scene is made of, read without Mitsuba: the cloths that its shapes wear, and the files that it refers to."""
+"""Cloths and files of a scene, read without Mitsuba."""
 
 from __future__ import annotations
 

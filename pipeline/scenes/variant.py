@@ -31,7 +31,7 @@ assert list(scene.ray_test(mitsuba.Ray3f(origin, mitsuba.Vector3f(0, 0, -1)))) =
 
 @cache
 def llvm_works() -> bool:
-    """Say whether a fresh process can render and trace rays with Mitsuba's LLVM variant."""
+    """Return whether a fresh process can render and trace rays with Mitsuba's LLVM variant."""
     trial = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, timeout=120, check=False)
     return trial.returncode == 0
 

@@ -69,7 +69,7 @@ class Answerer(NamedTuple):
 
 
 class Summary:
-    """What was answered, gathered row by row in constant memory.
+    """Statistics of the results, collected row by row in constant memory.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ class ShardEntry(BaseModel):
     kind: Kind = "components"
     """Kind of its rows, which names its columns (`pipeline.shards.schema`)."""
     split: str
-    """What its rows are for: train, validation or test; of extra rows the name of their set."""
+    """Split of its rows: train, validation or test; for extra rows the name of their set."""
     start: int
     """First row of the split's stream."""
     rows: int

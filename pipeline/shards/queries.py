@@ -52,7 +52,7 @@ class QueryOptions(BaseModel):
 
     @property
     def plain(self) -> bool:
-        """Whether all footprints are round, the cloth is flat, and the light is on the viewer's side."""
+        """True if all footprints are round, the cloth is flat, and the light is on the viewer's side."""
         return self.behind == 0.0 and self.stretch == 1.0 and self.curvature == (0.0, 0.0)
 
 

@@ -104,7 +104,7 @@ def check_columns(path: Path, schema: pa.Schema) -> None:
 
 
 Faults = Callable[[Queries], dict[int, tuple[str, object, str]]]
-"""What is wrong with questions: row -> (column, value, what is allowed)."""
+"""Faults of queries: row -> (column, value, what is allowed)."""
 
 
 def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong: Faults = faults) -> None:

@@ -43,7 +43,7 @@ class Silhouettes(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     kind: Literal["opacity", "grazing_cosine"]
-    """What is answered: the opacity, or mean and variance of the grazing cosine over the footprint."""
+    """Target: the opacity, or mean and variance of the grazing cosine over the footprint."""
     rows: int = Field(ge=1)
     """Rows for a fabric."""
     points: int = Field(ge=32)

@@ -1,4 +1,4 @@
-"""What a training remembers, written whole or not at all: tensors and JSON; nothing that could run is ever loaded."""
+"""Checkpoints of a training, written atomically: tensors and JSON, never executable content."""
 
 from __future__ import annotations
 

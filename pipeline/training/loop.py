@@ -160,7 +160,7 @@ def chosen_device(name: str) -> torch.device:
 
 
 def mixed(training: TrainingOptions, device: torch.device) -> bool:
-    """Say whether a training multiplies in bfloat16: on a GPU, unless told not to."""
+    """Return whether a training multiplies in bfloat16: on a GPU, unless told not to."""
     return training.precision == "mixed" or (training.precision == "auto" and device.type == "cuda")
 
 

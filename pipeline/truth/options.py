@@ -52,7 +52,7 @@ class TruthOptions(BaseModel):
     """The denominator: `visible` is the projected area that the viewer sees, A_P; `projected` is |wo.n_s| times the
     area of the footprint, which restores reciprocity."""
     shadows: bool = True
-    """Whether points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
+    """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
     variation: Variation | None = None
     """Random gloss of every float; left out: all yarns of a family are alike."""
 

@@ -26,7 +26,7 @@ RGB: Final = ("R", "G", "B")
 
 
 class Exr(NamedTuple):
-    """What an OpenEXR file holds."""
+    """Contents of an OpenEXR file."""
 
     channels: dict[str, Picture]
     """Each (H, W)."""

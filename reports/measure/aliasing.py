@@ -1,4 +1,4 @@
-"""What point sampling does to a moving, receding surface, as two numbers. Both are 0 for the truth.
+"""Aliasing on a moving, receding surface, as two numbers. Both are 0 for the truth.
 
 Let L(f, p) be the luminance of frame f at pixel p while the surface moves by less than a pixel from frame to frame, T
 the truth's, <T> the truth's mean over frames and pixels. Random methods draw anew in every frame, as renderers do.

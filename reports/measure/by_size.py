@@ -47,7 +47,7 @@ MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
     "specular": ("size_specular", np.array([[1.0], [1.0], [0.0], [0.0]])),
     "diffuse": ("size_diffuse", np.array([[0.0], [0.0], [1.0], [1.0]])),
 }
-"""What errors are taken of: the Record's metric and the colour of each component."""
+"""Measured quantities: the Record's metric and the colour of each component."""
 
 LONGEST: Final = 0.02
 """Seconds that a timed call of one class, over its fabrics, should not exceed by much."""

@@ -76,7 +76,7 @@ class Extremes(NamedTuple):
     size: npt.NDArray[np.float64]
     """Footprint of each, in repeats."""
     grazing: npt.NDArray[np.bool_]
-    """Whether light or viewer graze."""
+    """True if light or viewer graze."""
     repeat: tuple[int, int]
     """Of the fabric, in yarn spacings."""
 

@@ -1,4 +1,4 @@
-"""What lies between two latents, and what an edit costs.
+"""Errors of blended latents, and the time of an edit.
 
 A designer moves a slider, or edits a yarn. Two ways lead from one fabric to another: blend their latents, or encode the
 fabric in between. Both are held against the truth of the fabric in between, at shares t of the way, on the same
@@ -60,7 +60,7 @@ class Pair:
 
     @property
     def about(self) -> str:
-        """What the second one has that the first has not."""
+        """Difference of the second fabric from the first."""
         return f"{self.differs} of {self.second.name}"
 
 

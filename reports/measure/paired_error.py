@@ -1,4 +1,4 @@
-"""Whether one picture errs more than another of the same frame, by the same truth.
+"""True if one picture errs more than another of the same frame, by the same truth.
 
 Two intervals that overlap say little: both are as wide as pixels differ, and pixels that one method finds hard are so
 for the other. The difference of squared errors, pixel by pixel, cancels that, and the truth's noise with it:

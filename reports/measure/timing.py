@@ -1,4 +1,4 @@
-"""What a query costs: methods side by side in one process.
+"""Time of a query: all methods side by side in one process.
 
 All methods answer the same queries; they take turns, so that whatever else the machine does falls on all alike. Each is
 called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
@@ -170,7 +170,7 @@ def milliseconds(action: Callable[[], object]) -> float:
 
 
 def set_threads(threads: int) -> None:
-    """Tell torch how many threads it may use, if a method has loaded it; kernels have one thread each."""
+    """Set the number of torch's threads, if torch is loaded; kernels have one thread each."""
     if (torch := sys.modules.get("torch")) is not None:
         torch.set_num_threads(threads)
 

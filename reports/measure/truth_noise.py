@@ -1,4 +1,4 @@
-"""What the truth errs on average, from the errors it states.
+"""Average error of the truth, from its standard errors.
 
 A tabulated answer states an error that is to cover the true one: three of them do for 99 of 100 queries. On average the
 true one is smaller: over the nine fabrics of quick, 250 queries each, the stated variance of the colour is 3.1 to 4.7

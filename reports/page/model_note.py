@@ -18,12 +18,12 @@ class ModelNote:
     fingerprint: str = ""
     """Of the trained model."""
     per_material: bool = False
-    """Whether one model is trained for each fabric."""
+    """True if one model is trained for each fabric."""
     kind: str = ""
     """Kind of model, a key of `pipeline.models.catalogue.CLASSES`; empty: its name."""
 
     @property
     def learns(self) -> bool:
-        """Whether there is anything to train."""
+        """True if there is anything to train."""
         model = CLASSES.get(self.kind or self.name)
         return model is None or model.learns

@@ -50,8 +50,8 @@ class Difference:
         return self.b.value / self.a.value if self.a.value > 0 else math.nan
 
     @property
-    def verdict(self) -> Verdict:
-        """What is shown of B, held against A."""
+    def result(self) -> Verdict:
+        """Result of the test of B against A."""
         if math.isnan(self.p):
             return "not tested"
         if self.p > LEVEL:
@@ -70,7 +70,7 @@ class Comparison:
     """Measurements that A alone has, of those that can be compared."""
     only_b: int
     unlike: list[str]
-    """What else differs, of which the numbers may speak: data sets, versions."""
+    """Other differences that can affect the numbers: data sets, versions."""
 
 
 def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[str]:
@@ -160,7 +160,7 @@ def _test(a: Record, b: Record) -> tuple[float, float]:
 
 
 def _unlike(found: Sequence[Difference]) -> list[str]:
-    """Say in which respects the two benchmarks did not measure the same."""
+    """Return sentences on differences in what the two benchmarks measured."""
     sentences = []
     if any(one.a.provenance.dataset != one.b.provenance.dataset for one in found):
         sentences.append("A and B were measured on different data sets")

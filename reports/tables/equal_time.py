@@ -36,7 +36,7 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
 
 
 def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
-    """Return every method without a knob beside every method with one, at the time of the former.
+    """Return every method without settings beside every method with them, at the time of the former.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
 
 
 def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:
-    """Return the error of a knob's curve of (time, error) at a time; NaN before its fastest setting.
+    """Return the error of a method's curve of (time, error) at a time; NaN before its fastest setting.
 
     Straight in both logarithms between settings that no faster one beats; beyond the slowest its error. From the first
     setting on whose error is lost in the truth's noise (not above 0) it is 0.

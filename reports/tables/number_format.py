@@ -113,7 +113,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 def missing(value: float | None) -> bool:
-    """Say whether there is no finite number."""
+    """Return whether there is no finite number."""
     return value is None or not math.isfinite(value)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 
 def front(points: Sequence[tuple[float, float]]) -> list[bool]:
-    """Say which points are on the front.
+    """Return which points are on the front.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class Column:
     floor: str = ""
     """Column of the error by the noise of the truth alone."""
     in_powers: bool = False
-    """Whether intervals are in powers of ten."""
+    """True if intervals are in powers of ten."""
 
     def interval(self, low: float, high: float) -> str:
         """Return an interval in words; empty where there is none."""

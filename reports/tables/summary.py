@@ -34,7 +34,7 @@ _KEYS: Final = ["method", "setting"]
 
 
 def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
-    """Say which rows of a table with `method` and `setting` are the baseline's."""
+    """Return which rows of a table with `method` and `setting` are the baseline's."""
     return (table["method"] == BASELINE[0]) & (table["setting"] == BASELINE[1])
 
 
@@ -110,7 +110,7 @@ SCENE_METRICS: Final[tuple[Metric, ...]] = (
     "colour_rrmse",
     "fovvideovdp",
 )
-"""What is measured of every method on a scene."""
+"""Metrics of every method on a scene."""
 
 SCENE_FLOORS: Final[tuple[Metric, ...]] = (
     "truth_noise",
@@ -121,7 +121,7 @@ SCENE_FLOORS: Final[tuple[Metric, ...]] = (
     "flip_hdr_floor",
     "delta_e_floor",
 )
-"""What the truth's noise alone scores on a scene (`reports.measure.scene.image_error`); the same for every method."""
+"""Scores of the truth's noise alone on a scene (`reports.measure.scene.image_error`); common to all methods."""
 
 SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
     "mse",

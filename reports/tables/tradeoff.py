@@ -1,4 +1,4 @@
-"""What is bought with time and with bytes: which methods nothing beats on both, and the cheapest within a limit."""
+"""Trade-off of error against time and bytes: methods on the front, and the cheapest within a limit."""
 
 from __future__ import annotations
 

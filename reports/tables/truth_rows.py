@@ -36,7 +36,7 @@ def stability_rows(findings: Sequence[Finding]) -> dict[str, list[dict[str, Any]
                     str(finding.negative),
                 ],
                 "holds": finding.holds,
-                "verdict": "ok" if finding.holds else "limit",
+                "result": "ok" if finding.holds else "limit",
                 "at": finding.at,
             }
         )
@@ -76,7 +76,7 @@ def bias_rows(found: Sequence[Bias]) -> list[list[str]]:
     lines: dict[tuple[str, str], dict[str, str]] = {}
     for bias in found:
         value = round(100 * bias.value, 2) + 0.0  # no zero is negative
-        text = f"{value:+.2f} ± {100 * bias.standard_error:.2f} %{marks[bias.verdict]}".replace("-", "−")
+        text = f"{value:+.2f} ± {100 * bias.standard_error:.2f} %{marks[bias.result]}".replace("-", "−")
         lines.setdefault((bias.fabric, bias.side), {})[bias.component] = text
     return [
         [plain(fabric), side.removeprefix("light "), *(cells.get(name, NONE) for name in COMPONENTS)]

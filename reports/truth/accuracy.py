@@ -1,4 +1,4 @@
-"""What accuracy costs: the true errors of every estimator, beside the errors it states and what it takes.
+"""Accuracy of the estimators: true errors beside stated errors and cost.
 
 Errors are of the four components as a vector, |mean - reference| / |reference|, over patches that return light; the
 reference is `owen` with `REFERENCE` points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
@@ -79,7 +79,7 @@ SETTINGS: Final[dict[str, TruthOptions]] = {
     "auto at 2 %": TruthOptions(relative_error=0.02, max_count=1 << 14),
     "auto at 1 %": TruthOptions(relative_error=0.01, max_count=1 << 14),
 }
-"""What is measured, by the name it is shown under."""
+"""Settings that are measured, by their names in tables."""
 
 
 def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = REFERENCE) -> Iterator[Accuracy]:

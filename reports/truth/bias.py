@@ -56,8 +56,8 @@ class Bias:
     """Queries."""
 
     @property
-    def verdict(self) -> Literal["below", "open", "above"]:
-        """Whether it lies below `LIMIT`, as far as two standard errors tell."""
+    def result(self) -> Literal["below", "open", "above"]:
+        """True if it lies below `LIMIT`, as far as two standard errors tell."""
         if abs(self.value) + 2.0 * self.standard_error <= LIMIT:
             return "below"
         return "above" if abs(self.value) - 2.0 * self.standard_error > LIMIT else "open"

@@ -41,7 +41,7 @@ class Corners(NamedTuple):
 
     @property
     def inputs(self) -> dict[str, Array]:
-        """What to name when a corner is the worst."""
+        """Label of a corner in the results."""
         names = {"wi": np.stack(self.wi, axis=1), "wo": np.stack(self.wo, axis=1), "t": np.stack(self.t, axis=1)}
         return {**names, "alpha": self.alpha, "T": self.thickness}
 

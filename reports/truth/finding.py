@@ -35,7 +35,7 @@ class Finding:
     """One expression over one set of corners."""
 
     expression: str
-    """What is computed."""
+    """Expression that is computed."""
     corner: str
     """Over which inputs."""
     arithmetic: str
@@ -59,17 +59,17 @@ class Finding:
 
     @property
     def limit(self) -> float:
-        """What the worst error must not exceed."""
+        """Limit of the worst error."""
         return SLACK * self.listed
 
     @property
     def holds(self) -> bool:
-        """Whether it does not, and every value is a number that can be."""
+        """True if it does not, and every value is a number that can be."""
         return not self.fault
 
     @property
     def fault(self) -> str:
-        """What is wrong, in words; empty if nothing is."""
+        """Description of the fault; empty if there is none."""
         if self.not_finite:
             return f"{self.not_finite} of {self.count} values are NaN or infinite"
         if self.negative:

@@ -1,4 +1,4 @@
-"""What a sampler saves: the variance of one bounce under even light, against cosine sampling.
+"""Variance saved by a sampler: one bounce under even light, against cosine sampling.
 
 One bounce towards the viewer, L = integral over the whole sphere of f_P(wi, wo) d(wi) in luminance, estimated by one
 direction: f_P / pdf. For each patch the variance over its directions; "saved" is the mean variance of cosine sampling,

@@ -1,4 +1,4 @@
-"""What floating point does to the model at its extremes: float32 against float64, float64 against 50 digits."""
+"""Numerical stability of the model at its extremes: float32 against float64, float64 against 50 digits."""
 
 from __future__ import annotations
 

@@ -232,7 +232,7 @@ def _numpy_points(fabric: Fabric, table: Table, queries: Queries, points: int = 
 
 
 def _clears(table: Table, nodes: npt.NDArray[np.int64], w: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Say which nodes see a direction, by linear interpolation between two azimuths."""
+    """Return which nodes see a direction, by linear interpolation between two azimuths."""
     place = np.arctan2(w[1], w[0]) / (2 * np.pi) * len(table.slope)
     row = int(np.floor(place))
     share = place - row

@@ -116,7 +116,7 @@ class OnFabric(Measurement):
         """Estimated seconds on one core."""
         width, height = self.frame_options.frame_size
         queries = self.frame_options.frames * width * height + self.errors.rows + self._pixels
-        return 1.0 + queries * self.model.options.seconds[1] * (sum(self.model.options.knobs) or 1)
+        return 1.0 + queries * self.model.options.seconds[1] * (sum(self.model.options.settings) or 1)
 
     @property
     def size(self) -> int:

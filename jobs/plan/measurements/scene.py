@@ -62,7 +62,7 @@ class OnScene(Measurement):
     def title(self) -> str:
         """Model, setting and scene."""
         options = self.model.options
-        settings = [f"k = {knob}" for knob in options.knobs]
+        settings = [f"k = {k}" for k in options.settings]
         return " ".join([options.name, *settings, f"on the scene {self.scene}"])
 
     @property
@@ -89,7 +89,7 @@ class OnScene(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         queries = self._pixels * QUERIES_A_PIXEL * self.frames
-        return 1.0 + queries * self.model.options.seconds[1] * (sum(self.model.options.knobs) or 1)
+        return 1.0 + queries * self.model.options.seconds[1] * (sum(self.model.options.settings) or 1)
 
     @property
     def size(self) -> int:

@@ -39,7 +39,7 @@ class SceneShot(Measurement):
     scene: str
     """Name of the scene."""
     found: Place
-    """What names the scene in the recipe: the scene's name, or a path."""
+    """Reference to the scene in the recipe: its name, or a path."""
     files: tuple[str, ...]
     """Hashes of its files; none for a scene of the package, which has a version."""
     cloths: dict[str, SceneCloth]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from reports.record import Provenance
 
 Role = Literal["seen", "unseen"]
-"""Whether general models saw a fabric in training."""
+"""True if general models saw a fabric in training."""
 
 
 class Dataset(Part):
@@ -57,8 +57,8 @@ class Trained(Part):
 
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
         """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
-        knobs = self.options.knobs
-        return tuple(f"k = {knob}" for knob in knobs if knob in counts) if knobs else ("",)
+        settings = self.options.settings
+        return tuple(f"k = {k}" for k in settings if k in counts) if settings else ("",)
 
     def provenance(self, dataset: str = "") -> Provenance:
         """Return the provenance of Records of this model."""

@@ -33,7 +33,7 @@ class CurvedOptions(Options):
     offset: bool = True
     """Shift the centre along the view by a learnt depth before the look-up."""
     silhouette: Literal["opacity", "grazing"] = "opacity"
-    """What makes the silhouette: the opacity, or the cosine at which a ray just touches, in which opacity is a step."""
+    """Quantity of the silhouette: the opacity, or the grazing cosine, in which opacity is a step."""
     directions: Literal["vector", "projected"] = "vector"
     """How directions enter: as unit vectors, or as their x and y, which cannot tell light in front from light behind;
     the paper does not say."""

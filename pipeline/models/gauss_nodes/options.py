@@ -16,7 +16,7 @@ class GaussNodesOptions(Options):
     """Gauss-Legendre rules on every piece of yarn, k nodes across it; nothing is trained."""
 
     learns: ClassVar[bool] = False
-    knob: ClassVar[str] = "nodes"
+    parameter: ClassVar[str] = "nodes"
     seconds: ClassVar[tuple[float, float]] = (0.0, 3e-7)
 
     model: Literal["gauss_nodes"] = "gauss_nodes"
@@ -29,7 +29,7 @@ class GaussNodesOptions(Options):
     along: float = Field(default=0.5, ge=0.125, le=1)
     """Nodes along a cell as a share of those across; at least 2. Equal numbers cost twice the time and gain nothing."""
     shadows: Literal["soft", "hard", "none"] = "soft"
-    """Whether horizons hide nodes: by a ramp as wide as the horizon spreads over the node, by a step, or not at all."""
+    """True if horizons hide nodes: by a ramp as wide as the horizon spreads over the node, by a step, or not at all."""
     horizon_nodes: int = Field(default=16, ge=4, le=128)
     """Nodes of the horizon map on each piece of yarn in a cell, across and along."""
     azimuths: int = Field(default=32, ge=8, le=512)

@@ -1,4 +1,4 @@
-"""What networks of an encoder and a decoder share in training: all weights learn alike, and nothing is scheduled."""
+"""Training of networks of an encoder and a decoder: one learning rate for all weights, no schedule."""
 
 from __future__ import annotations
 

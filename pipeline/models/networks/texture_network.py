@@ -1,4 +1,4 @@
-"""What networks of textures and perceptrons share in training: `neumip` and `curved` [Kuznetsov2021NeuMIP].
+"""Training of networks of textures and perceptrons: `neumip` and `curved` [Kuznetsov2021NeuMIP].
 
 Textures learn faster than perceptrons, because a short training touches each texel rarely. They begin blurred, and the
 blur is annealed. The offset texture is held fixed after a share of the training.

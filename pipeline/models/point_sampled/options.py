@@ -16,7 +16,7 @@ class PointSampledOptions(Options):
     """The point model at k random points of the footprint [Jin2022Woven]; nothing is trained."""
 
     learns: ClassVar[bool] = False
-    knob: ClassVar[str] = "counts"
+    parameter: ClassVar[str] = "counts"
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
 
     model: Literal["point_sampled"] = "point_sampled"

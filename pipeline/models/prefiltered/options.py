@@ -23,4 +23,4 @@ class PrefilteredOptions(Options):
     texels_per_yarn: int = Field(default=16, ge=1, le=128)
     """Texels of the finest level along one yarn spacing, at least; a repeat's sides are powers of two."""
     widening: Literal["none", "toksvig", "lean"] = "lean"
-    """What widens the roughness: nothing, the mean tangent's length, or the half vector's variance."""
+    """Source of the widened roughness: none, the mean tangent's length, or the half vector's variance."""

@@ -34,7 +34,7 @@ class BtfOptions(Options):
     angles: Literal["stereographic", "disc"] = "stereographic"
     """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
     log_samples: bool = False
-    """Whether the encoder reads the specular samples in log space, the space in which the decoder answers. Linear ones
+    """True if the encoder reads the specular samples in log space, the space in which the decoder answers. Linear ones
     average as the cloth does, and trained as well."""
     weights: int = Field(default=32, ge=1, le=512)
     """Weights m of every sample; not published."""

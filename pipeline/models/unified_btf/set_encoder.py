@@ -67,7 +67,7 @@ class SetEncoder(nn.Module):
 
 
 class Texels(NamedTuple):
-    """What the encoder reads of a fabric.
+    """Inputs of the encoder from a fabric.
 
     Attributes
     ----------

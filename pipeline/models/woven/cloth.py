@@ -1,4 +1,4 @@
-"""What `woven` reads of a cloth: maps of normal and tangent over one repeat, and the yarns' parameters.
+"""Inputs of `woven` from a cloth: maps of normal and tangent over one repeat, and the yarns' parameters.
 
 Every cloth is brought into standard position first (pipeline.models.woven.standard_position), and begins at a random
 yarn in every training step: both are options.
@@ -27,7 +27,7 @@ def parameter_count(options: WovenOptions) -> int:
 
 
 class Cloth(NamedTuple):
-    """What the network reads of F fabrics, in standard position.
+    """Inputs of the network from F fabrics, in standard position.
 
     Attributes
     ----------

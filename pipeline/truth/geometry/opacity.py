@@ -1,4 +1,4 @@
-"""What a curved cloth hides: its opacity along camera rays, and the cosine at which a ray just touches it.
+"""Opacity of curved cloth along camera rays, and the cosine at which a ray just touches it.
 
 The boundary surface lies at the height of the cloth's highest point. A camera ray enters it at a point of the footprint
 with direction -wo, and the cloth falls away below it by kappa s^2 / 2 at distance s [Kuznetsov2022Curved]: seen from

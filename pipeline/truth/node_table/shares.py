@@ -1,4 +1,4 @@
-"""What one query takes from each node of a table: float32 arrays with one number a node."""
+"""Weights of the nodes of a table for one query: float32 arrays with one number per node."""
 
 from __future__ import annotations
 

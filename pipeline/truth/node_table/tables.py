@@ -42,7 +42,7 @@ ALLOWED: Final = (
     f"flat cloth of at most {TABLE_CELLS} different cells, footprints of at least {TABLE_SIGMA:.3g} yarn spacings and "
     "not too thin, and the default frame, shadows and variation: take auto"
 )
-"""What a table answers, as the end of a sentence."""
+"""Queries that a table answers, as the end of a sentence."""
 
 
 class NodeTable:

@@ -1,4 +1,4 @@
-"""What a method makes of a scene: its picture's errors, what aliases on the camera's way, the time of a frame.
+"""Measurements of a method on a scene: errors of its picture, aliasing along the camera path, time of a frame.
 
 Errors are those of the first frame (`reports.measure.scene.image_error`), over the pixels of lit cloth; the colour's is
 over the queries of all frames. Flicker and excess energy are those of `reports.measure.aliasing` over all frames:
@@ -55,7 +55,7 @@ class _Reference(NamedTuple):
     lit: npt.NDArray[np.bool_]
     """Pixels of lit cloth, (F, H, W)."""
     floor: dict[Metric, float]
-    """What a noised copy of the first frame scores."""
+    """Scores of a noised copy of the first frame."""
 
 
 def write_truth(shot: Shot, path: Path) -> None:
@@ -101,8 +101,8 @@ def measure_scene(
         records += errors.records(subject)
         records.append(_colour(subject, shot, answers, image))
         records += _over_time(subject, shown, reference, options)
-        strange = [method.strange(cloth.fabric, cloth.queries) for cloth in shot.cloths]
-        records.append(subject.of("fallback_share", float(np.concatenate(strange).mean()), sum(map(len, strange))))
+        outside = [method.out_of_domain(cloth.fabric, cloth.queries) for cloth in shot.cloths]
+        records.append(subject.of("fallback_share", float(np.concatenate(outside).mean()), sum(map(len, outside))))
     return records
 
 
@@ -148,7 +148,7 @@ def time_scene(
         for fabric, queries in subjects:
             method.prepare(fabric)
             # Quadrature's own preparation must not look like the time of a query: rare ones come late in a call.
-            rare = np.flatnonzero(method.strange(fabric, queries))[:1]
+            rare = np.flatnonzero(method.out_of_domain(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
             contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
     records = []

@@ -35,7 +35,7 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.models.method import Method
 
-_COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "stand_in")
+_COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "fallback_values")
 
 Floats = npt.NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class ClothQueries:
         Linear RGB irradiance.
     mean, standard_error : float32 (M, 4)
         The truth's answers.
-    stand_in : float32 (M, 4)
+    fallback_values : float32 (M, 4)
         What quadrature answers where light or viewer is behind the cloth, for methods that do not know that; 0
         elsewhere.
     """
@@ -68,7 +68,7 @@ class ClothQueries:
     weight: npt.NDArray[np.float32]
     mean: npt.NDArray[np.float32]
     standard_error: npt.NDArray[np.float32]
-    stand_in: npt.NDArray[np.float32]
+    fallback_values: npt.NDArray[np.float32]
 
     def light(self, components: npt.ArrayLike) -> Floats:
         """Return the light of each query, (M, 3), from components (M, 4)."""
@@ -139,7 +139,7 @@ class Shot:
         return Shot(self.name, self.base[:1], [cloth.of_frame(0) for cloth in self.cloths])
 
     def covered_by(self, method: Method) -> bool:
-        """Tell whether a method answers for every cloth."""
+        """Return whether a method answers for every cloth."""
         return all(method.covers(cloth.fabric) for cloth in self.cloths)
 
     def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
@@ -150,8 +150,8 @@ class Shot:
         found = []
         for cloth in self.cloths:
             method.prepare(cloth.fabric)
-            values = cloth.stand_in.copy()
-            answered = method.strange(cloth.fabric, cloth.queries) & cloth.queries.behind
+            values = cloth.fallback_values.copy()
+            answered = method.out_of_domain(cloth.fabric, cloth.queries) & cloth.queries.behind
             for frame in range(len(self.base)):
                 rows = np.flatnonzero((cloth.frame == frame) & ~answered)
                 if rows.size:
@@ -187,7 +187,7 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             columns |= queries._asdict()
             columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
-            columns |= {"stand_in": _stand_in(fabric, queries, seed)}
+            columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
             parts[key].append(columns)
         bases.append(base)
     arrays = {"base": np.array(bases, np.float32)}
@@ -215,7 +215,7 @@ def read_shot(path: Path) -> Shot:
         return Shot(about["name"], file["base"], cloths)
 
 
-def _stand_in(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
+def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
     """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():

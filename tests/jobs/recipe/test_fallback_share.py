@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jobs.recipe.fallback_share import left_to_quadrature
+from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
@@ -34,7 +34,7 @@ def asked(*names, options=OPTIONS):
 )
 def test_shares(model, fabrics, share):
     """Light from behind, 30 %; sizes below .0439 of log-uniform ones between .02 and 20, 11.4 %; or all."""
-    found = left_to_quadrature(MODELS[model], QUICK, asked(*fabrics))
+    found = fallback_share(MODELS[model], QUICK, asked(*fabrics))
     assert found == pytest.approx(share, abs=0.03)
 
 
@@ -45,4 +45,4 @@ def test_it_is_what_the_model_itself_will_leave():
 
     (pair,) = asked("denim")
     method = Fallback(Trained(), MODELS["woven"].options.kinds)
-    assert left_to_quadrature(MODELS["woven"], QUICK, [pair]) == np.mean(method.strange(*pair))
+    assert fallback_share(MODELS["woven"], QUICK, [pair]) == np.mean(method.out_of_domain(*pair))

@@ -101,10 +101,10 @@ def test_what_is_saved_is_counted(tmp_path):
     assert "768,000 queries to learn from in place of 13,824,000 (18.0 times)" in said
 
 
-@pytest.mark.parametrize(("method", "knob"), [("point_sampled", "counts"), ("gauss_nodes", "nodes")])
-def test_one_setting_is_enough(tmp_path, method, knob):
+@pytest.mark.parametrize(("method", "parameter"), [("point_sampled", "counts"), ("gauss_nodes", "nodes")])
+def test_one_setting_is_enough(tmp_path, method, parameter):
     own = narrowed(tmp_path / "r.toml", method=method, setting="k = 16")
-    assert getattr(own.models[0].options, knob) == [16]
+    assert getattr(own.models[0].options, parameter) == [16]
     assert len(own.models) == (1 if method == "point_sampled" else 2)
     assert "nothing to train" in savings(tmp_path / "r.toml", QUICK)
 

@@ -14,7 +14,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger, measure
 from jobs.verbs.require_recipe import write_recipe
-from jobs.verbs.savings import DIFFERENCE, Saving, Value, saved, verdict
+from jobs.verbs.savings import DIFFERENCE, Saving, Value, conclusion, saved
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.measure.pictures import write_picture
@@ -147,7 +147,7 @@ def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):
     rows = by_quantity(both(runs, "point_sampled", "k = 2"))
     assert rows["queries generated"].ratio == 3.0 and math.isnan(rows["queries learnt from"].ratio)
     assert rows["frame_time over 2 points"].general.value == 1.0
-    assert "3.0 times fewer queries to generate; MSE 0.0003 in place of 0.0004." in verdict([*rows.values()])
+    assert "3.0 times fewer queries to generate; MSE 0.0003 in place of 0.0004." in conclusion([*rows.values()])
 
 
 @pytest.mark.parametrize(
@@ -156,9 +156,9 @@ def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):
 )
 def test_the_verdict_says_whether_the_error_differs(runs, interval, words):
     rows = [*by_quantity(both(runs)).values()]
-    assert "paired" not in verdict(rows)
+    assert "paired" not in conclusion(rows)
     rows.append(Saving("sphere", "neumip", DIFFERENCE, "1", Value(0.0), Value(0.0, *interval)))
-    assert words in verdict(rows)
+    assert words in conclusion(rows)
 
 
 def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
@@ -191,7 +191,7 @@ def write_frames(path, fabric):
 def test_less_than_the_aim_is_said(runs):
     few, same = Value(2.0), Value(1.0)
     rows = [Saving("s", "m", name, "1", few, same) for name in ("queries generated", "queries learnt from", "mse")]
-    assert verdict(rows).endswith("less than 3 times.")
+    assert conclusion(rows).endswith("less than 3 times.")
 
 
 def test_the_command_prints_and_writes_all_of_it(runs, capsys, monkeypatch):

@@ -75,7 +75,7 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     fabric, queries = load_fabric("voile"), mixed()
     method = Seen()
     fallback = Fallback(method, ())
-    strange = fallback.strange(fabric, queries)
+    strange = fallback.out_of_domain(fabric, queries)
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
@@ -94,7 +94,7 @@ def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
     denim = load_fabric("denim")
     rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
     queries = draw_queries(QueryOptions(sigma=(0.5, 1.0)), denim.weave.repeat, 3, 0, 20)
-    assert not fallback.strange(denim, queries).any() and fallback.strange(rough, queries).all()
+    assert not fallback.out_of_domain(denim, queries).any() and fallback.out_of_domain(rough, queries).all()
     found = fallback.predict(rough, queries)
     np.testing.assert_array_equal(found, fallback_answers(rough, queries, 0))
 
@@ -119,7 +119,7 @@ def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_met
     method.domain = Domain.of({"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}}, [fabric])
     queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
     fallback = Fallback(method, ())
-    strange = fallback.strange(fabric, queries)
+    strange = fallback.out_of_domain(fabric, queries)
     cosine = np.cos(np.radians(60.0))
     steep = np.minimum(queries.wi[:, 2], queries.wo[:, 2]) < cosine
     small = queries.sigma < 0.3
@@ -138,7 +138,7 @@ def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own()
     fabric, queries, method = load_fabric("voile"), mixed(), Seen()
     method.domain = Domain.of({}, [fabric])
     fallback = Fallback(method, {"behind", "stretch", "curvature"})
-    strange = fallback.strange(fabric, queries)
+    strange = fallback.out_of_domain(fabric, queries)
     assert strange[queries.behind].all()
     fallback.predict(fabric, queries)
     (asked,) = method.asked

@@ -34,7 +34,7 @@ def test_every_fabric_is_known_whichever_was_read_last(order):
     for fabric in CLOTHS:
         queries = draw_queries(QueryOptions(sigma=(0.5, 1.0)), fabric.weave.repeat, 3, 0, 8)
         assert method.covers(fabric)
-        assert not Fallback(method, ()).strange(fabric, queries).any()
+        assert not Fallback(method, ()).out_of_domain(fabric, queries).any()
 
 
 def test_yarns_unlike_all_of_them_are_not_known():
@@ -54,7 +54,7 @@ def test_cloth_steeper_than_was_taught_is_quadratures():
     queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), denim.weave.repeat, 3, 0, 40)
     fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
     assert steep.any() and not steep.all()
-    np.testing.assert_array_equal(fallback.strange(denim, queries), steep)
+    np.testing.assert_array_equal(fallback.out_of_domain(denim, queries), steep)
     found = fallback.predict(denim, queries)
     np.testing.assert_array_equal(found[~steep], method.predict(denim, queries.take(~steep)))
     np.testing.assert_array_equal(found[steep], fallback_answers(denim, queries.take(steep), 0))

@@ -82,4 +82,4 @@ def test_a_model_taught_what_a_scene_requires_answers_for_it(low, factor, angle,
     domain = Domain.of({"queries": taught.model_dump()}, [denim])
     assert not domain.faults(asked, "m")
     # Two ends and four quantities, of 4,000 queries: two each, and one more for the quantile between two of them.
-    assert domain.strange(denim, asked).sum() <= 6 * 3
+    assert domain.out_of_domain(denim, asked).sum() <= 6 * 3

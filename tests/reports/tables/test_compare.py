@@ -31,7 +31,7 @@ def error_of(method, value, standard_error, fabric="denim", scene="queries"):
 
 def verdicts(a, b):
     found = compare(a, b)
-    return [one.verdict for one in (*found.times, *found.errors)]
+    return [one.result for one in (*found.times, *found.errors)]
 
 
 def test_a_shift_of_5_percent_is_marked_and_only_where_it_is():
@@ -67,7 +67,7 @@ def test_what_lacks_samples_or_standard_errors_is_not_tested():
     without = with_samples.model_copy(update={"samples": ()})
     exact = error_of("m", 1.0, None)
     found = compare([with_samples, exact], [without, error_of("m", 9.0, 0.1)])
-    assert [one.verdict for one in (*found.times, *found.errors)] == ["not tested"] * 2
+    assert [one.result for one in (*found.times, *found.errors)] == ["not tested"] * 2
     # What is not tested does not make the others stricter.
     more = compare([without, error_of("m", 1.0, 0.1)], [without, error_of("m", 2.0, 0.1)])
     assert more.errors[0].p == compare([error_of("m", 1.0, 0.1)], [error_of("m", 2.0, 0.1)]).errors[0].p
@@ -85,7 +85,7 @@ def test_like_is_compared_with_like():
     a = [one, two, *edits, *other, error_of("m", 1.0, 0.1, "denim"), error_of("gone", 1.0, 0.1)]
     found = compare(a, [*reversed(a[:-1]), error_of("m", 5.0, 0.1, "basket"), time_of("new", fast)])
     assert len(found.times) == 4 and len(found.errors) == 1
-    assert all(row.a == row.b and row.verdict == "no difference shown" for row in (*found.times, *found.errors))
+    assert all(row.a == row.b and row.result == "no difference shown" for row in (*found.times, *found.errors))
     assert (found.only_a, found.only_b) == (1, 2)
 
 
