@@ -28,7 +28,7 @@ LEVEL: Final = 0.05
 TIMES: Final[tuple[Metric, ...]] = ("time", "prepare_time", "encode_time")
 """Metrics that are compared by their samples."""
 
-Verdict = Literal["faster", "slower", "lower", "higher", "no difference shown", "not tested"]
+Outcome = Literal["faster", "slower", "lower", "higher", "no difference shown", "not tested"]
 
 _Key = tuple[Metric, str, str, str, int, str]
 
@@ -50,13 +50,13 @@ class Difference:
         return self.b.value / self.a.value if self.a.value > 0 else math.nan
 
     @property
-    def result(self) -> Verdict:
+    def result(self) -> Outcome:
         """Result of the test of B against A."""
         if math.isnan(self.p):
             return "not tested"
         if self.p > LEVEL:
             return "no difference shown"
-        words: tuple[Verdict, Verdict] = ("faster", "slower") if self.a.metric in TIMES else ("lower", "higher")
+        words: tuple[Outcome, Outcome] = ("faster", "slower") if self.a.metric in TIMES else ("lower", "higher")
         return words[self.sign > 0]
 
 
