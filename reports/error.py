@@ -133,7 +133,7 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resam
 
 
 def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
-    """Return the mean squared error of each component, in the order of `frames.COMPONENTS`."""
+    """Return the mean squared error of each component, in the order of `pipeline.truth.conventions.COMPONENTS`."""
     components = np.asarray(values)
     return [
         squared_error(components[:, j], answers.mean[:, j], answers.standard_error[:, j], resamples=0)

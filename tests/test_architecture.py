@@ -4,8 +4,10 @@ Standard library only, so that this holds before anything is installed that coul
 """
 
 import ast
+import re
 import subprocess
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -145,6 +147,91 @@ def test_rooms_are_small_and_say_what_is_in_them(room):
     assert len(files) <= (6 if room == ROOT / "pipeline" / "truth" else 18), f"{room}: {len(files)} files"
     described = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
     assert described and len(described.splitlines()) <= 10, f"{room}: its docstring is missing or too long"
+
+
+SOURCES = [*MODULES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
+"""Files whose docstrings and comments may name modules."""
+
+DOTTED = re.compile(r"(?<![\w./-])(?:weaves|pipeline|reports|jobs)(?:\.[A-Za-z_]\w*)+")
+"""Full names of modules and of what is in them."""
+
+CONSTANTS = re.compile(r"`([a-z_]\w*)\.([A-Z][A-Z_]*\w*)`")
+"""Names in capitals after the last part of a module's name, such as `kernels.SMOOTH`."""
+
+PATHS = re.compile(r"(?<![\w./-])(?:weaves|pipeline|reports|jobs|tests)(?:/[\w.-]*\w)+")
+"""Files and folders of the tree."""
+
+
+def defined(body: list[ast.stmt]) -> dict[str, ast.stmt]:
+    """Return the names that statements of a module or class bind, each with its statement."""
+    found: dict[str, ast.stmt] = {}
+    for node in body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            found[node.name] = node
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            found |= {(alias.asname or alias.name).split(".")[0]: node for alias in node.names}
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            found |= {name.id: node for name in ast.walk(node) if isinstance(name, ast.Name)}
+        elif isinstance(node, (ast.If, ast.Try, ast.For, ast.With)):
+            found |= defined(node.body)
+    return found
+
+
+TOP = {module: defined(ast.parse(path.read_text(encoding="utf-8")).body) for module, path in MODULES.items()}
+
+
+def exists(name: str) -> bool:
+    """Return whether a dotted name is a module, a name in one, or a member of a class in one."""
+    parts = name.split(".")
+    length = next(n for n in range(len(parts), 0, -1) if ".".join(parts[:n]) in MODULES)
+    names = TOP[".".join(parts[:length])]
+    for part in parts[length:]:
+        if part not in names:
+            return False
+        node = names[part]
+        names = defined(node.body) if isinstance(node, ast.ClassDef) else {}
+    return True
+
+
+def missing_names(text: str) -> list[str]:
+    """Return the modules, constants of modules and paths that a text names and that do not exist."""
+    wrong = [name for name in DOTTED.findall(text) if not exists(name)]
+    for stem, name in CONSTANTS.findall(text):
+        modules = [module for module in MODULES if module.rpartition(".")[2] == stem]
+        if modules and not any(name in TOP[module] for module in modules):
+            wrong.append(f"{stem}.{name}")
+    return wrong + [path for path in PATHS.findall(text) if "NAME" not in path and not (ROOT / path).exists()]
+
+
+def prose(path: Path) -> str:
+    """Return the docstrings and comments of a file."""
+    with path.open("rb") as file:
+        comments = [token.string for token in tokenize.tokenize(file.readline) if token.type == tokenize.COMMENT]
+    nodes = (node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Expr))
+    strings = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return "\n".join(strings + comments)
+
+
+def test_names_in_docstrings_and_comments_exist():
+    wrong = {str(path.relative_to(ROOT)): missing_names(prose(path)) for path in SOURCES}
+    assert not any(wrong.values()), {path: names for path, names in wrong.items() if names}
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("see pipeline.truth.query", []),
+        ("`pipeline.truth.query.Queries.take`, then", []),
+        ("`pipeline.truth.query.Queries.asked`", ["pipeline.truth.query.Queries.asked"]),
+        ("(pipeline.truth.sums)", ["pipeline.truth.sums"]),
+        ("`kernels.SMOOTH`", []),
+        ("`kernels.ROUGH`", ["kernels.ROUGH"]),
+        ("tests/fits and pipeline/atomic.py.", []),
+        ("tests/fit", ["tests/fit"]),
+    ],
+)
+def test_the_search_for_missing_names_can_fail(text, wrong):
+    assert missing_names(text) == wrong
 
 
 MOST_PARAMETERS, MOST_LINES = 12, 100

@@ -15,7 +15,7 @@ from weaves.fabric import Fabric
 
 
 def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64]:
-    """Return the linear RGB colours of the components in the order of `frames.COMPONENTS`, (4, 3).
+    """Return the linear RGB colours of the components in the order of `pipeline.truth.conventions.COMPONENTS`, (4, 3).
 
     Light that is `transmitted`, from the other side of the cloth, takes the diffuse colours k_dt.
     """

@@ -1,6 +1,6 @@
-"""Queries and answers: what a patch BSDF is asked, and what comes back.
+"""Queries of the patch BSDF and their answers.
 
-A query is one patch seen from one direction and lit from another (pipeline.truth.conventions says who is who); an
+A query is one patch seen from one direction and lit from another (directions: pipeline.truth.conventions); an
 answer holds the four components.
 """
 
@@ -18,7 +18,7 @@ _UNIT_TOLERANCE = 1e-4
 
 
 class Queries(NamedTuple):
-    """N questions about one fabric.
+    """N queries about one fabric.
 
     Attributes
     ----------
@@ -27,7 +27,8 @@ class Queries(NamedTuple):
     sigma : float32 (N,)
         Standard deviation of the footprint along its first axis, in yarn spacings, > 0.
     wi, wo : float32 (N, 3)
-        Unit vectors to the light and to the viewer; on different sides of the cloth, its transmission is asked for.
+        Unit vectors to the light and to the viewer; if they are on different sides of the cloth, the answer is its
+        transmission.
     sigma_minor : float32 (N,)
         Standard deviation along the second axis, at right angles to the first; equal to `sigma` if round.
     angle : float32 (N,)
@@ -61,7 +62,7 @@ class Queries(NamedTuple):
 
     @property
     def behind(self) -> Mask:
-        """Which queries have light or viewer behind the cloth, (N,)."""
+        """True for queries with light or viewer behind the cloth, (N,)."""
         return np.asarray((self.wi[:, 2] < 0.0) | (self.wo[:, 2] < 0.0))
 
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
@@ -70,7 +71,7 @@ class Queries(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """N patch BSDF values with their uncertainty; columns in the order of `frames.COMPONENTS`.
+    """N patch BSDF values with their uncertainty; columns in the order of `pipeline.truth.conventions.COMPONENTS`.
 
     Attributes
     ----------
@@ -106,7 +107,7 @@ STEEPEST_CURVATURE = 1.0
 
 
 def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
-    """Return what is wrong with the queries that have no answer: row -> (column, value, what is allowed)."""
+    """Return the fault of each query that has no answer: row -> (column, value, what is allowed)."""
     found: dict[int, tuple[str, object, str]] = {}
 
     def note(rows: Any, name: str, column: Float32, allowed: str) -> None:

@@ -53,7 +53,7 @@ def test_crown_of_a_plain_float_by_hand():
 
 
 def test_a_point_off_the_axis_by_hand():
-    """PHYSICS: sin v = x/r, sin u = y/(R + r cos v); at x = .25, y = .3 of a float with R = 1, r = 1/2."""
+    """Closed form: sin v = x/r, sin u = y/(R + r cos v); at x = .25, y = .3 of a float with R = 1, r = 1/2."""
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 0}, {"bend": 30, "twist": 0})
     cos_v = np.sqrt(0.75)
     sin_u = 0.3 / (1 + 0.5 * cos_v)
