@@ -22,7 +22,8 @@ class PointSampler:
     fabric : Fabric
         The cloth.
     options : TruthOptions
-        Footprint, frame, normaliser and geometry; the estimator and its limits play no part. Left out: the defaults.
+        Footprint, frame, normaliser, shadows and variation; the estimator and its limits play no part. Left out: the
+        defaults.
     """
 
     def __init__(self, fabric: Fabric, options: TruthOptions | None = None) -> None:

@@ -1,4 +1,4 @@
-"""The conventions every module follows; stated here once.
+"""Conventions of all modules: axes, units, directions, components. They are stated here once.
 
 Axes
     Fabric plane z = 0, macro normal n_s = +z; warp yarns run along y, weft yarns along x. Length: one yarn spacing.
@@ -12,7 +12,7 @@ Components
 Gaps and transmission
     Where no yarn covers the fabric plane is a gap, at z = 0; what is seen through it counts in the denominator only.
     `transparency` is the share of light from straight behind (-wo) that reaches the viewer unscattered: through gaps,
-    and through yarns as exp(-T Lambda). wi and wo on different sides ask for transmission: specular components then
+    and through yarns as exp(-T Lambda). wi and wo on different sides mean transmission: specular components then
     take k_s, diffuse ones the colour k_dt. A viewer behind the cloth sees `Fabric.back()`, reflected in the plane.
 Curved cloth
     Wrapped around a cylinder, the cloth falls away from its tangent plane by kappa s^2 / 2 at distance s.

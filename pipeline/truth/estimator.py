@@ -1,8 +1,8 @@
 """The estimators of the patch BSDF behind one interface: means, standard errors, points used.
 
 `mc`, `jittered`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
-`node_table` sums over nodes with horizons; `auto` uses it where its error is small enough, and samples otherwise
-(node_table.cascade).
+`node_table` sums over nodes with horizons; `auto` takes `node_table` where its error is small enough, and samples the
+other queries (node_table.cascade).
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     queries : Queries
-        N questions; viewer and light may be on either side of the cloth.
+        N queries; viewer and light may be on either side of the cloth.
     options : TruthOptions
         Estimator, requested error, and the choices of the model.
     seed : int

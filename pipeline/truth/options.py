@@ -23,7 +23,7 @@ class Variation(BaseModel):
     spread: float = Field(gt=0, le=2)
     """Standard deviation of the logarithm of the factor."""
     seed: int = Field(default=0, ge=0, lt=2**63)
-    """Which factors."""
+    """Seed of the factors."""
     repeats: int = Field(default=4, ge=1, le=32)
     """Repeats of the draft, in each direction, until the factors begin again."""
 
@@ -40,7 +40,7 @@ class TruthOptions(BaseModel):
     relative_error: float = Field(default=0.02, gt=0, le=1)
     """Stop when the norm of the four standard errors falls below this share of the norm of the four means."""
     absolute_error: float = Field(default=1e-5, ge=0, le=1)
-    """Or below this, 1/sr: dark patches need no more."""
+    """Also stop when that norm falls below this, 1/sr: dark patches need no more."""
     min_count: int = Field(default=256, ge=32)
     """Points before the error is first estimated; a power of two."""
     max_count: int = Field(default=4096, ge=32)

@@ -19,7 +19,7 @@ REACH: Final = 3.0
 """Standard deviations at which a footprint is cut."""
 
 BANDS: Final = 49
-"""Of yarns and gaps that a narrow footprint reaches into, at most: seven an axis."""
+"""Most parts of pieces that a narrow footprint covers: seven along each axis."""
 
 _SLIVER: Final = 0.05  # pieces of a footprint thinner than so many deviations are left out
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)

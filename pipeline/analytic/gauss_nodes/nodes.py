@@ -42,13 +42,13 @@ class GaussNodes(NamedTuple):
     Attributes
     ----------
     points : float32 (ROWS, N)
-        What `locate` finds at the nodes, and half the extents of their boxes; other rows are the query's.
+        Rows of `locate` at the nodes, and half the extents of their boxes; the other rows depend on the query.
     mean, steepness : float32 (azimuths, N)
         Mean sine of the horizon's elevation over the node's box, and the ramp's steepness.
     evenly : float32 (N,)
         Share of the area.
     pieces : int64 (P, 7)
-        See above.
+        Columns FIRST to COPIES.
     copies : int64 (C, 2)
         End and pick of the cells in which pieces lie.
     positions, weights : float32 (R, n)

@@ -33,12 +33,11 @@ from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_ax
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
 
 LONG: Final = 0.75
-"""Largest deviation of the wider axis at which nodes are placed in a footprint that is narrow along the other axis.
-
-It bounds their number."""
+"""Largest deviation along the wider axis for which nodes are placed in a footprint that is narrow along the other axis.
+This bounds the number of nodes."""
 
 RESOLVED: Final = 0.12
-"""Least deviation whose density fixed nodes resolve; a narrower one is taken as this."""
+"""Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
 
 # Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))

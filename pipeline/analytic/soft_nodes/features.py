@@ -47,19 +47,19 @@ from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_T
 from pipeline.truth.query import Queries
 
 FEATURES: Final = 40
-"""Numbers a query."""
+"""Features of a query."""
 
 OF_QUERY: Final = 30
-"""The first of them; the others are the same for all queries of a cloth."""
+"""Number of leading features that depend on the query; the others are the same for all queries of a cloth."""
 
 EXCHANGED: Final = np.array(
     [*range(8, 16), *range(8), 17, 16, 18, 20, 19, 21, 23, 22, 24, 25, 26, 27, 29, 28]
     + [k + 1 - 2 * (k % 2) for k in range(OF_QUERY, FEATURES)]
 )
-"""Where each feature comes from when x and y are exchanged."""
+"""Index of the feature that each one becomes when x and y are exchanged."""
 
 EXCHANGED_SIGN: Final = np.array([-1.0 if k in (28, 29) else 1.0 for k in range(FEATURES)], np.float32)
-"""Its factor then: a mirror reverses the twists."""
+"""Factor of each feature under that exchange: a mirror reverses the twists."""
 
 _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least

@@ -1,4 +1,4 @@
-"""Groups of like pieces: the pieces of a repeat that share nodes.
+"""Groups of similar pieces: the pieces of a repeat that share nodes.
 
 Pieces of one shape that lie alike on floats of one length form a group. A draft of many different floats has too many
 groups: then the two most alike are merged, again and again (Ward's distance between their inclinations), until the
@@ -37,7 +37,7 @@ class PieceGroup(NamedTuple):
     cells : list of (end, pick)
         Where they lie.
     blocks : list of int
-        What their horizons are called; one for each cell.
+        Numbers of their horizons, one for each cell.
     """
 
     piece: Piece

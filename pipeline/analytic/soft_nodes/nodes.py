@@ -63,7 +63,7 @@ class Table(NamedTuple):
     float_length : float32 (2,)
         Mean length of the floats of each family over the cells that show them; 1 if none does.
     uniform, waves_from : float
-        Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves say its weights.
+        Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves give its weights.
     starts : int64 (4,)
         First block of the nodes on warps, on wefts, in gaps; their end.
     nodes : float32 (B, ROWS, BLOCK_NODES)
@@ -231,7 +231,7 @@ def _filled(rows: list[Float64], edge: bool) -> Float32:
 def _float_lengths(front: HeightField) -> Float32:
     found = []
     for family in (WARP, WEFT):
-        # Float64 that never end count as long as the repeat.
+        # A float that never ends counts as long as the repeat.
         shown = np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], 0.5 * front.top.shape[family])
         found.append(2.0 * float(shown.mean()) if shown.size else 1.0)
     return np.array(found, np.float32)

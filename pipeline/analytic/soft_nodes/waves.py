@@ -1,7 +1,7 @@
 """Waves: the weights of all nodes under a wide Gaussian as a sum over the longest waves of the cloth.
 
 The cells of a group form a lattice; a Gaussian of deviation s damps its wave of wave vector k by exp(-2 pi^2 s^2 k^2).
-From some deviation on, the few longest waves that the cloth's groups tell apart are all that is left:
+From some deviation on, only the few longest waves that differ between the groups of the cloth remain:
 
     weight(node) = evenly(node) (1 + sum 2 damping mean over its cells of cos(2 pi k (centre - place)))
 """
@@ -51,7 +51,7 @@ class Waves(NamedTuple):
 
 
 def faintest(deviation: float) -> float:
-    """Return the wave number of the wave that a Gaussian damps to where it is left out."""
+    """Return the wave number from which on a Gaussian damps waves so much that they are left out."""
     return math.sqrt(-math.log(_FAINT) / 2.0) / (math.pi * deviation)
 
 

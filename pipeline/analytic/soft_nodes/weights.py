@@ -21,7 +21,7 @@ from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import WEFT
 
 REACH: Final = 2.6
-"""Deviations after which a footprint is cut off: 1 % of it."""
+"""Deviations at which a footprint is cut off; 1 % of it lies beyond."""
 
 TURN_ROWS: Final = 4
 """Rows of the scratch of `wave_weights`: cosines and sines of whole turns of x, then of y."""

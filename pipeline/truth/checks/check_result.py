@@ -1,6 +1,6 @@
-"""The result of a check: a number holds exactly, within its statistical error, or not.
+"""Result of a check: a number agrees with its expected value exactly, within its statistical error, or not.
 
-A number without statistical error holds if it equals its expected value up to rounding. Many numbers with errors hold
+A number without statistical error passes if it equals its expected value up to rounding. Many numbers with errors pass
 if Student's t of the worst stays below the quantile of `LEVEL`, with Sidak's correction for their number.
 """
 
@@ -27,15 +27,15 @@ class CheckResult(NamedTuple):
     Attributes
     ----------
     name : str
-        What is measured.
+        Measured quantity.
     measured, expected, standard_error : float
-        The number, what it should be, and its uncertainty, 0 if it has none.
+        Measured number, expected value, and standard error, which is 0 for an exact number.
     relation : str
-        Whether it should be equal or at most so large; ``reported``: there is no expected value.
+        Expected relation of the number to the expected value; ``reported``: there is no expected value.
     status : str
         ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
     note : str
-        What else to know.
+        Remark, shown in the table.
     """
 
     name: str
@@ -48,7 +48,7 @@ class CheckResult(NamedTuple):
 
     @property
     def sigmas(self) -> float:
-        """Distance from what is expected in standard errors; 0 without any."""
+        """Distance from the expected value in standard errors; 0 for an exact number."""
         return (self.measured - self.expected) / self.standard_error if self.standard_error else 0.0
 
 
@@ -92,7 +92,7 @@ def worst(
 
 
 def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Float64:
-    """Return first / second, and 1 where they are equal, so that nothing over nothing is no difference."""
+    """Return first / second, and 1 where they are equal, 0 / 0 included."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.equal(first, second), 1.0, np.divide(first, second, dtype=np.float64))
 

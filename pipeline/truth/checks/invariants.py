@@ -107,7 +107,7 @@ def patch_reciprocity(fabric: Fabric) -> list[CheckResult]:
 
 
 def range_of_values(fabric: Fabric) -> list[CheckResult]:
-    """Test that no answer is negative or not finite, and 0 <= transparency <= 1, over everything that can be asked."""
+    """Test that no answer is negative or not finite, and 0 <= transparency <= 1, over all kinds of queries."""
     rng = np.random.default_rng(_SEED + 2)
     angles = (0.0, 45.0, 80.0, 89.0, 89.9)
     odd, rows, low, high = 0, 0, math.inf, -math.inf
@@ -139,7 +139,9 @@ def range_of_values(fabric: Fabric) -> list[CheckResult]:
 
 
 def energy(fabric: Fabric) -> list[CheckResult]:
-    """Test that no light is made: unit radiance from everywhere is seen as at most 1, if k_d, k_dt or k_s is 1.
+    """Test that the cloth gains no light: under unit radiance from everywhere it returns at most 1.
+
+    Each of k_d, k_dt and k_s is 1 in turn.
 
     int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at several angles of wo; k_s with all that goes
     straight through. Directions are low-discrepancy points of the hemisphere, randomly shifted in each randomisation.
@@ -232,8 +234,8 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
         )
     ):
         sizes = (np.full(rows, size * n, np.float32) for n in (ends, picks))
-        asked = queries._replace(**dict(zip(("sigma", "sigma_minor"), sizes, strict=True)))
-        answers = estimate(fabric, asked, _fixed(16_384, footprint=footprint), seed)
+        resized = queries._replace(**dict(zip(("sigma", "sigma_minor"), sizes, strict=True)))
+        answers = estimate(fabric, resized, _fixed(16_384, footprint=footprint), seed)
         seen = mean[:, :4] > 1e-7
         scale = mean[:, :4][seen]
         spread = np.hypot(answers.standard_error, error[:, :4])[seen] / scale
@@ -284,7 +286,7 @@ def translation(fabric: Fabric) -> list[CheckResult]:
     found = []
     for name, count in (("one repeat", 1), ("1000 repeats", 1000)):
         far = near._replace(u=near.u + np.float32(count * ends), v=near.v - np.float32(count * picks))
-        here, there = (estimate(fabric, asked, _fixed(512), 7).mean for asked in (near, far))
+        here, there = (estimate(fabric, moved, _fixed(512), 7).mean for moved in (near, far))
         apart = float((np.abs(here - there) / np.maximum(here.max(axis=1, keepdims=True), 1e-12)).max())
         found.append(exact(f"change by a move of {name}", apart, 0.0, ROUNDING, note="relative to the largest part"))
     return found
@@ -293,7 +295,7 @@ def translation(fabric: Fabric) -> list[CheckResult]:
 def agreement(fabric: Fabric) -> list[CheckResult]:
     """Test that all estimators give the same answers, each compared with one of them that takes more points.
 
-    One that does not know the cloth, as `table` does not a large irregular draft, is left out.
+    An estimator that cannot answer for the cloth is left out: `node_table` has a limit of different cells.
     """
     rng = np.random.default_rng(_SEED + 8)
     rows, reference = 24, "owen"

@@ -1,13 +1,11 @@
 """Elliptic Gaussians at an angle to the yarns, as mixtures of Gaussians along them.
 
-A Gaussian of deviations s_x, s_y and correlation r is the convolution of one along the axes, of deviations
-sqrt(1 - |r|) s_x and sqrt(1 - |r|) s_y, with one on the line (sqrt(|r|) s_x, sign(r) sqrt(|r|) s_y) z, z normal. On the
-line points in even steps h stand for the whole. Of waves exp(i w.x) the mixture keeps a first alias of
-
-    exp(-(2 pi / h)^2 (1 - |r|) / (1 + |r|) / 2)
-
-at most, so steps are step sqrt((1 - |r|) / (1 + |r|)); for weak correlations two or three points of Gauss-Hermite do.
-Wherever weights are products of two axes, an ellipse costs a product a point, and its nodes are shaded once.
+A Gaussian of deviations s_x, s_y and correlation r is the convolution of one along the axes, of deviations sqrt(1 -
+|r|) s_x and sqrt(1 - |r|) s_y, with one on the line (sqrt(|r|) s_x, sign(r) sqrt(|r|) s_y) z, z normal. The mixture has
+its components at even steps h along the line. For a wave exp(i w.x) its first alias is at most exp(-(2 pi / h)^2 (1 -
+|r|) / (1 + |r|) / 2), so h is step sqrt((1 - |r|) / (1 + |r|)); for weak correlations two or three points of
+Gauss-Hermite are enough. Where weights are products of two axes, an ellipse costs one product for each point of the
+line, and its nodes are shaded once.
 
 No wave differs by more than 2 % from that of the ellipse with a `COARSE_LINE`, which is for methods; by more than 1e-4
 with a `FINE_LINE`, which is for the truth.
@@ -26,7 +24,7 @@ from pipeline.truth.query import Queries
 
 
 class Line(NamedTuple):
-    """How points are laid on the line.
+    """Positions of the points on the line.
 
     Attributes
     ----------

@@ -1,11 +1,11 @@
-"""Footprints folded by periodicity: where in the repeat a patch of any size puts its points, and with which weight.
+"""Footprints folded by periodicity: positions in the repeat, and weights, of the points of a patch of any size.
 
-A kernel of any width over an endless fabric is a density on one repeat, wrapped; both kernels are products of one axis
-each. A narrow axis is sampled from the kernel itself and wrapped. A wide one would wrap many times and lose the order
-of low-discrepancy points, so it is sampled evenly over the repeat and weighted by the wrapped density instead; for a
-Gaussian of one repeat or more that weight is 1 to 4e-16. The choice depends on the size alone, so both are the same
-integral. A footprint with two axes at an angle is no product in x and y: it is sampled from the kernel and wrapped,
-unless it covers the repeat evenly.
+A kernel of any width over an endless fabric is a wrapped density on one repeat; both kernels are products of one factor
+for each axis. A narrow axis is sampled from the kernel itself and wrapped. A wide one would wrap many times and lose
+the order of low-discrepancy points, so it is sampled evenly over the repeat and weighted by the wrapped density
+instead; for a Gaussian of one repeat or more that weight is 1 to 4e-16. The choice depends on the size alone, so both
+are the same integral. A footprint with two axes at an angle is no product in x and y: it is sampled from the kernel and
+wrapped, unless it covers the repeat evenly.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def place(shape: int, centre: float, sigma: float, repeat: float, number: float)
     centre, sigma, repeat : float
         Centre and standard deviation of the kernel and length of the repeat, in yarn spacings.
     number : float
-        Where in the distribution.
+        Numbers in (0, 1) that select the point.
     """
     if shape == GAUSSIAN:
         if sigma < _WIDE_GAUSSIAN * repeat:
@@ -95,7 +95,7 @@ def place_pair(
     ends, picks : float
         The repeat.
     first, second : float
-        Where in the distribution.
+        Numbers in (0, 1) that select the point.
     """
     if angle == 0.0 or (shape == GAUSSIAN and sigma == sigma_minor):
         x, weight_x = place(shape, u, sigma, ends, first)

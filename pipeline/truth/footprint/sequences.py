@@ -1,10 +1,10 @@
 """Random and low-discrepancy numbers as pure functions of (key, index, dimension).
 
-Nothing is drawn "next": any worker, in any order, finds the same number under the same name. The generator is
-SplitMix64's finaliser over a Weyl sequence [Steele2014SplitMix]. Points in the unit square: independent; jittered, one
-in each stratum of a grid; R2, the additive sequence of the plastic number with a random shift [Roberts2018R2]; and the
-first two Sobol dimensions [Sobol1967] with nested uniform (Owen) scrambling by the Laine-Karras hash in Vegdahl's
-constants [Burley2020Owen].
+There is no state: any worker, in any order, computes the same number from the same key, index and dimension. The
+generator is SplitMix64's finaliser over a Weyl sequence [Steele2014SplitMix]. Points in the unit square: independent;
+jittered, one in each stratum of a grid; R2, the additive sequence of the plastic number with a random shift
+[Roberts2018R2]; and the first two Sobol dimensions [Sobol1967] with nested uniform (Owen) scrambling by the
+Laine-Karras hash in Vegdahl's constants [Burley2020Owen].
 """
 
 from __future__ import annotations

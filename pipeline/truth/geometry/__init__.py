@@ -1,4 +1,5 @@
-"""The surface of one repeat and what hides what: heightfield, visibility (shadows, masking), horizon, opacity.
+"""Geometry of one repeat: heightfield (surface), visibility (shadows and masking), horizon, opacity.
 
-pieces and symmetry cut a repeat into what differs; gloss varies the specular colour from float to float.
+horizon tabulates visibility; opacity is that of curved cloth. pieces and symmetry find the different parts of a repeat;
+gloss varies the specular colour from float to float; march and azimuths are shared helpers.
 """

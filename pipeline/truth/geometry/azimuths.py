@@ -1,4 +1,4 @@
-"""Azimuths for which something is tabulated: evenly spaced, counter-clockwise from +x, linear in between."""
+"""Azimuths of tables: evenly spaced, counter-clockwise from +x, with linear interpolation between them."""
 
 from __future__ import annotations
 

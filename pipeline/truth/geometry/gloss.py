@@ -1,4 +1,4 @@
-"""Yarns that differ: a random factor of the specular colour for every float, as real cloth glitters [Jin2022Woven].
+"""Random gloss: a factor of the specular colour for every float, because real cloth glitters [Jin2022Woven].
 
 The factors are log-normal with mean 1; their spread is chosen here, because the published form is not stated. A cloth
 that varies is a larger cloth that repeats: the draft is tiled, so that every float of the tile has a factor of its own
@@ -31,7 +31,7 @@ def gloss(
     variation : Variation
         How much the floats differ.
     family, side : int
-        Whose float; whether it lies on top (0) or beneath (1) here.
+        Family of the float; 0 if it lies on top here, 1 if it lies beneath.
     pick, end : int
         The cell.
     offset, length : float

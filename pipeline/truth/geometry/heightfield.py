@@ -2,7 +2,7 @@
 
 `weaves.surface` is the oracle in NumPy; the functions here repeat its formulas for one point, because a ray visits one
 cell after another. A float on top is a piece of a torus seen from outside [Irawan2012Woven]; its height,
-sqrt((R + rho)^2 - y^2) with rho = sqrt(r^2 - x^2), is CONCAVE in (x, y): visibility rests on that.
+sqrt((R + rho)^2 - y^2) with rho = sqrt(r^2 - x^2), is CONCAVE in (x, y): visibility relies on that.
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ def local_position(family: int, offset: float, x: float, y: float, end: int, pic
 def surface_at(
     field: HeightField, x: float, y: float, end: int, pick: int
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
-    """Return what is seen from above at (x, y) in cell (pick, end) of the repeat.
+    """Return the surface seen from above at (x, y) in cell (pick, end) of the repeat.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Horizons: how steeply a ray must rise to leave the cloth, for points and azimuths, tabulated once for many queries.
+"""Horizons: the least slope of a ray that leaves the cloth, for points and azimuths, tabulated once for many queries.
 
 The slope of the horizon is the greatest (h(s) - z) / s over everything that a ray crosses. Within a cell h is concave
 (heightfield), so that the slope rises and then falls.
@@ -206,8 +206,8 @@ def horizon_sines(
 ) -> Float64:
     """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
 
-    Who looks through a gap sees it if nothing on the other side of the cloth, `back` seen from -wo, hides it either:
-    there the higher of both horizons counts. `azimuths` is even.
+    A view through a gap is free only if the other side of the cloth, `back` seen from -wo, does not hide it either: in
+    a gap the higher of both horizons counts. `azimuths` is even.
     """
     slopes = horizons(front, x, y, azimuths, False).astype(np.float64)
     if gap.any():

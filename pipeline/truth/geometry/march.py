@@ -82,7 +82,7 @@ def span_on_top(
 ) -> tuple[float, float]:
     """Return the part of the way from `start` to `stop` through a cell that lies over its top yarn.
 
-    Before and after it, the yarn beneath or a gap shows. If all of it does, both numbers are equal.
+    Before and after that part, the yarn beneath or a gap shows. If the top yarn covers nothing, both numbers are equal.
     """
     family = int(field.top[cell.pick, cell.end])
     if field.yarn[family, RADIUS] >= 0.5:

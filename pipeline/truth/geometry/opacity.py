@@ -179,7 +179,7 @@ def opacity(
     fabric : Fabric
         The cloth.
     queries : Queries
-        N questions. `wi` plays no part, and `wo` may have any sign: with wo.z <= 0 a ray leaves the boundary where it
+        N queries. `wi` plays no part, and `wo` may have any sign: with wo.z <= 0 a ray leaves the boundary where it
         enters, which is an opacity of 0.
     options : TruthOptions
         Its footprint and counts; `relative_error` is taken of full opacity. Always from `owen` points, with shadows.

@@ -1,6 +1,6 @@
-"""Pieces: the rectangles of a cell with one surface each, as it shows them from above.
+"""Pieces: the rectangles of a cell as seen from above, each with one surface.
 
-A cell shows its top yarn; where that leaves room, the yarn beneath on either side, and gaps in the corners.
+A cell shows its top yarn; if that yarn is narrow, also the yarn beneath on either side, and gaps in the corners.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The estimators `node_table` and `auto`: sums over tabulated nodes with exact horizons.
 
-build makes the nodes, tables keeps them for the last cloths; weights spreads a footprint over them, kernels are the
-loops over nodes, shares their arrays. answer sums, refine samples nodes on borders of shadows, cascade is `auto`: a
-coarse table, a fine one, sampling.
+cascade is `auto`: a coarse table, a fine one, sampling. tables keeps the nodes of the last cloths; build makes them.
+answer sums over nodes for each query, refine samples the nodes on borders of shadows. weights spreads a footprint over
+nodes; kernels has the loops over nodes, shares their arrays.
 """

@@ -2,9 +2,9 @@
 
 The error of a sum over nodes comes mostly from borders of shadows that cross nodes. The margins of two nodes show how
 far the border between them lies from half-way, and so by how much it moves the sum; this is reported as an error. Where
-the horizon jumps, the place of the border is unknown. Curvature within a node (`kernels.SMOOTH`) and what neither nodes
-nor borders show (`refine.UNSEEN`) add a share each; both were fitted to converged answers (tests/fits). Where the
-estimated error exceeds the requested one, the nodes on borders are sampled (refine).
+the horizon jumps, the place of the border is unknown. Curvature within a node (`kernels.SMOOTH`) and errors that
+neither nodes nor borders show (`refine.UNSEEN`) add a share each; both were fitted to converged answers (tests/fits).
+Where the estimated error exceeds the requested one, the nodes on borders are sampled (refine).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """The estimators `node_table` and `auto`: sums over tabulated nodes, and sampling of all other queries.
 
-`auto` takes a coarse table if the footprint is wide, and then a fine one, which costs ten to forty microseconds a
-query. The fine one samples the nodes on borders of shadows where its error exceeds the requested one (refine). Queries
-whose error is still too large are sampled as a whole, and so are all that no table knows: tiny and very thin
-footprints, curved cloth, cloths of many different cells, and other models than the default.
+`auto` evaluates wide footprints by a coarse table. All others, and those whose error exceeds the requested one, go to a
+fine table, which costs ten to forty microseconds a query. Where its error is too large, the fine table samples the
+nodes on borders of shadows (refine). Queries whose error is still too large are sampled as a whole. So are all queries
+that no table can answer: tiny and very thin footprints, curved cloth, cloths of many different cells, and options of
+the truth other than the default.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pipeline.compiled.decorators import kernel
 
 
 class NodeShares(NamedTuple):
-    """Shares of the nodes in the sums of one query; written for each query again.
+    """Shares of the nodes in the sums of one query; overwritten for each query.
 
     Attributes
     ----------

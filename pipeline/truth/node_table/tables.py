@@ -1,4 +1,4 @@
-"""Tables of nodes of one resolution: built once for a cloth, kept for the last cloths, and the queries they know.
+"""Node tables of one resolution, kept for the last cloths, and the queries that they can answer.
 
 A table answers queries about flat cloth with at most `TABLE_CELLS` different cells, for the default model and
 footprints of at least `TABLE_SIGMA`. Rotated Gaussians are mixtures of Gaussians along the yarns (footprint.mixture),

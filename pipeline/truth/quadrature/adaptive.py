@@ -2,10 +2,10 @@
 
 The fabric is cut into the rectangles on which its surface is smooth: floats on top, strips of the yarn beneath, gaps.
 Across a yarn the nodes are taken in the angle v, x = r sin v, which turns the vertical tangent at its edge into nothing
-special. A rectangle is clipped to the footprint and cut again where the kernel is narrow against it (quadrature_parts);
-what is left, a part, gets a tensor rule, cut at shadow edges (quadrature_rules). Without shadows it converges
-spectrally, at a rate proportional to the roughness; with them the median error falls as points^-1.1 (cloth with gaps)
-to points^-1.8 (narrow footprints), where scrambled points reach points^-0.8.
+special. A rectangle is clipped to the footprint and cut again where the kernel is narrow against it (parts); each
+resulting part gets a tensor rule, cut at shadow edges (rules). Without shadows it converges spectrally, at a rate
+proportional to the roughness; with them the median error falls as points^-1.1 (cloth with gaps) to points^-1.8 (narrow
+footprints), where scrambled points reach points^-0.8.
 
 Each part doubles its nodes per axis on its own, the worst first. Its error is taken to be its last change, an
 overestimate of what is left, plus what a rule of its size may step over: highlights and slivers of light. Parts add up
@@ -73,7 +73,7 @@ def integrate_rows(
     cloth, columns : ClothSide, Columns
         The cloth and the queries.
     different : Mask (picks, ends)
-        The cells that stand for all under a footprint that covers the repeat evenly: the first of each orbit.
+        The cells that represent all others under a footprint that covers the repeat evenly: the first of each orbit.
     relative_error, absolute_error, min_count, max_count
         As in `TruthOptions`.
     split : int

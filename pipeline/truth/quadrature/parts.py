@@ -1,7 +1,7 @@
-"""A fabric cut into rectangles on which its surface is smooth, and these into what a footprint reaches of them.
+"""Rectangles of a fabric on which its surface is smooth, and their parts that a footprint reaches.
 
 Floats on top, strips of the yarn beneath where the one on top is narrow, and gaps cover one repeat once. Footprints are
-folded: a position stands for all its images. A kernel that is narrow against a rectangle cuts it further, so that a
+folded: a position represents all its images. A kernel that is narrow against a rectangle cuts it further, so that a
 rule of few nodes resolves it.
 """
 

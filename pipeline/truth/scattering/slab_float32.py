@@ -1,4 +1,4 @@
-"""The slab in single precision and without branches: what loops over many points call.
+"""The slab in single precision and without branches, for loops over many points.
 
 The formulas are those of `slab`, multiplied by both cosines, so that grazing directions need no division by a cosine
 near 0. The flake density D comes as a quotient, D / 4 = flakes / spread: one division then serves all. The exponentials
