@@ -1,14 +1,14 @@
-"""Never more light than arrives: any method's answers, cut at what the cloth returns without shadows.
+"""Energy bound: the answers of any method, limited to those of the soft nodes without shadows.
 
-Beside each component, the sums (pipeline.analytic.soft_nodes.features) know what it would be without shadows of the
-light: a mean of the point model over nodes whose weights do not depend on wi. For every node the diffuse lobe (w_d
-<i.n_p> + (1 - w_d) i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean of them. Hence
+The soft nodes (pipeline.analytic.soft_nodes.features) also give each component without shadows of the light: a mean of
+the point model over nodes whose weights do not depend on wi. For every node the diffuse lobe (w_d <i.n_p> + (1 - w_d)
+i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean of them. Hence
 
     answer <= bound  for every wi   implies   integral of C_warp + C_weft over wi <= 1
 
-whatever the network has learnt. The specular bounds, scattered once, integrate to less than one half of what the layer
-meets. It costs a reading of the sums, about a microsecond a query; `selvage` has read them anyway, and is bounded from
-the start.
+whatever the network has learnt. The specular bounds, scattered once, integrate to less than one half of the light that
+meets the layer. The bound costs one evaluation of the soft nodes, about a microsecond a query; `selvage` evaluates them
+anyway, and is bounded from the start.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 BOUNDED, UNBOUNDED = "bounded", "unbounded"
-"""Settings of what `counterpart` returns."""
+"""Settings of the methods that `counterpart` returns."""
 
 
 class Bounded:
-    """A method's answers, component by component at most those of the unshadowed sums.
+    """A method's answers, each component at most that of the soft nodes without shadows.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Bounded:
         self._tables.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4). BadInput for queries that the method or the sums do not know."""
+        """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
         refuse_other(queries, self.name, stretch=True)
         result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
         for start in range(0, len(result), CHUNK):

@@ -28,7 +28,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 PHYSICS: Final = ("footprint", "frame", "normaliser", "shadows", "variation")
-"""Options of the truth that decide what is learnt, not how exactly."""
+"""Options of the truth that define the learnt quantity; the other options set its accuracy."""
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
 _SLACK: Final = 0.02  # of a range, that a fabric or a footprint may lie outside
@@ -79,13 +79,13 @@ class Domain(BaseModel):
     def kinds(self) -> frozenset[str]:
         """Kinds of queries trained on, of `behind`, `stretch` and `curvature`."""
         queries = self.queries
-        taught = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-        return frozenset(kind for kind, there in taught.items() if there)
+        trained = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
+        return frozenset(kind for kind, there in trained.items() if there)
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.
 
-        Kinds that were not trained on at all are no matter of ranges (`faults`).
+        Kinds that were not trained on at all are not checked here, but by `faults`.
         """
         if not self.knows(fabric):
             return np.ones(len(queries.u), np.bool_)
@@ -125,7 +125,7 @@ class Domain(BaseModel):
             raise BadInput("queries", f"{len(found)} rows; first row {row}: {column}", value, allowed)
 
     def faults(self, queries: Queries, model: str) -> dict[int, tuple[str, object, str]]:
-        """Return the queries it was not taught, as `pipeline.truth.query.faults` does those that have no answer."""
+        """Return the fault of each query of a kind not trained on, in the form of `pipeline.truth.query.faults`."""
         found: dict[int, tuple[str, object, str]] = {}
         for rows, column, values, allowed in self._strangers(queries):
             for row in np.flatnonzero(rows).tolist():
@@ -139,7 +139,7 @@ class Domain(BaseModel):
             slack = _SLACK * (high - low) + 1e-6
             for value in values:
                 if not low - slack <= value <= high + slack:
-                    allowed = f"the model {model} was trained on {low:g} to {high:g} only; --extrapolate asks it anyway"
+                    allowed = f"the model {model} was trained on {low:g} to {high:g} only; --extrapolate uses it anyway"
                     raise BadInput(fabric.name, name, value, allowed)
 
     def knows(self, fabric: Fabric) -> bool:
@@ -180,7 +180,7 @@ def joined_domain(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
 
 
 def _size(queries: Queries) -> npt.NDArray[np.float64]:
-    """Return the root of the product of each footprint's axes, the size that `QueryOptions.sigma` speaks of."""
+    """Return the root of the product of each footprint's axes, the size that `QueryOptions.sigma` limits."""
     return np.asarray(np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor))
 
 

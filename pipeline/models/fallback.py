@@ -41,7 +41,7 @@ TABLE: Final = NodeTable(lambda cells: NODES, AZIMUTHS, COARSE_LINE)
 """The table of the fallback."""
 
 QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=0.1)
-"""Answers what the table does not know: typically 2 % off, at a tenth of a millisecond a query."""
+"""Options of the estimator for queries that the table cannot answer: typically 2 % off, at .1 ms a query."""
 
 FLAT: Final = 0.1
 """Radians that cloth may turn across a footprint's deviation and count as flat. In the shipped scenes that changes
@@ -49,7 +49,7 @@ answers by .1 to .3 % with the light behind and by 1 % with it in front; at graz
 
 
 def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
-    """Answer N queries of any kind, float32 (N, 4); `seed` names the points of what is sampled."""
+    """Answer N queries of any kind, float32 (N, 4); `seed` fixes the random points."""
     turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
     flat = queries._replace(curvature=np.where(turned <= FLAT, np.float32(0.0), queries.curvature))
     result, left = np.empty((len(queries.u), 4), np.float32), np.ones(len(queries.u), np.bool_)
@@ -85,9 +85,11 @@ class Fallback:
         self.name, self.setting = method.name, method.setting
         self._method, self._footprint = method, footprint
         self._domain: Domain | None = getattr(method, "domain", None)
-        # What it could know it may not have been taught: a scene's own recipe leaves out what never occurs there.
-        taught = self._domain.kinds | getattr(method, "untaught", frozenset()) if self._domain else frozenset(kinds)
-        self._kinds = frozenset(kinds) & taught
+        # A method may know a kind and not be trained on it: a scene's own recipe leaves out kinds that never occur
+        # there.
+        self._kinds = frozenset(kinds)
+        if self._domain:
+            self._kinds &= self._domain.kinds | getattr(method, "without_training", frozenset())
 
     def covers(self, fabric: Fabric) -> bool:
         """Return whether the method covers the fabric."""
@@ -119,7 +121,7 @@ class Fallback:
         return behind if self._domain is None else behind | self._domain.out_of_domain(fabric, self._nearest(queries))
 
     def _known(self, fabric: Fabric, queries: Queries) -> Queries:
-        """Return queries in the nearest form, no larger than where the method learnt the average."""
+        """Return queries in the nearest form; footprints that see the average are no larger than trained on."""
         nearest = self._nearest(queries)
         return nearest if self._domain is None else self._domain.within(fabric, nearest)
 

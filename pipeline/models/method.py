@@ -18,10 +18,10 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 CHUNK = 4096
-"""Rows inferred at a time on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
+"""Rows of one inference on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
 
 GPU_CHUNK = 2**18
-"""Rows inferred at a time on a GPU."""
+"""Rows of one inference on a GPU."""
 
 KNOWN = ("u", "v", "sigma", "wi", "wo")
 """Columns of round footprints of flat cloth, the inputs of the published networks."""

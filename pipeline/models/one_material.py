@@ -24,7 +24,7 @@ class OneMaterial(Generic[Net]):
     networks : dict
         From the fingerprint of a fabric's optics to its network.
     domain : Domain, optional
-        What they were taught; anything if left out.
+        Domain of the training; any query if left out.
     device : torch.device
         Where they compute.
     """
@@ -58,7 +58,7 @@ class OneMaterial(Generic[Net]):
 
 
 def restored(trained: Trained, make: Callable[[tuple[int, int]], Net]) -> tuple[dict[str, Net], Domain | None]:
-    """Return the networks of trained cards and weights by the fabrics' optics, and what they were taught together.
+    """Return the networks of trained cards and weights by the fabrics' optics, and their joint domain.
 
     `make` returns an untrained network for a repeat (ends, picks).
     """

@@ -29,7 +29,7 @@ class PerQuery(NamedTuple):
     inputs: Callable[[Queries], Columns]
     """Returns the inputs of the module for N queries: float32 arrays of N rows."""
     module: nn.Module
-    """Takes those, as tensors, then the constants; returns the components (N, 4)."""
+    """Takes the inputs, as tensors, then the constants; returns the components (N, 4)."""
     constants: tuple[Tensor, ...] = ()
     """Inputs of the module for the fabric. Fabrics whose constants have equal shapes may share the module."""
 

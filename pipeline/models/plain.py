@@ -1,4 +1,4 @@
-"""Refusal of queries other than flat cloth lit and seen from the front, which some methods are limited to."""
+"""Refusal of queries that some methods cannot answer: all but flat cloth, lit and seen from the front."""
 
 from __future__ import annotations
 

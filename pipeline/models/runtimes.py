@@ -1,6 +1,6 @@
 """Ways to run a trained method: in half precision, compiled, by ONNX Runtime, in 8-bit integers; all on the CPU.
 
-None is another training: the same weights answer the same queries, faster or slower, a little different or not.
+All use the same weights. They differ in speed, and some of them in rounding.
 
     eager-bf16, eager-fp16   torch's autocast: products of matrices in half precision, encodings and exponentials in
                              single: 8 bits cannot tell places within a repeat, and float16 ends at 65,504
@@ -8,8 +8,8 @@ None is another training: the same weights answer the same queries, faster or sl
     onnx                     ONNX Runtime on the exported module
     onnx-int8                the same with weights of 8 bits, and activations rounded to 8 bits as they come
 
-What computes in single precision throughout (`EXACT`) must agree with the method itself: it is held against it once for
-every module, and refused beyond `TOLERANCE`.
+A runtime in single precision (`EXACT`) must agree with the method itself: both are compared once for every module, and
+a difference above `TOLERANCE` is refused.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class BtfAutoencoder:
     methods : dict
         From the fingerprint of a fabric's optics to the network's own method.
     domain : Domain, optional
-        What they were taught; anything if left out.
+        Domain of the training; any query if left out.
     """
 
     def __init__(self, name: str, methods: dict[str, UnifiedBtf], domain: Domain | None = None) -> None:
@@ -51,7 +51,7 @@ class BtfAutoencoder:
         self._known.of(fabric).prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
         return self._known.of(fabric).predict(fabric, queries, seed)
 
     def per_query(self, fabric: Fabric) -> PerQuery:

@@ -157,7 +157,7 @@ class CurvedNetwork(TextureNetwork):
         return output
 
     def _view(self, view: View) -> Tensor:
-        """Return what the perceptrons see of viewer and curvature."""
+        """Return the perceptrons' inputs for viewer and curvature."""
         options, curvature = self.options, view.curvature.unsqueeze(-1)
         seen = [view.wo[:, : _axes(options)], curvature if options.curvature_input == "linear" else curvature.sqrt()]
         if options.curvature_input == "touch":
@@ -183,19 +183,19 @@ class Curved(OneMaterial[CurvedNetwork]):
     """Trained materials for curved surfaces, one network for each fabric."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
-        network = self._asked(fabric, queries)
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
+        network = self._checked_network(fabric, queries)
         return self._in_chunks(fabric, queries, partial(_components, network), 4)
 
     def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return the reflectance of the fabric's network; what it covers is another question."""
+        """Return the reflectance of the fabric's network, without its opacity."""
         network, repeat = self.network_of(fabric), fabric.weave.repeat
 
         def refuse(queries: Queries) -> None:
-            self._asked(fabric, queries)
+            self._checked_network(fabric, queries)
 
-        def answer(*asked: Tensor) -> Tensor:
-            return _components(network, View(*asked[:-1]), asked[-1])
+        def answer(*inputs: Tensor) -> Tensor:
+            return _components(network, View(*inputs[:-1]), inputs[-1])
 
         names = (*View._fields, "wi")
         module = Answering(network, answer)
@@ -203,7 +203,7 @@ class Curved(OneMaterial[CurvedNetwork]):
 
     def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
-        network = self._asked(fabric, queries)
+        network = self._checked_network(fabric, queries)
         return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
 
     def _steepest(self, fabric: Fabric) -> float:
@@ -211,8 +211,8 @@ class Curved(OneMaterial[CurvedNetwork]):
         limit = self.network_of(fabric).options.largest_curvature
         return limit if self.domain is None else min(limit, self.domain.queries.curvature[1])
 
-    def _asked(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
-        """Return the fabric's network; BadInput for what it was not taught."""
+    def _checked_network(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
+        """Return the fabric's network; BadInput for queries that it was not trained on."""
         network = self.network_of(fabric)
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
@@ -229,7 +229,7 @@ class Curved(OneMaterial[CurvedNetwork]):
         """Answer some rows at a time, without gradients."""
         columns = (*View._fields, "wi")
         near = in_repeat(queries, fabric.weave.repeat)
-        return in_chunks(near, lambda *asked: answer(View(*asked[:-1]), asked[-1]), self._device, columns, width)
+        return in_chunks(near, lambda *inputs: answer(View(*inputs[:-1]), inputs[-1]), self._device, columns, width)
 
 
 def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:

@@ -49,7 +49,7 @@ class CurvedOptions(Options):
     silhouette_rows: int = Field(default=262_144, ge=64, le=2**24)
     """Queries about the silhouette, in shards of their own."""
     silhouette_points: Literal[32, 64, 128, 256, 512, 1024] = 32
-    """Rays of each; of grazing cosines a sixteenth."""
+    """Rays of each query; a grazing cosine takes a sixteenth of them."""
     silhouette_sigma: tuple[float, float] = (0.05, 32.0)
     """Range of their footprints, in yarn spacings; drawn log-uniformly."""
     largest_curvature: float = Field(default=0.5, gt=0, le=1)
@@ -59,7 +59,8 @@ class CurvedOptions(Options):
     silhouette_seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of these queries and of their rays."""
     silhouette_weight: Weight = 0.1
-    """Weight of the silhouette's loss. It shares no weight with the rest, so it sets little but what clipping keeps."""
+    """Weight of the silhouette's loss. Its network shares no parameter with the rest, so it matters for gradient
+    clipping only."""
     blur: float = Field(default=8.0, ge=0, le=64)
     """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
     blur_halving: float = Field(default=0.11, gt=0, le=1)

@@ -8,7 +8,7 @@ from torch import nn
 
 
 class EncoderDecoder(nn.Module):
-    """A network of two parts, which who inherits makes.
+    """A network of two parts, which subclasses create.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """One-blob encoding: a number as a Gaussian blob spread over bins [Muller2019NIS].
 
 Bin b of a period 1 holds the integral of the Gaussian about x over [b/bins, (b + 1)/bins]. The plain form has the
-deviation 1/bins and loses what hangs over the edges. The periodic form wraps it around, so that x = 0 and x = 1 are the
+deviation 1/bins and loses the part beyond the edges. The periodic form wraps it around, so that x = 0 and x = 1 are the
 same place and the bins always sum to 1; its deviation is free, so that a blob can be as wide as a footprint makes it.
 By its Fourier series, which ends at the bins' own resolution,
 

@@ -6,7 +6,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 SLOPE = 0.01
-"""Of the leaky ReLU below 0."""
+"""Slope of the leaky ReLU below 0."""
 
 
 def activate(x: Tensor) -> Tensor:

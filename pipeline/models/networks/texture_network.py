@@ -18,7 +18,7 @@ from pipeline.models.neumip.options import NeumipOptions
 
 
 class TextureNetwork(nn.Module):
-    """Textures of one fabric, and perceptrons that read them; who inherits makes the parts named here.
+    """Textures of one fabric, and perceptrons that read them; subclasses create the parts named here.
 
     Attributes
     ----------

@@ -98,7 +98,7 @@ class Neumip(OneMaterial[NeumipNetwork]):
     """Trained textures, one network for each fabric."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
         self._refuse(queries)
         answer = partial(_components, self.network_of(fabric))
         return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)

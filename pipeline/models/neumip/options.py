@@ -44,12 +44,12 @@ class NeumipOptions(Options):
     diffuse_weight: Weight = 2.0
     """Weight of the diffuse squared error."""
     ignore_curvature: bool = False
-    """Take part in comparisons on curved cloth as a flat material does: learn from what is lit from the front, blind to
-    the curvature, and answer 0 where the light is behind the tangent plane."""
+    """Accept queries on curved cloth, as a flat material: train on rows lit from the front, ignore the curvature, and
+    answer 0 where the light is behind the tangent plane."""
 
     @model_serializer(mode="wrap")
     def _older_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave what came later out while it changes nothing: trained models keep their fingerprints."""
+        """Omit newer options that have their defaults, so that trained models keep their fingerprints."""
         values: dict[str, Any] = write(self)
         if not self.ignore_curvature:
             values.pop("ignore_curvature", None)

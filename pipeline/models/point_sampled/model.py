@@ -1,9 +1,9 @@
-"""The point model at k points of the footprint: what a renderer does without prefiltering [Jin2022Woven].
+"""The point model at k points of the footprint, as in a renderer without prefiltering [Jin2022Woven].
 
 The points are independent draws from the footprint's kernel, or the R2 sequence with one random shift a query
-[Roberts2018R2]; the answer is the ratio of the sums of PHYSICS' patch integral, as [Chen2024Woven] modified the
-baseline. Cheap at k = 1; the error falls as k^(-1/2), with R2 somewhat faster, and what is left shows as aliasing.
-Visibility is exact, by a march through the cloth in double precision, or looked up in a horizon map in single
+[Roberts2018R2]; the answer is the ratio of the sums over points (pipeline.truth.scattering.point), as [Chen2024Woven]
+modified the baseline. Cheap at k = 1; the error falls as k^(-1/2), with R2 somewhat faster, and what is left shows as
+aliasing. Visibility is exact, by a march through the cloth in double precision, or looked up in a horizon map in single
 precision, at a tenth of the time and with a bias that more points do not lower
 (pipeline.analytic.horizon_points.sampler).
 """
@@ -73,7 +73,7 @@ class PointSampled:
 
 
 class HorizonSampled:
-    """The same with visibility from a horizon map, in single precision, for Gaussian footprints.
+    """Point sampling with visibility from a horizon map, in single precision, for Gaussian footprints.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The habit of prefiltering normals: MIP maps of normal and tangent, one point model a query and family, no shadows.
+"""Prefiltered normals: MIP maps of normal and tangent, one point model a query and family, no shadows.
 
-Formulas, and what widens the roughness, stand in pipeline.analytic.prefiltered. What it cannot see: that points hide
-one another, and that the mean of a product is not the product of the means.
+The formulas are in pipeline.analytic.prefiltered. The method ignores that points hide one another, and that the mean of
+a product is not the product of the means.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Options of `prefiltered`: how fine the maps are, and what widens the roughness."""
+"""Options of `prefiltered`: resolution of the maps, and the rule that widens the roughness."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ class Selvage:
         Range of its training; any query of the soft nodes if left out.
     """
 
-    untaught: ClassVar[frozenset[str]] = frozenset({"stretch"})
+    without_training: ClassVar[frozenset[str]] = frozenset({"stretch"})
     """Kinds of queries that need no training: the soft nodes weigh an ellipse."""
 
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:

@@ -1,9 +1,8 @@
-"""Sums over few nodes with soft shadows: what `selvage` knows of a cloth before anything is learnt.
+"""Sums over few nodes with soft shadows: `selvage` without its network.
 
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
-(pipeline.analytic.soft_nodes); a query becomes one sum over them and costs about a microsecond. What so few nodes get
-wrong is a few per cent of the answer of a wide footprint, and more of a narrow one on a patch that is hidden almost
-wholly.
+(pipeline.analytic.soft_nodes); a query becomes one sum over them and costs about a microsecond. The error is a few per
+cent of the answer for a wide footprint, and more for a narrow one on a patch that is almost hidden.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from weaves.fabric import Fabric
 
 
 class SoftNodes:
-    """The sums alone; nothing is learnt.
+    """Soft nodes without a network; nothing is learnt.
 
     Parameters
     ----------
@@ -46,7 +45,7 @@ class SoftNodes:
         self._tables.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries the sums do not know."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know."""
         refuse_other(queries, self.name, stretch=True)
         table = self._tables.of(fabric)
         result = np.empty((len(queries.u), 4), np.float32)

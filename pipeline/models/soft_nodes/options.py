@@ -8,7 +8,7 @@ from pipeline.models.options import Name, Options
 
 
 class SoftNodesOptions(Options):
-    """The sums of `selvage` without its network; nothing is trained."""
+    """Soft nodes, as in `selvage`, without a network; nothing is trained."""
 
     learns: ClassVar[bool] = False
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
@@ -18,7 +18,7 @@ class SoftNodesOptions(Options):
     name: Name = "soft_nodes"
     """Name in tables."""
     footprint: Literal["gaussian"] = "gaussian"
-    """Kernel of the sums; must be the kernel of the truth."""
+    """Kernel of the soft nodes; must be the kernel of the truth."""
 
     @property
     def kinds(self) -> frozenset[str]:

@@ -8,9 +8,9 @@ forward pass, without any optimisation:
     decoder   latent 32 + angles 4 -> 106 -> 106 -> 106 -> 106 -> 4
 
 Latents can be averaged, so that a footprint is read from a MIP pyramid of averaged latents: bilinear within a level,
-linear between the two levels around log2(sigma / sigma_0), sigma_0 the footprint of a texel. Training asks the pyramid
-what inference asks it: all texels of a step's fabrics are encoded, each fabric from a random number of its samples in
-random order, and the rows of the data set are the targets.
+linear between the two levels around log2(sigma / sigma_0), sigma_0 the footprint of a texel. Training and inference
+read the same pyramid. In training all texels of a step's fabrics are encoded, each fabric from a random number of its
+samples in random order, and the rows of the data set are the targets.
 
 ADAPTED: values are the four components of unit colour in place of RGB, in and out, the specular ones in log space, so
 that every model is measured alike. With 3 outputs the decoder has the published 38,269 weights. Not published, so
@@ -148,7 +148,7 @@ class UnifiedBtf:
     network : UnifiedBtfNetwork
         Trained weights.
     domain : Domain, optional
-        What it was taught; anything if left out.
+        Domain of the training; any query if left out.
     device : torch.device
         Where it computes.
     """
@@ -171,7 +171,7 @@ class UnifiedBtf:
         self._pyramids.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
         self._refuse(queries)
         pyramid = self._pyramids.of(fabric)
 

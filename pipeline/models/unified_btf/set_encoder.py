@@ -1,7 +1,7 @@
 """The encoder of `unified_btf`: a texel's angular samples, any number in any order, to its latent [Zaheer2017DeepSets].
 
-Of the angles a perceptron makes m weights a sample; weights times sample are averaged over the samples, and one layer
-takes the mean to the latent. All texels of a fabric are seen under the same directions, so that the weights are
+A perceptron turns the angles of a sample into m weights; weights times sample are averaged over the samples, and one
+layer takes the mean to the latent. All texels of a fabric are seen under the same directions, so that the weights are
 computed once for all of them.
 """
 

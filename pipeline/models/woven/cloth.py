@@ -66,14 +66,14 @@ class Cloth(NamedTuple):
 
 
 def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> Cloth:
-    """Look at the surfaces of at least one fabric.
+    """Return the inputs of at least one fabric.
 
     Parameters
     ----------
     fabrics : sequence of Fabric
         At least one.
     options : WovenOptions
-        Whether they are brought into standard position, and how finely they are seen.
+        Whether fabrics are brought into standard position, and the side of their maps.
     like : Fabric, optional
         All are mirrored, exchanged and begun as brings this one into standard position; otherwise each by itself.
     """

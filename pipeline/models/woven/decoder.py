@@ -2,11 +2,11 @@
 
 The patch P = (u, v, size) enters as one-blobs. OWN CHANGE, `one_blob = "local"`: as published, the decoder has to learn
 products of latent and place, and learns them so slowly that small footprints come out as the repeat's average. Here the
-first layer sees the encoder's picture of the repeat, 8 x 8 numbers, from the place asked about: its 128 filters are
+first layer sees the encoder's picture of the repeat, 8 x 8 numbers, from the queried place: its 128 filters are
 correlated with the picture around the repeat, and read at (u, v) through the footprint's own one-blobs. Both are the
 same for all queries of a fabric, so that this costs a query one product of 64 x 128 in place of the latent's, which
-moves into the bias. The 24 one-blobs tell the place within the yarn. The decoder has 8,192 parameters more, the latent
-64 numbers.
+moves into the bias. The 24 one-blobs encode the place within the yarn. The decoder has 8,192 parameters more, the
+latent 64 numbers.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 
 def patch_size(options: WovenOptions) -> int:
-    """Return how many numbers say where a footprint lies and how large it is."""
+    """Return the length of the encoded place and size of a footprint."""
     return 3 if options.one_blob == "none" else 3 * options.bins
 
 
 def encode_patch(
     options: WovenOptions, u: Tensor, v: Tensor, sigma: Tensor, repeat: Tensor
 ) -> tuple[Tensor | None, Tensor]:
-    """Return what the decoder is told of footprints.
+    """Return the decoder's inputs that describe footprints.
 
     Parameters
     ----------

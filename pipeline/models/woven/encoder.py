@@ -1,4 +1,4 @@
-"""The encoder of `woven`: what a cloth looks like over one repeat, as one latent; it runs once a fabric.
+"""The encoder of `woven`: maps of one repeat of a cloth to one latent; it runs once a fabric.
 
 Residual convolutions, padded around the repeat, halve the maps four times; fully connected layers join them with the
 yarns' parameters. With `one_blob = "local"` it gives a picture of the repeat as well, bins x bins numbers, and the

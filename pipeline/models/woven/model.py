@@ -16,7 +16,7 @@ encoder of the maps (smaller than theirs, to be trained in minutes), the scale o
 images.
 
 Maps and parameters are read in pipeline.models.woven.cloth. OWN CHANGE, `one_blob = "local"`: the encoder also gives a
-picture of the repeat, and the decoder sees it from the place asked about (pipeline.models.woven.decoder).
+picture of the repeat, and the decoder sees it from the queried place (pipeline.models.woven.decoder).
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class Woven:
     network : WovenNetwork
         Trained weights.
     domain : Domain, optional
-        What it was taught; anything if left out.
+        Domain of the training; any query if left out.
     device : torch.device
         Where it computes.
     """
@@ -156,20 +156,21 @@ class Woven:
         self._encoded.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries it was not taught."""
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
         return self._components(queries, *self._encoded.of(fabric))
 
     def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
-        """Answer for what lies between two fabrics: latents are blended, nothing between them is encoded.
+        """Answer for a blend of two fabrics: their latents are blended, no intermediate fabric is encoded.
 
         Parameters
         ----------
         first, second : Fabric
-            Of one repeat. Both are placed as the first one is: what is blended must lie in the same place.
+            Two fabrics of one repeat. The second one is placed as the first one is, because blended latents must lie in
+            the same place.
         share : float
             Of the second one's latent; 0 is the first fabric, 1 the second.
         queries : Queries
-            N questions, in yarn spacings of either fabric.
+            N queries, in yarn spacings of either fabric.
 
         Returns
         -------
@@ -178,7 +179,7 @@ class Woven:
         Raises
         ------
         BadInput
-            If the repeats differ, or for kinds of queries that were not taught.
+            If the repeats differ, or for kinds of queries not trained on.
         """
         if first.weave.repeat != second.weave.repeat:
             (ends, picks), allowed = second.weave.repeat, "the repeat of {} is needed, {} x {}, to blend the two"

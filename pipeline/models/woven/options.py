@@ -1,4 +1,4 @@
-"""Options of `woven`: the published network, and what is ours."""
+"""Options of `woven`: those of the published network, and those of our own changes."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class WovenOptions(Options):
     """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
     one_blob: Literal["none", "plain", "periodic", "local"] = "local"
     """How centres enter: `none` as the bare numbers u, v and size; `plain` as published; `periodic` wraps u and v at
-    the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the place asked
-    about (an own change: see the model)."""
+    the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the queried place
+    (an own change: see the model)."""
     bins: int = Field(default=8, ge=2, le=64)
     """One-blob bins for each of u, v and size; the published 24 values are 3 x 8."""
     smallest_size: float = Field(default=0.005, gt=0, le=0.1)
@@ -66,7 +66,7 @@ class WovenOptions(Options):
     def departures(self) -> tuple[str, ...]:
         """Deviations from the published method, for the page."""
         changes = {
-            "a picture of the repeat seen from the place asked about": self.one_blob == "local",
+            "a picture of the repeat seen from the queried place": self.one_blob == "local",
             "bare numbers in place of one-blobs": self.one_blob == "none",
             "one-blobs that wrap": self.one_blob == "periodic",
             "every cloth in standard position": self.standard,

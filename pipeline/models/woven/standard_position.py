@@ -1,4 +1,4 @@
-"""Standard position: what all shifts, mirror images and turns of a cloth have in common.
+"""Standard position: one representative of all shifts, mirror images and turns of a cloth.
 
 A repeat may begin at any yarn; the mirror image of a fabric is a fabric, and so is one with warp and weft exchanged by
 the mirror x = y. What these fabrics answer follows from the first one's answers: the mirrors x -> -x, y -> -y and x = y
@@ -60,7 +60,7 @@ class Placement(NamedTuple):
     repeat: Tensor
 
     def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return what the fabrics in standard position are asked.
+        """Return the queries about the fabrics in standard position.
 
         Parameters
         ----------
