@@ -1,1 +1,1 @@
-"""When and where it runs: recipes, plans, the ledger, execution and the command line."""
+"""Recipes, the plans of their tasks, execution with a ledger, and the command line."""

@@ -1,7 +1,7 @@
 """The data set of a recipe: its shards as tasks, and its folder.
 
 Beside the recipe's own rows the folder holds the extra rows that its models learn from (`Options.extra_rows`). These
-are part of the models' identities and not of the data set's: a model more changes no measurement of the others.
+are part of the models' identities and not of the data set's: another model changes no measurement of the others.
 """
 
 from __future__ import annotations

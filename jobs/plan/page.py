@@ -141,7 +141,7 @@ def _note(
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
-        about += _taught(recipe, model) + _left_out(recipe, model, trainings, shots)
+        about += _trained_by(recipe, model) + _left_out(recipe, model, trainings, shots)
     return ModelNote(
         name=options.name,
         about=about,
@@ -151,7 +151,7 @@ def _note(
     )
 
 
-def _taught(recipe: Recipe, model: ModelRecipe) -> str:
+def _trained_by(recipe: Recipe, model: ModelRecipe) -> str:
     """Return which other recipe trains a model."""
     trainer = recipe.trainer_of(model)
     own = "" if trainer.dataset.queries == recipe.dataset.queries else ", on queries of its own"

@@ -1,6 +1,6 @@
 """Plan: a recipe as the list of its tasks; pure, and made without any of the libraries that do the work.
 
-Every task is listed after those it needs. Each kind of task says itself what enters its identity.
+Every task is listed after those it needs. Each kind of task defines its own identity.
 """
 
 from __future__ import annotations

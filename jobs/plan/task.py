@@ -30,7 +30,7 @@ STAGES: Final[tuple[Stage, ...]] = ("generate", "train", "bench", "report")
 """The stages in the order of work; each is a verb of the command line."""
 
 Progress = Callable[[float], None]
-"""Told the share of a task that is done."""
+"""Function that receives the finished share of a task."""
 
 _IDENTITY: Final = "identity"  # context of a dump
 

@@ -1,4 +1,4 @@
-"""Loading a recipe: TOML in, a frozen Recipe out; what it names is found, and what contradicts itself is refused."""
+"""Loading a recipe: TOML in, a frozen Recipe out; files that it names are found, contradictions are refused."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
     return _load(path, ())
 
 
-def _load(path: Path, asking: tuple[Path, ...]) -> Recipe:
-    """Read a recipe for those that ask for it, each of which is named in the one before."""
+def _load(path: Path, chain: tuple[Path, ...]) -> Recipe:
+    """Read a recipe; `chain` has the recipes that led to it, each named in the one before."""
     where, read = str(path), dict[Path, Recipe]()
 
     def load(name: object, key: str) -> Recipe:
         found = _beside(path, name, key)
         if found in read:
             return read[found]
-        chain = (*asking, path, found)
-        if found.resolve() in [one.resolve() for one in chain[:-1]]:
-            told = " → ".join(one.stem for one in chain)
-            raise BadInput(where, key, name, f"recipes must not wait for one another: {told}")
-        read[found] = _load(found, chain[:-1])
+        named = (*chain, path, found)
+        if found.resolve() in [one.resolve() for one in named[:-1]]:
+            circle = " → ".join(one.stem for one in named)
+            raise BadInput(where, key, name, f"recipes must not wait for one another: {circle}")
+        read[found] = _load(found, named[:-1])
         return read[found]
 
     content, trained_by = with_trained_by(read_toml(path), where, load)

@@ -19,7 +19,7 @@ from pipeline.models.domain import PHYSICS, Domain
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
 
-_KEYS = ("model", "name", "recipe", "runtimes")  # of an entry; all other keys stand in the recipe that trains
+_KEYS = ("model", "name", "recipe", "runtimes")  # of an entry; all other keys are in the recipe that trains
 
 
 def with_trained_by(
@@ -82,7 +82,7 @@ def check_trained_by(recipe: Recipe, where: str) -> None:
 def _taken_over(
     entry: Mapping[str, Any], key: str, where: str, load: Callable[[Any, str], Recipe]
 ) -> tuple[dict[str, Any], Recipe]:
-    """Return a model's entry as another recipe has it, and the recipe that trains it."""
+    """Return a model's entry in another recipe, and the recipe that trains it."""
     trainer = load(entry["recipe"], f"{key}.recipe")
     known = {model.options.name: model for model in trainer.models}
     name = entry.get("name", entry.get("model"))

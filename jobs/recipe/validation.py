@@ -1,4 +1,4 @@
-"""Validation across the sections of a recipe: each may be right by itself and still not fit the others."""
+"""Validation across the sections of a recipe: each may be valid by itself and not fit the others."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The kernels that tasks use, compiled before the tasks start.
 
-A group is one estimator, or one model that learns nothing, asked a few queries. Workers compile several groups at the
-same time; what groups have in common is compiled once (`pipeline.compiled.decorators`). A kernel that no group reaches
-is compiled by the first task that calls it.
+A group is one estimator, or one model that learns nothing, evaluated on a few queries. Workers compile several groups
+at the same time; kernels that groups share are compiled once (`pipeline.compiled.decorators`). A kernel that no group
+reaches is compiled by the first task that calls it.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ def execute(
     recorded: Callable[[Task], None] = lambda task: None,
     console: Console | None = None,
 ) -> Summary:
-    """Do what is not done yet of some stages.
+    """Run the unfinished tasks of some stages.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def execute(
 def _prepare(client: Any, preparations: Sequence[Preparation], console: Console) -> None:
     """Compile kernels in all workers at once and show how far it is.
 
-    What fails here fails again in the task that needs it, and is told there.
+    A failure here occurs again in the task that needs the kernel, and is reported there.
     """
     with Compiling(len(preparations), console) as shown:
         client.subscribe_topic(KERNELS, shown.hear)
@@ -186,7 +186,7 @@ def _prepare_one(one: Preparation) -> None:
 
 
 def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
-    """Refuse to start when a stage that is not to run has left out something needed."""
+    """Refuse to start if a product is missing of a stage that does not run."""
     planned = {task.id: task for task in tasks}
     own = {task.id for task in todo}
     gaps = {need for task in todo for need in task.needs if need not in finished and need not in own}
@@ -236,7 +236,7 @@ def _work(runner: Runner, task: Task, out: str) -> Outcome:
 
 
 def _outcome(future: Any) -> Outcome:
-    """Return what became of a task, also when its worker could not tell."""
+    """Return the outcome of a task, also if its worker could not report it."""
     from distributed import KilledWorker
 
     error = future.exception()
@@ -314,6 +314,6 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _sentence(error: BaseException) -> str:
-    """Return in one line what an unexpected exception was."""
+    """Return an unexpected exception in one line."""
     lines = str(error).strip().splitlines() or [""]
     return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__

@@ -38,7 +38,7 @@ class Ledger:
         self.folder = out / "ledger"
 
     def state(self, task: Task) -> State:
-        """Return what the files say about a task."""
+        """Return the state of a task, from its files."""
         receipt = self._read(self._receipt(task))
         if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products):
             return "done"
@@ -67,7 +67,7 @@ class Ledger:
         self._write(self._note(task), {**_heading(task), "reason": reason, "traceback": traceback})
 
     def adopt(self, task: Task) -> bool:
-        """Take a task's products from where another data set has them; say whether that made the task done.
+        """Take a task's products from another data set; return whether the task is then done.
 
         Data sets share shards (the same id is the same bytes), yet each folder is whole, so that it can be copied
         away; a hard link costs no space.
@@ -129,7 +129,7 @@ class Ledger:
 
     @staticmethod
     def _read(path: Path) -> dict[str, Any]:
-        """Return a file of the ledger; one that is missing or not readable as such says nothing."""
+        """Return a file of the ledger; empty if it is missing or not readable."""
         try:
             content = json.loads(path.read_bytes())
         except (OSError, ValueError):

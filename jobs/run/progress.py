@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from jobs.plan.task import STAGES, Stage, Task
 
 TOPIC = "progress"
-"""Dask topic on which workers tell how far a task is: {"task": id, "fraction": share done}."""
+"""Dask topic on which workers report the progress of a task: {"task": id, "fraction": share done}."""
 
 
 KERNELS = "kernels"

@@ -90,7 +90,7 @@ def evaluate(
 
 
 def evaluation_table(summary: Summary) -> Table:
-    """Show what `twillight evaluate` did."""
+    """Show the summary of `twillight evaluate`."""
     answered = summary.rows - summary.bad
     table = table_of("rows", "answered", "median relative error", "points per query", "queries per second")
     for column in table.columns:

@@ -100,7 +100,7 @@ def write_recipe(
 
 
 def alone(general: Recipe, names: set[str]) -> Recipe:
-    """Return a general recipe with some of its methods alone: what it takes to have just them."""
+    """Return a general recipe with some of its methods only."""
     return Recipe(**{**vars(general), "models": tuple(m for m in general.models if m.options.name in names)})
 
 
@@ -199,7 +199,7 @@ def _bench(general: Recipe, scene: str) -> dict[str, Any]:
 
 
 def _beside(path: Path, reference: str) -> str:
-    """Return what names a fabric or scene in a recipe: a path as it is seen from where the recipe lies, or a name."""
+    """Return the reference to a fabric or scene in a recipe: a path relative to the recipe's folder, or a name."""
     if Path(reference).suffix not in (".toml", ".xml"):
         return reference
     return Path(os.path.relpath(Path(reference).resolve(), path.parent.resolve())).as_posix()

@@ -1,4 +1,4 @@
-"""One verb's work on a recipe: plan, hold the output folder, execute, keep the manifest in step, tell what was done."""
+"""Stages of a recipe: plan, lock the output folder, execute, update the manifest, print a summary."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from weaves.errors import WorkFailed
 
 
 def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, workers: int) -> None:
-    """Do what is not done yet of some stages of a recipe and print a summary.
+    """Run the unfinished tasks of some stages of a recipe and print a summary.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def summary_of(records: Sequence[Path]) -> Any:
 
 
 def summary_table(tasks: Sequence[Task], ran: Mapping[str, float]) -> Table:
-    """Show what a run did: tasks by stage, how many of them it did now, and the seconds of work in them."""
+    """Show the tasks of a run by stage, how many of them it did, and the seconds of work in them."""
     table = table_of("stage", "tasks", "done now", "work", right=("tasks", "done now", "work"))
     stages: list[Stage] = [stage for stage in STAGES if any(task.stage == stage for task in tasks)]
     for stage in stages:

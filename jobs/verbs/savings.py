@@ -4,8 +4,8 @@ Rows and seconds of ground truth and training come from the ledger, queries lear
 errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
 alone: the rows that this method learns from and is measured on, and its own training. Seconds depend on what else a
 machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
-frames of point sampling at 2 points, timed in turns with it. Last comes what either model leaves to quadrature in the
-general recipe's other scenes: a scene's own model answers for its domain, and for no other.
+frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both models in
+the other scenes of the general recipe: a scene's own model answers for its own domain only.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
 
 
 def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]:
-    """Return what a scene, by its name, takes by the general recipe, which is run by the name `run`, and by its own."""
+    """Return the costs of a scene by the general recipe, which is run by the name `run`, and by its own recipe."""
     path = out / "recipes" / f"require-{scene}.toml"
     if not path.is_file():
         raise BadInput("savings", "scene", scene, f"there is no {path}; write it with `twillight require {scene}`")
@@ -154,10 +154,10 @@ def conclusion(rows: Sequence[Saving]) -> str:
 def _costs(
     recipe: Recipe, model: ModelRecipe, worn: set[str], ledger: Ledger, whole: Sequence[Task], run: str
 ) -> dict[tuple[str, str], Value]:
-    """Return what data and training of one method took, as the receipts say, and the weights that a scene needs."""
+    """Return the costs of data and training of one method, from the receipts, and the weights that a scene needs."""
     # The same tasks, by the folders that the whole recipe puts them in.
-    asked = {task.id for task in plan(recipe)}
-    tasks = [task for task in whole if task.id in asked and task.stage in ("generate", "train")]
+    planned = {task.id for task in plan(recipe)}
+    tasks = [task for task in whole if task.id in planned and task.stage in ("generate", "train")]
     if left := [task for task in tasks if ledger.state(task) != "done"]:
         allowed = f"{len(left)} of {len(tasks)} tasks behind {model.options.name} are not done; `twillight run {run}`"
         raise BadInput("savings", "recipe", recipe.name, allowed)
@@ -183,7 +183,7 @@ def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
 
 
 def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:
-    """Return what a page says of a method on a scene, and the time of its frame in those of 2 points."""
+    """Return a method's numbers on a scene from a page, and the time of its frame over that of 2 points."""
     from reports.record import OF_A_PAGE, read_records
     from reports.tables.summary import BASELINE
 
@@ -203,7 +203,7 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
 
 
 def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
-    """Return how much more the scene's own model errs; nothing where a picture or the truth's frames are not there."""
+    """Return the difference of the errors of both models; nothing if a picture or the truth's frames are missing."""
     from reports.images.exr import RGB, read_exr
     from reports.measure.paired_error import mse_difference
     from reports.measure.scene.shot import read_shot
@@ -235,7 +235,7 @@ def _setting(model: ModelRecipe) -> str:
 def _elsewhere(
     scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
 ) -> Iterator[Saving]:
-    """Yield what either model leaves to quadrature in the general recipe's other scenes, whose frames are there."""
+    """Yield the fallback shares of both models in the general recipe's other scenes whose frames exist."""
     from reports.measure.scene.shot import read_shot
 
     for task in plan(general):
@@ -243,8 +243,8 @@ def _elsewhere(
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:
-            asked = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
-            shares = (Value(fallback_share(*of, asked)) for of in ((same, general), (model, own)))
+            queries = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
+            shares = (Value(fallback_share(*of, queries)) for of in ((same, general), (model, own)))
             yield Saving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
 
 

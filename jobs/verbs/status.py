@@ -1,4 +1,4 @@
-"""`twillight status`: what is done, what failed and why, and what is missing."""
+"""`twillight status`: done, failed and missing tasks, with the reasons of failures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_status(recipe: str, out: Path) -> None:
 
 
 def status_table(tasks: Sequence[Task], ledger: Ledger) -> Table:
-    """Show what the files say: done, failed and missing tasks by stage, and the reason of each failure."""
+    """Show done, failed and missing tasks by stage, and the reason of each failure."""
     table = table_of("stage", "done", "failed", "missing", right=("done", "failed", "missing"))
     states = {task.id: ledger.state(task) for task in tasks}
     for stage in STAGES:

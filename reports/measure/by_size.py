@@ -1,8 +1,8 @@
 """Errors and times of methods by the size of the footprint.
 
-One number over all footprints hides what a method is good for: points resolve small footprints, averages large ones,
-and the cost of a query depends on its size as well. So errors and times are measured apart in classes of size, methods
-in turns; `reports.tables.equal_time` compares them.
+One number over all footprints hides differences between methods: point sampling is good at small footprints, averaging
+at large ones, and the cost of a query depends on its size as well. So errors and times are measured separately in
+classes of size, methods in turns; `reports.tables.equal_time` compares them.
 
 The error is the relative RMSE of the colour, .3 (S_warp + S_weft) + .5 (C_warp + C_weft), of its specular or its
 diffuse part: root of the MSE, noise of the truth subtracted, over the mean of the truth; the mean over fabrics.
@@ -53,7 +53,7 @@ LONGEST: Final = 0.02
 """Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
 
 FEWEST: Final = 512
-"""Least queries a fabric in such a call: what a call itself costs must not stand for what a query costs."""
+"""Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 _Rows = list[tuple[Fabric, Queries, Answers]]
 

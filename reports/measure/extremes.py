@@ -118,14 +118,14 @@ def measure_extremes(
     fabrics : sequence of (Fabric, role)
         The cloths; methods answer for those that they cover.
     truth : TruthOptions
-        What the methods are held against.
+        Options of the truth that methods are compared with.
 
     Returns
     -------
     list of Record
         For each method and fabric `extreme_error`, the worst over footprints with all of them as its curve, and
         `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`,
-        `extreme_not_finite`, `extreme_negative`. Numbers that no finite answer is left for are left out.
+        `extreme_not_finite`, `extreme_negative`. A number is left out if no answer is finite.
     """
     records = []
     for fabric, role in fabrics:
@@ -151,7 +151,7 @@ def measure_extremes(
 def _measured(
     subject: Record, method: Method, fabric: Fabric, inputs: Extremes, truth: Array
 ) -> tuple[Array, list[Record]]:
-    """Return a method's answers and what is measured of them alone."""
+    """Return a method's answers and the measurements of them alone."""
     near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))
     wide, wider = (_evaluated(method, fabric, inputs.queries.take(inputs.size == size)) for size in FOOTPRINTS[-2:])
     every = np.concatenate([near, far])

@@ -1,4 +1,4 @@
-"""Frames of the moving plane, by the truth and by methods, and what aliases in them (`reports.measure.aliasing`).
+"""Frames of the moving plane, by the truth and by methods, and their aliasing (`reports.measure.aliasing`).
 
 The truth's frames are one OpenEXR: luminance Y and its standard error, one frame below the other.
 """
@@ -32,7 +32,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class _Frames(NamedTuple):
-    """The truth's frames, less the irradiance."""
+    """The truth's frames under unit irradiance."""
 
     truth: Floats
     """Luminance, (F, H, W); 0 where no cloth is lit."""

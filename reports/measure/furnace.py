@@ -1,4 +1,4 @@
-"""The white furnace: how much of even light from everywhere a method sends back; never more than arrives.
+"""The white furnace: the share of even light from all directions that a method returns, at most 1 in nature.
 
     E(wo) = integral of f_P(wi, wo) over all wi on the viewer's side = 2 pi <f_P> over directions even in solid angle
 

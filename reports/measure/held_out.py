@@ -1,8 +1,8 @@
-"""The measurements on held-out queries: errors, the truth's own, and what answers cost.
+"""Measurements on held-out queries: errors of methods and of the truth, time, memory.
 
-Each function stands alone, so that a task system can run them apart; so do those of `reports.measure.pictures` and
-`reports.measure.frames`. Random methods get seeds that are named by what is measured: no number depends on what ran
-before.
+Each function is independent of the others, so that tasks can run them separately; so are those of
+`reports.measure.pictures` and `reports.measure.frames`. The seed of a random method is a function of the measurement:
+no number depends on earlier work.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def measure_truth(
     options: ErrorOptions,
     provenance: Provenance | None = None,
 ) -> list[Record]:
-    """Measure the truth itself on a fabric's held-out queries: median and quartiles of |standard error| / |mean|.
+    """Measure the truth on a fabric's held-out queries: median and quartiles of |standard error| / |mean|.
 
     Both are norms over the four components, as in the estimator's stopping rule.
     """
@@ -121,9 +121,10 @@ def measure_timing(
     -------
     list of Record
         For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
-        thread, where the system tells (`reports.measure.memory`); `prepare_time`, the time until a fabric never seen
-        before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the truth
-        last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
+        thread, where the system reports it (`reports.measure.memory`); `prepare_time`, the time until a fabric never
+        seen before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the
+        truth last, with every reading as `samples` and the queries a fabric as `note`
+        (`reports.measure.timing.affordable`).
     """
     sample = []
     for name in manifest.names("seen", "unseen"):
@@ -170,7 +171,7 @@ def _times(entries: Sequence[tuple[Record, Contender]], options: TimingOptions) 
 
 
 def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:
-    """Return the time to prepare fabrics that nothing knows yet: the named ones in turn, each with an edit of its own.
+    """Return the time to prepare fabrics that no cache holds: the named ones in turn, each with an edit of its own.
 
     An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
     """

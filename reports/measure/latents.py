@@ -6,9 +6,8 @@ queries. Every number of the yarns is then blended alike, beta(t) = (1 - t) beta
 drafts there is no draft: the truth in between is the cross-fade (1 - t) f_first + t f_second of both cloths, and there
 is nothing to encode.
 
-Errors are the relative RMSE of the colour measure (`reports.error`), noise of the truth subtracted. The time
-of an edit is all that answers wait for: the fabric is looked at and encoded anew. Colours are no part of what is
-encoded.
+Errors are the relative RMSE of the colour measure (`reports.error`), noise of the truth subtracted. The time of an edit
+is the delay until the next answer: the fabric's maps are made and encoded again. Colours are not encoded.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ class Pair:
 
 @runtime_checkable
 class Blends(Protocol):
-    """A method that answers for what lies between two fabrics."""
+    """A method that answers for a blend of two fabrics."""
 
     def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer N queries from latents blended by `share`, float32 (N, 4)."""

@@ -1,9 +1,9 @@
-"""The memory a call needs while it runs, whoever allocates it: NumPy, torch and compiled kernels alike.
+"""Peak memory of a call, including that of NumPy, torch and compiled kernels.
 
 Linux keeps the largest resident size of a process and lets it be reset. Freed memory is handed back to the system
-first, or the call would fill it again unseen; what it then adds to the resident size at its largest is the answer. Of a
-process that has lived long not every page comes back, and what Python touches anew counts as well: numbers below
-`UNSURE` say no more than that they are small. Memory of a GPU is not part of it.
+first, because the call could reuse it unseen. The result is the growth of the largest resident size during the call. In
+an old process some pages are not handed back, and pages that Python touches again count too: a result below `UNSURE`
+only means that it is small. Memory of a GPU is not part of it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _RESET_LARGEST = "5"  # see proc(5), clear_refs
 def peak_memory(call: Callable[[], object], repeats: int = 3) -> float | None:
     """Return the bytes that a call adds to the process at most: the median of some calls, after one to warm up.
 
-    None where the system does not tell: elsewhere than on Linux with glibc.
+    None where the system does not report it: on all systems but Linux with glibc.
     """
     call()
     added = []

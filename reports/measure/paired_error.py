@@ -1,7 +1,8 @@
-"""True if one picture errs more than another of the same frame, by the same truth.
+"""Paired comparison: the difference of the errors of two pictures of one frame, against the same truth.
 
-Two intervals that overlap say little: both are as wide as pixels differ, and pixels that one method finds hard are so
-for the other. The difference of squared errors, pixel by pixel, cancels that, and the truth's noise with it:
+Two intervals that overlap say little: both are wide because pixels differ, and pixels with a large error of one method
+have a large error of the other too. The difference of squared errors, pixel by pixel, cancels these differences and the
+noise of the truth:
 
     (b - t)^2 - (a - t)^2 = (b - a) (b + a - 2 t),     unbiased, for t enters linearly
 """

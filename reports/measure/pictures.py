@@ -1,4 +1,4 @@
-"""Pictures of the views, by the truth and by methods, and the error of the latter.
+"""Pictures of the views, by the truth and by methods, and the errors of methods.
 
 A picture is a linear OpenEXR: R, G, B under the light of the view, A = 1 where there is cloth; the truth's holds the
 standard error of each colour beside them.

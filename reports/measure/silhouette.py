@@ -1,11 +1,11 @@
-"""The edge of a cloth cylinder against a dark ground: who finds its silhouette, and what light it returns there.
+"""The edge of a cloth cylinder against a dark ground: errors of its silhouette and of the light there.
 
 An orthographic camera looks at right angles at a cylinder of radius r; its picture is the strip along one edge, from
 `depth` inside the boundary's outline to the outline. A pixel at the distance d from the axis sees the boundary under
 the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacity: what the cloth hides of the ground
 [Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance pi.
 
-A method without `missed` knows no curved cloth. It is asked as a flat material is used on a curved surface: the
+A method without `missed` knows no curved cloth. It is evaluated as a flat material is on a curved surface: the
 same queries with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
 """
 
@@ -36,7 +36,7 @@ Floats = npt.NDArray[np.float64]
 
 @runtime_checkable
 class SeesThrough(Protocol):
-    """A method that knows what a curved cloth does not hide."""
+    """A method that knows which share of camera rays misses a curved cloth."""
 
     def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
@@ -76,7 +76,7 @@ class Silhouette(NamedTuple):
 
 
 def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
-    """Return what the strip's pixels ask, row after row, (H W,); the circumference runs along x."""
+    """Return the queries of the strip's pixels, row after row, (H W,); the circumference runs along x."""
     radius, pixel = options.radius, options.pixel
     columns = max(round(min(options.depth, radius) / pixel), 1)
     sine = (radius - pixel * (np.arange(columns)[::-1] + 0.5)) / radius

@@ -1,11 +1,11 @@
 """Average error of the truth, from its standard errors.
 
-A tabulated answer states an error that is to cover the true one: three of them do for 99 of 100 queries. On average the
-true one is smaller: over the nine fabrics of quick, 250 queries each, the stated variance of the colour is 3.1 to 4.7
-times the true one (plain weave 2.2, gabardine 12, all together 4.1; against 16,384 points a query and more), on
-herringbone 3.4, on open cloth (gauze, organza, voile) 1.1 to 2. What is subtracted from a method's error must be what
-the truth errs, and so the stated variance counts by a share. The errors of sampled answers are those of their
-replicates and count in full.
+The standard error of a tabulated answer is a cover: three of them exceed the true error for 99 of 100 queries. On
+average the true error is smaller: over the nine fabrics of quick, 250 queries each, the stated variance of the colour
+is 3.1 to 4.7 times the true one (plain weave 2.2, gabardine 12, all together 4.1; against 16,384 points a query and
+more), on herringbone 3.4, on open cloth (gauze, organza, voile) 1.1 to 2. The true variance of the truth is subtracted
+from a method's error, and so the stated variance is divided by a constant. The standard errors of sampled answers come
+from independent randomisations and are taken as they are.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ OVERSTATED: Final = 3.0
 
 
 def with_noise(answers: Answers, queries: Queries, options: TruthOptions) -> Answers:
-    """Return the truth's answers with their errors as they are on average."""
+    """Return the truth's answers with standard errors that are right on average."""
     if options.estimator not in ("node_table", "auto"):
         return answers
     # Curved cloth is sampled.

@@ -32,7 +32,7 @@ class Latents(Measurement):
     queries: QueryOptions
     """Distribution of the queries."""
     truth: TruthOptions
-    """How true the truth is."""
+    """Options of the truth."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

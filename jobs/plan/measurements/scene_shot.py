@@ -47,7 +47,7 @@ class SceneShot(Measurement):
     step: tuple[float, float, float]
     """Step of the camera from frame to frame."""
     options: ShotOptions
-    """The frames, and how true they are."""
+    """Options of the frames and of the truth."""
 
     @classmethod
     def of(cls, name: str, options: ShotOptions) -> Self:

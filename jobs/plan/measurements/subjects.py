@@ -126,7 +126,7 @@ class ModelSubject:
 
 @dataclass(frozen=True)
 class Subjects:
-    """Everything that the measurements of a recipe are planned from."""
+    """Fabrics, models, rows and networks that the measurements of a recipe use."""
 
     recipe: Recipe
     shards: Sequence[Shard]

@@ -24,7 +24,7 @@ class TruthFrames(Measurement):
     fabric: Coloured
     """The fabric."""
     options: FrameOptions
-    """The frames, and how true they are."""
+    """Options of the frames and of the truth."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

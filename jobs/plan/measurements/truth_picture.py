@@ -32,7 +32,7 @@ class TruthPicture(Measurement):
     view: ViewOptions
     """Camera, light and scale."""
     truth: TruthOptions
-    """How true it is."""
+    """Options of the truth."""
     seed: int
     """Seed of the truth's points."""
 

@@ -1,4 +1,4 @@
-"""Where a picture differs from the truth's: maps as layers of its OpenEXR.
+"""Maps of the difference between a picture and the truth's, as layers of its OpenEXR.
 
 Channels: `lit` (1 where a pixel counts), `relative.R`, `.G`, `.B` and `.Y` (signed, as shares), `flip_ldr`, `flip_hdr`,
 `delta_e`, `ssim`, `square` (`reports.measure.scene.flip_ssim`).

@@ -1,4 +1,4 @@
-"""Maps of PSNR, SSIM, FLIP and CIEDE2000: the difference of two pictures as an eye sees it on a display.
+"""Maps of PSNR, SSIM, FLIP and CIEDE2000: the perceived difference of two pictures on a display.
 
 Pictures are linear RGB. Outside the mask both are set to one grey, the median luminance of the truth's lit pixels:
 nothing there enters, not even by the windows of SSIM and FLIP, and it shifts no exposure of HDR-FLIP.

@@ -1,9 +1,9 @@
-"""How visible the difference of two films is to an eye: FovVideoVDP [Mantiuk2021FovVideoVDP], where it is installed.
+"""Visibility of the difference of two films: FovVideoVDP [Mantiuk2021FovVideoVDP], where it is installed.
 
-A score in JOD (just-objectionable differences): 10 where the films cannot be told apart, one less where 3 of 4 people
-prefer the truth; sustained and transient contrast count, so flicker does. Films are luminance on a display of stated
-size, distance and light (`DisplayOptions`): Y = peak min(max(exposure L, 0), 1) + peak / contrast. Frames are fewer
-than the quarter of a second that the metric looks back: the first one is taken to have stood still before.
+A score in JOD (just-objectionable differences): 10 for films that look the same, one less where 3 of 4 people prefer
+the truth; sustained and transient contrast count, so flicker does. Films are luminance on a display of stated size,
+distance and light (`DisplayOptions`): Y = peak min(max(exposure L, 0), 1) + peak / contrast. Frames are fewer than the
+quarter of a second that the metric looks back: the first one is taken to have stood still before.
 
 `pyfvvdp` may not be used commercially and is therefore no dependency; `pip install pyfvvdp` adds the measure.
 """

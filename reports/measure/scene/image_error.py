@@ -51,7 +51,7 @@ class Measure(NamedTuple):
 
 @dataclass(frozen=True)
 class ImageErrors:
-    """All measures of one picture, and maps of what an eye sees."""
+    """All measures of one picture, and maps of the perceived errors."""
 
     mse: Error
     mse_relative: Error
@@ -97,7 +97,7 @@ def image_errors(
     mask : array_like (H, W)
         True where there is lit cloth: the pixels that count. What the others hold does not matter.
     floor : mapping, optional
-        What `noise_floor` returned for this truth; half of the time is spent on it where it is not given.
+        Result of `noise_floor` for this truth; it takes half of the time if it is not given.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def image_errors(
 def noise_floor(
     truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions | None = None
 ) -> dict[Metric, float]:
-    """Return what a noised copy of the truth scores, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
+    """Return the scores of a noised copy of the truth, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
     options = options or ImageOptions()
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
     channels = 1 if options.floor_channels == "together" else 3

@@ -42,11 +42,11 @@ LONGEST: Final = 0.01
 """Seconds of a timed call."""
 
 FEWEST: Final = 128
-"""Least queries about a cloth in such a call: what a call itself costs must not stand for what a query costs."""
+"""Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 
 class _Reference(NamedTuple):
-    """The truth's frames and what every method is compared with."""
+    """The truth's frames: the reference of every method."""
 
     pictures: Floats
     """(F, H, W, 3)"""
@@ -112,7 +112,7 @@ def _reference(shot: Shot, image: ImageOptions) -> _Reference:
 
 
 def _over_time(subject: Record, shown: Floats, reference: _Reference, options: SceneErrorOptions) -> list[Record]:
-    """Return what a method's frames show of aliasing, and FovVideoVDP's score where that is installed."""
+    """Return the aliasing of a method's frames, and FovVideoVDP's score where that is installed."""
     own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, reference.pictures, reference.noise))
     still, image = np.asarray(reference.lit.all(axis=0)), options.image
     records = []
@@ -134,8 +134,8 @@ def time_scene(
 ) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
-    Of every cloth as many queries are asked as one call can answer in `LONGEST`, `FEWEST` at least; the time of all
-    of them is in proportion, cloth by cloth: a small one with costly queries counts for no more than it is.
+    Each cloth is timed on as many of its queries as one call can answer in `LONGEST`, at least `FEWEST`. The time of
+    all its queries is in proportion, so that a small cloth with slow queries gets its true weight.
     """
     first = shot.first()
     if not (able := [method for method in methods if first.covered_by(method)]):

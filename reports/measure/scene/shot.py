@@ -57,7 +57,7 @@ class ClothQueries:
     mean, standard_error : float32 (M, 4)
         The truth's answers.
     fallback_values : float32 (M, 4)
-        What quadrature answers where light or viewer is behind the cloth, for methods that do not know that; 0
+        Answers of the fallback where light or viewer is behind the cloth, for methods that do not know such queries; 0
         elsewhere.
     """
 
@@ -145,7 +145,7 @@ class Shot:
     def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
         """Return a method's components for every cloth; random methods draw anew in every frame.
 
-        What falls back because of light or viewer behind the cloth was answered once for all methods.
+        Queries that fall back because light or viewer is behind the cloth were answered once for all methods.
         """
         found = []
         for cloth in self.cloths:
@@ -216,7 +216,7 @@ def read_shot(path: Path) -> Shot:
 
 
 def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
-    """Return what quadrature answers where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
+    """Return the answers of the fallback where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
         result[rows] = fallback_answers(fabric, queries.take(rows), seed)
