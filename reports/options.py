@@ -22,6 +22,9 @@ LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
 )
 """Presets between whose latents errors are measured: each first one, with the yarns or the draft of the other."""
 
+Role = Literal["seen", "unseen"]
+"""Role of a measured fabric: `seen` if general models saw it in training."""
+
 Side = Annotated[int, Field(ge=16, le=4096)]
 """Side of a picture in pixels."""
 

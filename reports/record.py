@@ -23,6 +23,7 @@ from pipeline import versions
 from pipeline.atomic import atomic_write
 from reports.catalogue import METRICS
 from reports.error import Error
+from reports.options import Role
 from weaves.errors import BadInput
 
 PACKAGES: Final = (
@@ -46,9 +47,6 @@ TRUTH: Final = "truth"
 
 OF_A_PAGE: Final = "records.json"
 """File in a page's folder that holds all its Records; the machine of the times lies beside it."""
-
-Role = Literal["seen", "unseen"]
-"""True if general models saw the fabric in training."""
 
 
 def _known(metric: str) -> str:

@@ -9,13 +9,13 @@ from typing import Annotated, ClassVar
 from jobs.plan.dataset import fingerprint_of
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.scene_shot import SceneShot
-from jobs.plan.measurements.subjects import Role, Subjects
+from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import Timing
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
-from reports.options import BenchOptions
+from reports.options import BenchOptions, Role
 from reports.page.model_note import ModelNote
 from weaves.fabric import Fabric
 

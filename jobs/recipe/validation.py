@@ -12,6 +12,9 @@ from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
+_TAKEN = ("truth", "bench", "fallback")
+"""Names that stand beside those of models, in Records and among the versions in a task's identity."""
+
 _PLAIN = TruthOptions()
 _LEARNT = ("frame", "normaliser", "shadows", "variation")  # physics that not every model can learn
 
@@ -60,6 +63,10 @@ def _check_names(recipe: Recipe, where: str) -> None:
         for name in names:
             if names.count(name) > 1:
                 raise BadInput(where, key, name, "names must differ, because files are called by them")
+    for index, model in enumerate(recipe.models):
+        if (name := model.options.name) in _TAKEN:
+            allowed = f"must be another name: {', '.join(_TAKEN)} name other things than models"
+            raise BadInput(where, f"models.{index}.name", name, allowed)
 
 
 def _check_population(recipe: Recipe, where: str) -> None:

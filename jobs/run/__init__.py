@@ -1,1 +1,1 @@
-"""How tasks are executed: ledger, executor, progress, and the functions that do the work."""
+"""Execution of tasks: kernels compiled first, executor, ledger, manifest, progress."""

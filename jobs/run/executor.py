@@ -25,9 +25,6 @@ from jobs.run.ledger import Ledger, Product, measure
 from jobs.run.progress import KERNELS, TOPIC, Board, Compiling
 from weaves.errors import BadInput, WorkFailed
 
-Progress = Callable[[float], None]
-Runner = Callable[[Task, Path, Progress], None]
-
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 _SECONDS_BETWEEN_SIGNS = 0.2
 _SECONDS_TO_RESTART = 600  # on a busy machine a worker takes minutes to load what it needs
@@ -72,7 +69,6 @@ class Summary(NamedTuple):
 def execute(
     tasks: Sequence[Task],
     out: Path,
-    runner: Runner,
     *,
     stages: Sequence[Stage] = STAGES,
     scheduler: str = "",
@@ -89,8 +85,6 @@ def execute(
         The whole plan.
     out : Path
         Output folder; every worker must see it under this name.
-    runner : callable
-        Does one task in a worker: ``runner(task, out, progress)``; importable there.
     stages : sequence of str
         Stages to work on; what they need of others must be done.
     scheduler : str
@@ -138,7 +132,7 @@ def execute(
                 ready = [task for task in todo.values() if finished.issuperset(task.needs)]
                 ready.sort(key=lambda task: (task.alone, -urgency[task.id]))
                 for task in _admitted(ready, list(running.values()), slots=sum(client.nthreads().values())):
-                    running[_submit(client, runner, todo.pop(task.id), out)] = task
+                    running[_submit(client, todo.pop(task.id), out)] = task
                     board.begin(task)
                 if not running:
                     break  # what is left waits for tasks that failed
@@ -204,15 +198,15 @@ def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> lis
     return admitted if admitted or running else list(ready[:1])
 
 
-def _submit(client: Any, runner: Runner, task: Task, out: Path) -> Any:
+def _submit(client: Any, task: Task, out: Path) -> Any:
     """Hand a task to the cluster; one that must be alone gets a fresh process."""
     if task.alone and client.cluster is not None:
         # Which also forgets results: a worker's end would have dask compute them again.
         client.restart(timeout=_SECONDS_TO_RESTART)
-    return client.submit(_work, runner, task, str(out), key=f"{task.stage}-{task.id}")
+    return client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}")
 
 
-def _work(runner: Runner, task: Task, out: str) -> Outcome:
+def _work(task: Task, out: str) -> Outcome:
     """Do one task in a worker and measure its products; a failure becomes a reason, never an exception."""
     from distributed import get_worker
 
@@ -226,7 +220,7 @@ def _work(runner: Runner, task: Task, out: str) -> Outcome:
 
     start = time.perf_counter()
     try:
-        runner(task, Path(out), progress)
+        task.run(Path(out), progress)
         files = {Path(path).name: measure(Path(out) / path) for path in task.products}
     except (BadInput, WorkFailed) as error:
         return Outcome({}, time.perf_counter() - start, str(error))

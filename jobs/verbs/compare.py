@@ -67,16 +67,16 @@ def records_file(path: Path, recipe: str = "") -> Path:
     if path.is_file():
         return path
     if not path.is_dir():
-        raise BadInput(WHERE, "", f"{path} does not exist", "a folder of products, of a page, or a file of Records")
+        raise BadInput(str(path), "", "does not exist", "a folder of products, of a page, or a file of Records")
     if not recipe and (path / OF_A_PAGE).is_file():
         return path / OF_A_PAGE
     found = sorted(path.glob(f"report/{recipe or '*'}/{OF_A_PAGE}"))
     if not found:
         what = f"no page of the recipe {recipe}" if recipe else "no page"
-        raise BadInput(WHERE, "", f"{path} holds {what} with Records", "write one with `twillight report` first")
+        raise BadInput(str(path), "", f"holds {what} with Records", "write one with `twillight report` first")
     if len(found) > 1:
         pages = ", ".join(file.parent.name for file in found)
-        raise BadInput(WHERE, "", f"{path} holds several pages", f"choose one with --recipe: {pages}")
+        raise BadInput(str(path), "", "holds several pages", f"choose one with --recipe: {pages}")
     return found[0]
 
 

@@ -71,8 +71,8 @@ def require(
     Raises
     ------
     BadInput
-        If the scene cannot be used, the page has no errors by size, or no method meets the limits. Then the sentence
-        names the nearest points of the front.
+        If the scene cannot be used, the page has no errors by size, its best method is none of the recipe's, or no
+        method meets the limits. Then the sentence names the nearest points of the front.
     """
     from rich.console import Console
 
@@ -123,6 +123,10 @@ def require(
         )
         limits = f"{100 * error:g} % in {ms:g} ms per frame"
         raise BadInput("require", "limits", limits, f"no method meets them; the nearest points of the front are {near}")
+    if chosen.method not in names:
+        allowed = "the page shows it, the recipe has no such method: run the recipe again, or choose one with --method"
+        told = nearest_name(chosen.method, names, "model")
+        raise BadInput(f"the page of {general.name}", "method", chosen.method, f"{allowed}; {told}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
     write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options)
     name = f"{chosen.method} {chosen.setting}".strip()

@@ -18,7 +18,6 @@ from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.stages import run
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.console import duration, number, table_of
 from weaves.errors import WorkFailed
@@ -48,7 +47,6 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, w
         summary = execute(
             tasks,
             out,
-            run,
             stages=stages,
             scheduler=scheduler,
             workers=workers,

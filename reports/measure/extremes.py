@@ -27,8 +27,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.error import COLOUR_WEIGHTS
-from reports.options import EXTREME_TRUTH
-from reports.record import Metric, Provenance, Record, Role
+from reports.options import EXTREME_TRUTH, Role
+from reports.record import Metric, Provenance, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:

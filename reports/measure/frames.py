@@ -20,8 +20,8 @@ from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
 from reports.measure.truth_noise import with_noise
-from reports.options import FrameOptions
-from reports.record import TRUTH, Provenance, Record, Role
+from reports.options import FrameOptions, Role
+from reports.record import TRUTH, Provenance, Record
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from pipeline.scenes.shade import colours
 from pipeline.truth.query import Queries
-from reports.record import Metric, Provenance, Record, Role
+from reports.options import Role
+from reports.record import Metric, Provenance, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:

@@ -26,8 +26,8 @@ from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
 from reports.measure.truth_noise import with_noise
-from reports.options import ErrorOptions, TimingOptions
-from reports.record import TRUTH, Metric, Provenance, Record, Role
+from reports.options import ErrorOptions, Role, TimingOptions
+from reports.record import TRUTH, Metric, Provenance, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:

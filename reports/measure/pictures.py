@@ -23,8 +23,8 @@ from pipeline.truth.estimator import estimate
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
 from reports.measure.truth_noise import with_noise
-from reports.options import PictureOptions
-from reports.record import TRUTH, Provenance, Record, Role
+from reports.options import PictureOptions, Role
+from reports.record import TRUTH, Provenance, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:

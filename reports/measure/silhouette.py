@@ -27,8 +27,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.opacity import opacity
 from pipeline.truth.query import Queries
 from reports.images.exr import read_exr, write_exr
-from reports.options import EdgeOptions
-from reports.record import TRUTH, Provenance, Record, Role, to_table
+from reports.options import EdgeOptions, Role
+from reports.record import TRUTH, Provenance, Record, to_table
 from weaves.fabric import Fabric
 
 Floats = npt.NDArray[np.float64]

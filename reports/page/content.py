@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from reports.options import BenchOptions
+from reports.options import BenchOptions, Role
 from reports.page.model_note import ModelNote
 from reports.page.picture_strips import PictureFile
-from reports.record import Machine, Record, Role
+from reports.record import Machine, Record
 from weaves.fabric import Fabric
 
 

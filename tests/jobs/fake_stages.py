@@ -76,10 +76,6 @@ def task(name, kind=Fake, needs=(), **fields):
     return kind(name=name, after=tuple(need.id for need in needs), **fields)
 
 
-def run(task, out, progress):
-    task.run(out, progress)
-
-
 def prepare(argument, ready):
     """Stand in for the compiling of a group of kernels; `argument` is a folder and a task."""
     out, of = argument
@@ -109,4 +105,4 @@ def chain():
 if __name__ == "__main__":
     from jobs.run.executor import execute
 
-    execute(chain(), Path(sys.argv[1]), run, workers=2)
+    execute(chain(), Path(sys.argv[1]), workers=2)

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.subjects import FabricSubject, Role, Subjects, Trained
+from jobs.plan.measurements.subjects import FabricSubject, Subjects, Trained
 from jobs.plan.task import Progress, Uncoloured
 from pipeline import versions
 from pipeline.models.domain import PHYSICS
 from pipeline.truth.options import TruthOptions
-from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH
+from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH, Role
 
 if TYPE_CHECKING:
     from reports.record import Record

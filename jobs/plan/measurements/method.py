@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement, Picture
-from jobs.plan.measurements.subjects import Dataset, Role, Subjects, Trained
+from jobs.plan.measurements.subjects import Dataset, Subjects, Trained
 from jobs.plan.measurements.truth_edge import TruthEdge
 from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.measurements.truth_picture import TruthPicture
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline import versions
 from pipeline.scenes.options import View
-from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, RunOptions, select
+from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
 
 if TYPE_CHECKING:
     from reports.record import Record

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Self
 
 from jobs.plan.dataset import Shard, fingerprint_of, folder_of
 from jobs.plan.task import Made, Part, Place
@@ -14,16 +14,13 @@ from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint
-from reports.options import RunOptions
+from reports.options import Role, RunOptions
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
     from pipeline.models.fallback import Fallback
     from pipeline.models.method import Method
     from reports.record import Provenance
-
-Role = Literal["seen", "unseen"]
-"""True if general models saw a fabric in training."""
 
 
 class Dataset(Part):

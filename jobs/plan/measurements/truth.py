@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.subjects import Dataset, Role, Subjects
+from jobs.plan.measurements.subjects import Dataset, Subjects
 from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline import versions
-from reports.options import ErrorOptions, FrameOptions, select
+from reports.options import ErrorOptions, FrameOptions, Role, select
 
 if TYPE_CHECKING:
     from reports.record import Record

@@ -91,6 +91,8 @@ def test_a_recipe_of_ones_own(files):
         ("steps = 10", "stepps = 10", ["models.0.training.stepps = 10", "did you mean 'steps'"]),
         ("counts = [1, 2]", "[models.training]", ["models.2", "nothing to train"]),
         ('model = "neumip"', 'model = "neumip"\nname = "woven"', ["models = 'woven'", "names must differ"]),
+        ('model = "neumip"', 'model = "neumip"\nname = "truth"', ["models.1.name = 'truth'", "must be another name"]),
+        ('model = "neumip"', 'model = "neumip"\nname = "bench"', ["models.1.name = 'bench'", "must be another name"]),
         ("sigma = [0.05, 8.0]", "behind = 0.5", ["models.0.name = 'woven'", "does not know queries with behind"]),
         ("relative_error = 0.05", 'frame = "macro"', ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
         ("frames = 4", "frmes = 4", ["bench.frmes = 4", "did you mean 'frames'"]),

@@ -43,9 +43,7 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     slow = [fake.task(f"slow {index}", seconds=0.5) for index in range(2)]
     tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
     recorded = []
-    summary = execute(
-        tasks, tmp_path, fake.run, workers=2, recorded=lambda task: recorded.append(task.title), console=quiet()
-    )
+    summary = execute(tasks, tmp_path, workers=2, recorded=lambda task: recorded.append(task.title), console=quiet())
 
     assert {task.title for task in summary.ran} == {"good", "fine", "timed", "slow 0", "slow 1"} == set(recorded)
     assert {task.title for task in summary.failed} == {"bad", "forgetful"}
@@ -62,20 +60,20 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     assert {event["threads"] for event in events} == {"1"}
 
     # A second run does the failed ones again and nothing else.
-    again = execute(tasks, tmp_path, fake.run, workers=1, console=quiet())
+    again = execute(tasks, tmp_path, workers=1, console=quiet())
     assert {task.title for task in again.ran + again.failed} == {"bad", "forgetful"}
     assert len(again.before) == 5
 
 
 def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake):
     done, bad = fake.task("done"), fake.task("bad", fails="ValueError('no kernel')")
-    execute([done], tmp_path, fake.run, workers=1, console=quiet())
+    execute([done], tmp_path, workers=1, console=quiet())
     tasks = [done, bad, *(fake.task(f"new {index}") for index in range(3))]
 
     def prepare(todo):
         return [Preparation(task.title, fake.prepare, (tmp_path, task)) for task in todo]
 
-    summary = execute(tasks, tmp_path, fake.run, workers=2, prepare=prepare, console=quiet())
+    summary = execute(tasks, tmp_path, workers=2, prepare=prepare, console=quiet())
     events = [(event["event"], event["name"]) for event in fake.events(tmp_path)][2:]
     assert {name for event, name in events[:3] if event == "prepared"} == {"new 0", "new 1", "new 2"}
     # What cannot be compiled is told by the task that needs it.
@@ -84,7 +82,7 @@ def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake)
 
 def test_a_killed_worker_costs_one_retry(tmp_path, fake):
     tasks = [fake.task("victim", dies=True, seconds=0.2), fake.task("other", seconds=0.4)]
-    summary = execute(tasks, tmp_path, fake.run, workers=2, console=quiet())
+    summary = execute(tasks, tmp_path, workers=2, console=quiet())
     assert {task.title for task in summary.ran} == {"victim", "other"}
     starts = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
     assert starts.count("victim") == 2
@@ -92,12 +90,12 @@ def test_a_killed_worker_costs_one_retry(tmp_path, fake):
 
 def test_work_left_out_before_is_named(tmp_path, fake):
     with pytest.raises(WorkFailed, match="train: 8 tasks that it needs are not done; run `twillight generate` first"):
-        execute(fake.chain(), tmp_path, fake.run, stages=["train"], console=quiet())
+        execute(fake.chain(), tmp_path, stages=["train"], console=quiet())
 
 
 def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
     with pytest.raises(BadInput, match="no dask scheduler answers"):
-        execute(fake.chain(), tmp_path, fake.run, scheduler="nonsense://", console=quiet())
+        execute(fake.chain(), tmp_path, scheduler="nonsense://", console=quiet())
 
 
 def driver(out):
@@ -138,7 +136,7 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(tmp_path, fake, blow):
     tasks = fake.chain()
     done = sum(Ledger(tmp_path).state(task) == "done" for task in tasks)
     assert 2 <= done < len(tasks)
-    summary = execute(tasks, tmp_path, fake.run, workers=2, console=quiet())
+    summary = execute(tasks, tmp_path, workers=2, console=quiet())
     assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
     expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
     assert hashes(tmp_path) == expected
@@ -152,8 +150,8 @@ def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
     ledger = Ledger(tmp_path)
     ledger.finish(first, {"x.txt": measure(tmp_path / first.products[0])}, 1.0)
     recorded = []
-    summary = execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    summary = execute([twin], tmp_path, recorded=recorded.append, console=quiet())
     assert recorded == [twin] == summary.before and not summary.ran
     recorded.clear()
-    execute([twin], tmp_path, fake.run, recorded=recorded.append, console=quiet())
+    execute([twin], tmp_path, recorded=recorded.append, console=quiet())
     assert not recorded

@@ -5,7 +5,7 @@ import pytest
 from jobs.cli import main
 from jobs.recipe.load import load_recipe
 from reports.measure.by_size import EDGES
-from reports.record import OF_A_PAGE, Record, this_machine, write_records
+from reports.record import OF_A_PAGE, Record, read_records, this_machine, write_records
 
 RECIPE = """
 name = "wide"
@@ -89,8 +89,10 @@ def test_what_lies_beyond_the_general_domain_counts_as_quadratures(require, monk
     import jobs.verbs.require as module
 
     seen = {}
-    before = module._left
-    monkeypatch.setattr(module, "_left", lambda model, *rest: seen.setdefault(model.options.name, before(model, *rest)))
+    before = module._fallback_share
+    monkeypatch.setattr(
+        module, "_fallback_share", lambda model, *rest: seen.setdefault(model.options.name, before(model, *rest))
+    )
     assert require("plane")[0] == 0
     assert 0.1 < seen["woven"] < 0.9 and seen["woven"] == seen["neumip"] and seen["point_sampled"] == 0.0
 
@@ -108,6 +110,19 @@ def test_a_method_that_was_not_measured_is_refused(require):
     pytest.importorskip("mitsuba")
     code, _, told = require("plane", "--method", "neumip")
     assert code == 2 and told.count("\n") == 1 and "--method = 'neumip': it was not measured" in told
+
+
+def test_a_method_that_only_an_old_page_has_is_refused(require, tmp_path):
+    pytest.importorskip("mitsuba")
+    path = tmp_path / "out" / "report" / "wide" / OF_A_PAGE
+    best = Record(method="sums", scene="plane", threads=1)
+    numbers = {"mse": 1e-6, "colour_rrmse": 0.001, "fallback_share": 0.0, "frame_time": 1e-6}
+    records = [best.of(metric, value, 9) for metric, value in numbers.items()]
+    write_records(path, [*read_records([path]), *records], this_machine(1))
+    code, _, told = require("plane")
+    assert code == 2 and told.count("\n") == 1
+    assert "the page of wide: method = 'sums'" in told and "'sums' is now 'soft_nodes'" in told
+    assert require("plane", "--method", "point_sampled")[0] == 0
 
 
 @pytest.mark.parametrize(

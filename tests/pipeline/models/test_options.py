@@ -22,8 +22,8 @@ def test_model_tells_the_options_apart():
 
 @pytest.mark.parametrize("model", CLASSES)
 def test_options_lie_in_the_file_of_their_model(model):
-    assert CLASSES[model].__module__ == f"pipeline.models.options.{model}"
-    assert find_spec(f"pipeline.models.{model}") is not None
+    assert CLASSES[model].__module__ == f"pipeline.models.{model}.options"
+    assert find_spec(f"pipeline.models.{model}.model") is not None
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,8 @@ def test_what_returns_nothing_has_no_bias():
     ("value", "error", "result"),
     [(0.001, 0.0005, "below"), (-0.001, 0.0005, "below"), (-0.0025, 0.001, "open"), (0.0055, 0.001, "above")],
 )
-def test_verdicts_need_two_standard_errors(value, error, verdict):
-    assert Bias("denim", SIDES[0], COMPONENTS[0], value, error, 10).result == verdict
+def test_results_need_two_standard_errors(value, error, result):
+    assert Bias("denim", SIDES[0], COMPONENTS[0], value, error, 10).result == result
 
 
 def test_the_table_is_measured_from_both_sides():

@@ -12,7 +12,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.images.exr import read_exr
 from reports.images.film import film
-from reports.measure.scene import errors as scene_bench
+from reports.measure.scene import scene_errors
 from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
 from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.timing import Timing
@@ -24,7 +24,7 @@ pytest.importorskip("mitsuba")
 
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
 SCENES = SceneBenchOptions(
-    names=("table",),
+    names=("dinner_table",),
     size=(40, 32),
     frames=3,
     options=SceneOptions(environment_directions=4),
@@ -61,13 +61,13 @@ ALL = {"behind", "stretch", "curvature"}
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
-    path = tmp_path_factory.mktemp("shot") / "table.npz"
-    shoot("table", SCENES, path)
+    path = tmp_path_factory.mktemp("shot") / "dinner_table.npz"
+    shoot("dinner_table", SCENES, path)
     return read_shot(path), path
 
 
 def test_the_same_work_gives_the_same_bytes(shot, tmp_path):
-    shoot("table", SCENES, tmp_path / "again.npz")
+    shoot("dinner_table", SCENES, tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == shot[1].read_bytes()
 
 
@@ -163,7 +163,7 @@ def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
             for index, _ in enumerate(contenders)
         ]
 
-    monkeypatch.setattr(scene_bench, "time_side_by_side", readings)
+    monkeypatch.setattr(scene_errors, "time_side_by_side", readings)
     records = time_scene([Fallback(Answers(factor), ALL) for factor in (1.0, 1.3)], frames, REPEATS, 0)
     whole = 1e-3 * sum(count * (1 + index) for index, count in enumerate(counts))
     for record in records:
