@@ -227,6 +227,8 @@ class RunOptions(_Options):
 class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
 
+    latents: bool = True
+    """Measure models that blend latents between pairs of presets, and the time of edits."""
     picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
     scenes: SceneBenchOptions = SceneBenchOptions()

@@ -40,7 +40,7 @@ class Latents(Measurement):
         names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
         dataset = subjects.recipe.dataset
         for model in subjects.models:
-            if model.recipe.options.blends:
+            if subjects.recipe.bench.latents and model.recipe.options.blends:
                 yield cls(
                     model=model.whole,
                     presets=tuple(load_fabric(name) for name in names),
