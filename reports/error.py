@@ -1,9 +1,9 @@
-"""How far answers are from the truth, and how much of that is noise of the truth itself.
+"""Errors of answers against the truth, and the part of them that is noise of the truth.
 
 With a model's value m, the truth's estimate t, its standard error s, and means <.> over queries (pixels) and channels:
 
 MSE measured   <(m - t)^2> in linear RGB of the fabric's own colours: the error the papers report [Chen2024Woven].
-noise          <s^2>, s what the truth errs on average (`reports.measure.truth_noise`). Components are taken to be
+noise          <s^2>, s the error of the truth on average (`reports.measure.truth_noise`). Components are taken to be
                uncorrelated, s_rgb^2 = sum_j colour_j^2 s_j^2: an approximation, for they share their points; the page
                says how much of an error the noise is.
 MSE            MSE measured - noise. The truth's error is independent of the model's, so E[(m - t)^2] = (m - f)^2 + s^2
@@ -37,7 +37,7 @@ COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 
 @dataclass(frozen=True)
 class Error:
-    """A mean squared error and what is known of it."""
+    """A mean squared error with its interval and the noise of the truth."""
 
     value: float
     """MSE with the noise of the truth subtracted."""
@@ -162,7 +162,7 @@ def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> t
     Notes
     -----
     The interval is the delta method's in the logarithm: log r +- 1.96 sqrt((s_a/a)^2 + (s_b/b)^2). Methods that answer
-    the same queries err together, so it is wider than it need be.
+    errors of the same queries are correlated, so it is wider than necessary.
     """
     (a, error_a), (b, error_b) = numerator, denominator
     spread = 1.96 * math.hypot(error_a / a, error_b / b)

@@ -79,7 +79,7 @@ class ImageOptions(_Options):
     tone_mapper: Literal["aces", "hable", "reinhard"] = "aces"
     """By which HDR-FLIP shows its exposures."""
     floor_channels: Literal["together", "independent"] = "together"
-    """How the noised copy of the truth errs in the channels of a pixel. Their noise is that of the same points in a few
+    """Noise of the noised copy of the truth in the channels of a pixel. Their noise is that of the same points in a few
     colours: drawn independently it would be coloured, and the noise floor of colour differences several times that of
     a perfect method."""
     block: int = Field(default=16, ge=1)

@@ -236,7 +236,7 @@ def _compact(record: Record) -> dict[str, object]:
 
 
 def _cpu() -> str:
-    """Return the processor's model name, as Linux tells it."""
+    """Return the processor's model name, as Linux reports it."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text().splitlines():

@@ -1,7 +1,9 @@
 """Words of the code: names use the field's terms, and docstrings open with a noun or an imperative."""
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,6 +31,18 @@ PHRASES = {"stand_in": "fallback", "left_to": "fallback", "not_its_own": "fallba
 
 OPENINGS = re.compile(r"(What|Say|Says|Tell|Tells|Whether)\b")
 """Openings of docstrings that are neither a noun nor an imperative of the field; bools open with "True if"."""
+
+PROSE = {
+    "asked": "query, evaluate",
+    "asks": "query, evaluate",
+    "taught": "trained on",
+    "told": "report, receive",
+    "errs": "error",
+    "teacher": "trained_by",
+    "knob": "parameter",
+    "leftovers": "fallback_share",
+}
+"""Words that are not in docstrings and comments outside of code spans, and the terms to use."""
 
 LATER: dict[str, int] = {}
 """Docstrings that still open so, by room: these numbers only fall."""
@@ -58,6 +72,18 @@ def wrong_names(path: Path, tree: ast.AST) -> list[str]:
     return found
 
 
+def wrong_prose(text: str) -> list[str]:
+    words = re.findall(r"\w+", re.sub(r"`[^`]*`", "", text).lower())
+    return [f"{word}: use {PROSE[word]}" for word in words if word in PROSE]
+
+
+def comments(source: str) -> Iterator[str]:
+    """Yield the comments of a file."""
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.string
+
+
 def wrong_openings(tree: ast.AST) -> list[str]:
     return [text.split("\n")[0] for text in docstrings(tree) if OPENINGS.match(text)]
 
@@ -65,6 +91,13 @@ def wrong_openings(tree: ast.AST) -> list[str]:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_use_the_terms_of_the_field(path):
     found = wrong_names(path, ast.parse(path.read_text(encoding="utf-8")))
+    assert not found, f"{path}: {found}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_docstrings_and_comments_use_the_terms_of_the_field(path):
+    source = path.read_text(encoding="utf-8")
+    found = [wrong for text in (*docstrings(ast.parse(source)), *comments(source)) for wrong in wrong_prose(text)]
     assert not found, f"{path}: {found}"
 
 
@@ -82,6 +115,13 @@ def test_docstrings_open_with_a_noun_or_an_imperative(room):
     ]
     assert len(found) <= LATER.get(room, 0), found
     assert len(found) == LATER.get(room, 0), f"{room}: lower its number in LATER to {len(found)}"
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"), [("Queries that it was not taught.", 1), ("The column `asked`.", 0), ("A task is given.", 0)]
+)
+def test_the_search_for_words_can_fail(text, wrong):
+    assert len(wrong_prose(text)) == wrong
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ class Shard(Task):
     stage: ClassVar[Stage] = "generate"
 
     question: AnyShardTask
-    """Which rows of which fabric."""
+    """Rows of one fabric, and how they are answered."""
     role: str
     """Role of the fabric in the data set: seen, population or unseen."""
     folders: Places

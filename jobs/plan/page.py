@@ -28,7 +28,7 @@ class Page(Task):
     recipe: str
     """Name of the recipe."""
     about: str
-    """Its sentence."""
+    """Sentence about the recipe."""
     dataset: str
     """Name and fingerprint of the data set."""
     fabrics: tuple[tuple[Fabric, Role], ...]

@@ -64,7 +64,7 @@ class Made(Part):
     task: str
     """Id of that task."""
     path: Place
-    """Its product, or the folder of its products."""
+    """Path of its product, or of the folder of its products."""
 
 
 class Task(Part):
@@ -143,12 +143,12 @@ def urgencies(tasks: Sequence[Task]) -> dict[str, float]:
 
 
 def _optics(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
-    """Return the fabric; in an identity what shapes its components, and its name, which seeds random points."""
+    """Return the fabric; in an identity its optics, and its name, which seeds random points."""
     return {"name": fabric.name, "optics": fabric.optics()} if info.context == _IDENTITY else dump(fabric)
 
 
 def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
-    """Return the fabric; in an identity what shapes its components and its pictures, and its name."""
+    """Return the fabric; in an identity its optics, its colours and its name."""
     if info.context != _IDENTITY:
         return dump(fabric)
     shown = {"specular", "diffuse", "diffuse_transmission"}
@@ -157,6 +157,6 @@ def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: Serializati
 
 
 Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]
-"""A fabric whose colours shape nothing."""
+"""A fabric whose colours do not change the result."""
 Coloured = Annotated[Fabric, WrapSerializer(_look)]
-"""A fabric whose colours shape the result."""
+"""A fabric whose colours change the result."""

@@ -25,7 +25,7 @@ class Training(Task):
     options: ModelOptions
     """The network."""
     training: TrainingOptions
-    """How it is trained."""
+    """Options of its training."""
     fabrics: tuple[str, ...]
     """Names of the fabrics that it learns."""
     shards: tuple[str, ...]
@@ -84,7 +84,7 @@ class Training(Task):
         return {"model": self.options.version, "training": versions.TRAINING}
 
     def identity(self) -> dict[str, Any]:
-        """Return what the weights depend on: neither the device nor how often they are saved."""
+        """Return the identity of the weights, without the device and the interval of saving."""
         content = super().identity()
         training = {name: value for name, value in content["training"].items() if name not in _WHERE_IT_RUNS}
         return content | {"training": training}

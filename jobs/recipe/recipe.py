@@ -57,7 +57,7 @@ class DatasetOptions(_Section):
     queries: QueryOptions = QueryOptions()
     """Distribution of the queries."""
     truth: TruthOptions = TruthOptions()
-    """How they are answered."""
+    """Options of the truth."""
     training_truth: TruthOptions | None = None
     """How training rows are answered; left out: as all others. A training averages over the noise of its rows, so many
     coarse rows give a better model than the few exact ones that take the same time."""
@@ -76,7 +76,7 @@ class ModelRecipe(_Section):
     options: ModelOptions
     """The design."""
     training: TrainingOptions = TrainingOptions()
-    """How it is trained."""
+    """Options of its training."""
     runtimes: tuple[RuntimeName, ...] | None = None
     """Ways to run it that are measured too; left out: those of ``bench.runtimes``."""
 
@@ -114,7 +114,7 @@ class ModelRecipe(_Section):
         return self
 
     def measured(self, bench: BenchOptions) -> BenchOptions:
-        """Return what is measured of this model: ways to run a network are no matter of the others."""
+        """Return the measurements of this model: only networks are run in several ways."""
         runtimes = (bench.runtimes if self.runtimes is None else self.runtimes) if self.learns else ()
         return bench.model_copy(update={"runtimes": runtimes})
 

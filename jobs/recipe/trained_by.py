@@ -32,7 +32,7 @@ def with_trained_by(
     content : mapping
         A recipe's file.
     where : str
-        Its path, for sentences.
+        Path of the recipe, for error messages.
     load : callable
         Returns the recipe of a name, which stands at a key of the file.
 

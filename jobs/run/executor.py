@@ -45,7 +45,7 @@ class Preparation(NamedTuple):
     Attributes
     ----------
     name : str
-        What progress shows.
+        Name that progress shows.
     function : callable
         ``function(argument, ready)``; it calls ``ready`` with the name of each kernel.
     argument : object
@@ -92,11 +92,11 @@ def execute(
     workers : int
         Worker processes of the local cluster, one thread each; 0: one a core.
     prepare : callable
-        What workers do before the tasks that are not done yet.
+        Work of workers before the first task.
     recorded : callable
         Called in this process after a receipt is written, or products are taken from another data set.
     console : Console, optional
-        Where progress is shown.
+        Terminal that shows progress.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster that listens on the loopback alone and ends with this process."""
     os.environ.setdefault(
         "DASK_LOGGING__DISTRIBUTED", "critical"
-    )  # inherited by workers; dask tells every shutdown as a warning
+    )  # inherited by workers; dask reports every shutdown as a warning
     import dask.config
     from distributed import Client, LocalCluster
 
@@ -297,8 +297,8 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C back until the end of the block.
 
-    Threads and processes started within inherit this for good: of a terminal's Ctrl-C, which goes to every process,
-    only the driver hears, and it stops the workers.
+    Threads and processes that start within the block never receive Ctrl-C, although a terminal sends it to every
+    process. Only the driver receives it, and stops the workers.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

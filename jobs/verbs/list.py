@@ -31,7 +31,7 @@ def fabrics_table(fabrics: Sequence[Fabric]) -> Table:
 
 
 def recipes_table(recipes: Sequence[Recipe]) -> Table:
-    """List recipes: name and what they are for."""
+    """List recipes: name and purpose."""
     table = table_of("recipe", "for")
     for recipe in recipes:
         table.add_row(recipe.name, recipe.about)

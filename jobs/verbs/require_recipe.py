@@ -55,17 +55,17 @@ def write_recipe(
     Parameters
     ----------
     path : Path
-        Where it goes.
+        File to write.
     requirement : Requirement
         Requirements of the scene.
     general : Recipe
-        Whose method, truth and training are taken.
+        Recipe that has the method, truth and training.
     method, setting : str
         The method, by its name there, and its setting; empty for all of its settings.
     scene : str
         Name of a scene of the package, or path of one, from the current folder.
     fabrics : mapping
-        For each fabric's name what names it, a preset or a path from the current folder, and itself.
+        For each fabric's name its reference, a preset or a path from the current folder, and the fabric.
     effort : float
         Share of the training rows a fabric and of the steps, > 0; 1: all of them.
     options : mapping

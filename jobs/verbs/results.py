@@ -18,7 +18,7 @@ def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> N
     Raises
     ------
     BadInput
-        If the recipe has no page in `out`, its Records lack what is needed, or `readme` has no such block.
+        If the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
     from reports.record import read_machine, read_records
     from reports.tables.markdown import block, with_block

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 ENOUGH: Final = 3.0
-"""How many times less a scene's recipe should generate or learn from."""
+"""Least factor by which a scene's recipe should reduce rows and training."""
 
 MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
 """Records of a method on a scene that are held side by side."""
@@ -70,13 +70,13 @@ class Saving(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """How many times less it is by the scene's own recipe; infinite where it takes nothing, nan of nothing."""
+        """Quotient of the general recipe's value a and the own one's b; nan if a is 0, infinite if only b is."""
         a, b = self.general.value, self.narrow.value
         return math.nan if not a else a / b if b else math.inf
 
 
 def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
-    """Print what scenes' own recipes save, and write it to ``report/savings.csv``.
+    """Print the savings of scenes' own recipes, and write them to ``report/savings.csv``.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]
 
 
 def conclusion(rows: Sequence[Saving]) -> str:
-    """Return in a sentence what a scene's recipe saves, and at which error."""
+    """Return a sentence on the savings of a scene's recipe and its error."""
     by = {row.quantity: row for row in rows}
     generated, learnt, error = by["queries generated"], by["queries learnt from"], by["mse"]
     fewer = [f"{generated.ratio:.1f} times fewer queries to generate"]

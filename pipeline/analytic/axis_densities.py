@@ -49,7 +49,7 @@ def axis_densities(
     Returns
     -------
     int
-        How many cells are touched.
+        Number of touched cells.
     """
     cells = len(touched)
     reach = reach * deviation

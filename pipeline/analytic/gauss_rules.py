@@ -19,7 +19,7 @@ class Rule(NamedTuple):
     places, weights : float64 (n,)
         Positions within the cell; weights that sum to the length.
     borders : float64 (n + 1,)
-        Where the boxes of the nodes end: as long as their weights.
+        Borders of the nodes' boxes, which are as long as the weights.
     shares : float64 (n + 1,)
         The same as shares of the variable that the rule is Gauss's in, v across a yarn: from 0 to 1.
     """

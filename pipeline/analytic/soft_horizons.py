@@ -31,7 +31,7 @@ def over_boxes(
     values, squares : float (azimuths, rows, columns)
         Horizons of the cells of a grid, and their squares (means of both, where many grids share the boxes).
     rows, columns : float64 (boxes, cells)
-        Which share of each box lies in which cells, along both axes.
+        Share of each box in each cell, along both axes.
     """
     mean, square = ((rows @ grid @ columns.T).reshape(len(grid), -1) for grid in (values, squares))
     return mean, np.maximum(square - mean**2, 0.0)

@@ -50,7 +50,7 @@ def _defined(module: binding.ModuleRef, linkage: binding.Linkage) -> list[bindin
 
 
 class _OwnFlags(CPUTargetOptions):
-    """Options of a function: what it does not ask for is off, whatever its first caller has."""
+    """Options of a function: options that it does not set are off, whatever its first caller has."""
 
     def finalize(self, flags: Any, options: Any) -> None:
         for name in _INHERITED:

@@ -1,7 +1,7 @@
 """The models that exist: every folder beside this file that has options.
 
 Options are data: they enter the fingerprint of a trained model, and a recipe's ``[[models]]`` table is validated by
-`ModelOptions`, the union told apart by ``model``. Nothing heavy is imported here, so that plans can be made without
+`ModelOptions`, the union distinguished by ``model``. Nothing heavy is imported here, so that plans can be made without
 torch. A new model is a new folder; nothing else names it.
 """
 
@@ -36,4 +36,4 @@ if TYPE_CHECKING:
     ModelOptions = Options
 else:
     ModelOptions = Annotated[Union[tuple(CLASSES.values())], Field(discriminator="model")]  # noqa: UP007
-"""Any model's options, told apart by `model`."""
+"""Any model's options, distinguished by `model`."""

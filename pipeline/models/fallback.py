@@ -76,7 +76,7 @@ class Fallback:
     method : Method
         Answers all queries of its domain.
     kinds : collection of str
-        Which of `behind`, `stretch` and `curvature` it knows.
+        Kinds of queries that it knows, of `behind`, `stretch` and `curvature`.
     footprint : str
         Round footprint in place of an ellipse that it does not know: ``geometric_mean`` of the axes, or ``major``.
     """

@@ -26,7 +26,7 @@ class OneMaterial(Generic[Net]):
     domain : Domain, optional
         Domain of the training; any query if left out.
     device : torch.device
-        Where they compute.
+        Device of the computation.
     """
 
     def __init__(

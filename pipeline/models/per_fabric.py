@@ -1,4 +1,4 @@
-"""Cache of what a method computes once for each fabric.
+"""Cache of a method's results that are computed once for each fabric.
 
 Fabrics of equal optics share an entry. A known fabric object is found by its identity, because a fingerprint takes
 longer than a few hundred queries.

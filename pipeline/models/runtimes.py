@@ -49,7 +49,7 @@ class _Program(NamedTuple):
     """A module, ready to run."""
 
     run: Callable[..., Tensor]
-    """From inputs and constants to components (N, 4)."""
+    """Function of inputs and constants that returns components (N, 4)."""
     saved: int = 0
     """Bytes saved by its weights, relative to single precision."""
 
@@ -198,7 +198,7 @@ class RunBy:
     Parameters
     ----------
     method : Portable
-        What answers.
+        The method to run.
     runtime : str
         A key of `RUNTIMES`.
     """

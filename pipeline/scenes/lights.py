@@ -68,7 +68,7 @@ def lights_of(mi: Any, world: Any, where: str, options: SceneOptions) -> list[Li
 
 
 def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
-    """Ask a light without extent where it is from the origin, and a point light how strong it is at distance 1."""
+    """Return a directional light, or a point light with its strength at distance 1."""
     import drjit
 
     seen_from = drjit.zeros(mi.SurfaceInteraction3f)

@@ -89,7 +89,7 @@ class Loaded:
     mi, world, dressed, behind : Any
         The module mitsuba, its scene, the scene's cloth alone, and the scene without its cloth.
     cloths : dict
-        What each key of a cloth stands for, and its fabric.
+        The cloth of each key, and its fabric.
     worn : dict
         For every key the indices of the shapes that wear it, in the order of `world.shapes()`.
     lights : list of Light

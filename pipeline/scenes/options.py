@@ -67,9 +67,9 @@ class SceneOptions(BaseModel):
     """Curvature of the cloth along the view ray: from the shading normal's derivative `at_point`, concave places being
     flat; or `none`, for a benchmark of flat materials."""
     environment_directions: int = Field(default=64, ge=4, le=16384)
-    """Directions of the quadrature that stands for an environment light: a Fibonacci lattice of equal solid angles."""
+    """Directions of the quadrature of an environment light: a Fibonacci lattice of equal solid angles."""
     environment_samples: int = Field(default=64, ge=1, le=1024)
-    """Places of the environment that each of these directions stands for: their mean radiance is the direction's, so
+    """Places of the environment that each of these directions represents: their mean radiance is the direction's, so
     that the whole light is kept whatever its detail."""
     variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto"
     """Mitsuba's variant. `auto`: the LLVM one where a suitable LLVM is found, which changes last digits only."""

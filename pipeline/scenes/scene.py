@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 PREFIX: Final = "fabric_"
-"""How the id of a BSDF that stands for a cloth begins."""
+"""Beginning of the id of a BSDF that represents a cloth."""
 
 Yarns = Annotated[float, Field(gt=0, le=1e7)]
 Length = Annotated[float, Field(ge=-1e6, le=1e6)]

@@ -101,10 +101,10 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
         ],
         axis=-1,
     )
-    # The height of the camera, in yarn spacings, makes a spacing as wide as asked in the bottom row.
+    # The height of the camera, in yarn spacings, gives a spacing the requested width in the bottom row.
     bottom = -rays[-1, 0, 2]
     camera = bottom * focal / options.plane_pixels_per_yarn
-    # It ends with the last row that is nowhere seen more grazingly than asked.
+    # It ends with the last row that is nowhere seen at a larger angle than requested.
     steepness = -rays[..., 2] / np.linalg.norm(rays, axis=-1)
     in_sight = (steepness >= math.cos(math.radians(options.largest_angle))).all(axis=1)
     hit = np.broadcast_to(in_sight[:, None], steepness.shape)

@@ -1,1 +1,1 @@
-"""Questions and answers on disk: Parquet shards and the manifest that lists them."""
+"""Queries and answers on disk: Parquet shards and the manifest that lists them."""

@@ -68,7 +68,7 @@ class AngularSamples(BaseModel):
     ) -> tuple[Queries, Answers]:
         """Return rows `start` to `start + count`; a row depends on the fabric's optics, the grid and its index alone.
 
-        `progress` is told how many rows are done.
+        `progress` receives the number of finished rows.
         """
         from pipeline.truth.estimator import estimate
         from pipeline.truth.query import Answers

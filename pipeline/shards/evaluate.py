@@ -1,4 +1,4 @@
-"""Any list of questions answered: Parquet in, the same rows with their answers out, in bounded memory.
+"""Answers to a file of queries: Parquet in, the same rows with their answers out, in bounded memory.
 
 Row i of the result is row i of the file, and the truth's numbers depend on the seed and on i alone, not on how the file
 is cut into row groups or chunks, nor on how many threads answer these. Rows that have no answer stop everything before
@@ -51,16 +51,16 @@ _KEY = b"twillight"
 
 
 class Answerer(NamedTuple):
-    """Something else than the ground truth that answers questions about a fabric; it states no errors.
+    """A method that answers queries about a fabric in place of the ground truth, without standard errors.
 
     Attributes
     ----------
     answer : callable
-        Takes questions, returns components (N, 4) and transparency (N,), float32. BadInput if it cannot.
+        Takes queries, returns components (N, 4) and transparency (N,), float32. BadInput if it cannot.
     about : dict
         What the result's metadata says of it.
     faults : callable
-        The questions that it cannot answer, beside those that have no answer at all.
+        Faults of queries that it cannot answer, in addition to those that have no answer at all.
     """
 
     answer: Callable[[Queries], tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]
@@ -122,7 +122,7 @@ def evaluate_file(
     Parameters
     ----------
     fabric : Fabric
-        What is asked about.
+        The cloth.
     queries : Path
         A file with `QUERY_COLUMNS` as float32 or float64, less any of `OPTIONAL`; other columns are carried along.
     out : Path
@@ -138,7 +138,7 @@ def evaluate_file(
     threads : int
         Threads that answer; kernels run without the interpreter's lock.
     progress : callable
-        Told the share done.
+        Receives the finished share.
     other : Answerer, optional
         Who answers in place of the ground truth. Errors are then null; `options`, `seed` and `threads` mean nothing.
 
@@ -190,7 +190,7 @@ def bad_list(out: Path) -> Path:
 
 
 class _Crew:
-    """Threads that answer questions about one fabric."""
+    """Threads that answer queries about one fabric."""
 
     def __init__(
         self, fabric: Fabric, options: TruthOptions, seed: int, pool: Executor, other: Answerer | None
@@ -199,7 +199,7 @@ class _Crew:
         self._met: set[tuple[bool, bool]] = set()
 
     def prepare(self, questions: Queries) -> None:
-        """Load kernels and tabulate each side of the fabric that is asked about, before threads would do so at once."""
+        """Load kernels and tabulate the sides of the fabric that queries need, before threads start."""
         if self.other:
             return
         sides = np.stack([questions.wi[:, 2] < 0, questions.wo[:, 2] < 0], axis=1)
@@ -207,13 +207,13 @@ class _Crew:
             key = bool(sides[row, 0]), bool(sides[row, 1])
             if key not in self._met:
                 self._met.add(key)
-                # A wide footprint and a narrow one, for they may ask different tables.
+                # A wide footprint and a narrow one, for they may use different tables.
                 wi, wo = (np.repeat(w[row : row + 1], 2, axis=0) for w in (questions.wi, questions.wo))
                 centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.1], np.float32)
                 estimate(self.fabric, Queries.round(centre, centre, widths, wi, wo), self.options, self.seed, 0)
 
     def answers(self, runs: Iterable[tuple[Queries, int]]) -> Iterator[Answers]:
-        """Answer runs of questions, each with the place of its first row in the file; in their order."""
+        """Answer runs of queries, each with the place of its first row in the file; in their order."""
         return self.pool.map(self._answer, runs)
 
     def _answer(self, run: tuple[Queries, int]) -> Answers:

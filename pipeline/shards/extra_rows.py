@@ -17,9 +17,9 @@ Kind = Literal["components", "angular_samples", "opacity", "grazing_cosine"]
 """Kinds of rows, each with its columns (`pipeline.shards.schema`): a data set's own, and those of extra rows."""
 
 ExtraRows = Annotated[AngularSamples | Silhouettes, Field(discriminator="kind")]
-"""Any set of extra rows, told apart by its kind."""
+"""Any set of extra rows, distinguished by its kind."""
 
 
 def set_name(rows: ExtraRows) -> str:
-    """Return the name of a set in a manifest, where it stands in place of a split: kind and fingerprint."""
+    """Return the name of a set in a manifest, where it replaces the split: kind and fingerprint."""
     return f"{rows.kind}-{fingerprint(rows.model_dump(mode='json'), 8)}"

@@ -85,7 +85,7 @@ SHARD_TASK: Final = TypeAdapter[ShardTask | ExtraShardTask](AnyShardTask)
 
 
 def generate_shard(task: AnyShardTask, path: Path, progress: Callable[[float], None] = lambda fraction: None) -> None:
-    """Answer a task's queries and write them to `path`; `progress` is told the share done."""
+    """Answer a task's queries and write them to `path`; `progress` receives the finished share."""
     # Imported here so that a plan can name tasks without loading compilers.
     from pipeline.shards.store import columns_of, write_columns
 

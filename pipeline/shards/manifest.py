@@ -56,7 +56,7 @@ class Manifest(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     name: str
-    """Name of the recipe that asked for it."""
+    """Name of its recipe."""
     fingerprint: str
     """Fingerprint of everything that shaped its own rows; extra rows are part of the models that learn from them."""
     schema_version: int = SCHEMA_VERSION

@@ -1,4 +1,4 @@
-"""Which questions a data set asks: a pure function of the options, a seed and the row's index.
+"""Random queries of a data set: a pure function of the options, a seed and the row's index.
 
 Row n of a stream is the same query whether it is drawn alone or among a million, by any worker: the generator (Philox,
 counter based [Salmon2011Philox]) is advanced to the row, never run up to it.
@@ -32,7 +32,7 @@ class QueryOptions(BaseModel):
     """Largest angle of either direction to the macro normal, in degrees."""
 
     behind: float = Field(default=0.0, ge=0, le=1)
-    """Share of the queries with the light on the other side of the cloth: they ask for its transmission."""
+    """Share of the queries with the light on the other side of the cloth: their answers are its transmission."""
     stretch: float = Field(default=1.0, ge=1, le=1024)
     """Largest ratio of a footprint's axes; drawn log-uniformly from 1, the longer axis in any direction. The drawn
     standard deviation is then the root of the product of both."""

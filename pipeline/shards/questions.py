@@ -1,4 +1,4 @@
-"""A file of questions that came from elsewhere: read in blocks of bounded size, every fault told in its own words."""
+"""Files of a user's queries: read in blocks of bounded size; each fault is one sentence."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ Faults = Callable[[Queries], dict[int, tuple[str, object, str]]]
 
 
 def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong: Faults = faults) -> None:
-    """Read all questions once and refuse the file if any has no answer."""
+    """Read all queries once and refuse the file if any has no answer."""
     asked = [name for name in QUERY_COLUMNS if name in file.schema_arrow.names]
     first, count, start = None, 0, 0
     for block in blocks(path, file, asked):
@@ -125,9 +125,9 @@ def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong:
 def questions_of(
     block: pa.Table, start: int, repeat: tuple[int, int], wrong: Faults = faults
 ) -> tuple[Queries, list[BadRow]]:
-    """Return a block's questions in single precision and its bad rows.
+    """Return a block's queries in single precision and its bad rows.
 
-    `start` is the file's index of its first row; `wrong` tells what has no answer.
+    `start` is the file's index of its first row; `wrong` returns the faults of queries.
     """
     given = {name: block[name].to_numpy() for name in QUERY_COLUMNS if name in block.column_names}
     single: dict[str, npt.NDArray[np.float32]] = {}

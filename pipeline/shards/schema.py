@@ -40,7 +40,7 @@ _THROUGH: Final = "share of light from straight behind that reaches the viewer u
 
 STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
 QUERY_COLUMNS: Final = tuple(_QUERY)
-"""The columns of a question, as `twillight evaluate` reads them."""
+"""The columns of a query, as `twillight evaluate` reads them."""
 
 
 def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:

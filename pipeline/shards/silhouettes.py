@@ -68,7 +68,7 @@ class Silhouettes(BaseModel):
     ) -> dict[str, npt.NDArray[np.float32]]:
         """Return rows `start` to `start + count` by column; a row depends on fabric, options and its index alone.
 
-        `progress` is told how many rows are done.
+        `progress` receives the number of finished rows.
         """
         seed = stream_seed("silhouettes", [fabric.optics(), self.seed])
         steepest = self._steepest(fabric, seed)

@@ -66,7 +66,7 @@ def train(
     Raises
     ------
     BadInput
-        If rows are missing, the folder cannot be written, or a GPU is asked for that is not there.
+        If rows are missing, the folder cannot be written, or a requested GPU is missing.
     WorkFailed
         If the loss diverges; the last good checkpoint stays.
     """
@@ -152,7 +152,7 @@ def rate_factor(step: int, training: TrainingOptions) -> float:
 
 
 def chosen_device(name: str) -> torch.device:
-    """Return the device asked for; BadInput if it is a GPU and there is none."""
+    """Return the requested device; BadInput if it is a GPU and there is none."""
     present = torch.cuda.is_available()
     if name == "cuda" and not present:
         raise BadInput("training", "device", name, "torch finds no GPU here; allowed: auto, cpu")
@@ -160,7 +160,7 @@ def chosen_device(name: str) -> torch.device:
 
 
 def mixed(training: TrainingOptions, device: torch.device) -> bool:
-    """Return whether a training multiplies in bfloat16: on a GPU, unless told not to."""
+    """Return whether a training multiplies in bfloat16: on a GPU, unless this is switched off."""
     return training.precision == "mixed" or (training.precision == "auto" and device.type == "cuda")
 
 

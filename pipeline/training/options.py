@@ -20,7 +20,7 @@ class TrainingOptions(BaseModel):
     batch: int = Field(default=1024, ge=1, le=2**22)
     """Queries a step, over all fabrics of the step."""
     fabrics: int = Field(default=8, ge=1, le=4096)
-    """Fabrics a step; a model of many fabrics encodes each once and asks it batch / fabrics queries."""
+    """Fabrics a step; a model of many fabrics encodes each once and evaluates batch / fabrics queries of it."""
     learning_rate: float = Field(default=4e-3, gt=0, le=1)
     """Peak learning rate of AdamW."""
     warm_up: float = Field(default=0.03, ge=0, le=0.5)

@@ -17,7 +17,7 @@ from pipeline.truth.scattering.point import Choices
 from weaves.fabric import Fabric
 
 AREA: Final = 5
-"""Column of the denominator in every array of sums, after the four components and what goes straight through."""
+"""Column of the denominator in every array of sums, after the four components and the transparency."""
 
 SUMS: Final = 6
 """Columns of every array of sums."""

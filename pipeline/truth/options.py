@@ -34,7 +34,7 @@ class TruthOptions(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     estimator: EstimatorName = "auto"
-    """How a value is computed; see pipeline.truth.estimator."""
+    """Estimator of all values; see pipeline.truth.estimator."""
     footprint: Literal["gaussian", "box"] = "gaussian"
     """Kernel k_P; the box has the same standard deviations: sides sigma sqrt(12)."""
     relative_error: float = Field(default=0.02, gt=0, le=1)

@@ -25,7 +25,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 HALF_NYQUIST: Final = 0.25
-"""In cycles a pixel."""
+"""Half the Nyquist frequency, in cycles a pixel."""
 
 
 class Spectrum(NamedTuple):
@@ -91,7 +91,7 @@ def excess_energy(
 
 
 def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Spectrum:
-    """Return the power spectrum averaged over frames, less what noise adds.
+    """Return the power spectrum averaged over frames, less the part of noise.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ def blocks(mask: Mask, side: int = 16) -> npt.NDArray[np.intp]:
     mask : bool (H, W)
         Pixels that count.
     side : int
-        Of a block, in pixels; at most a quarter of the picture's shorter side is used.
+        Side of a block, in pixels; at most a quarter of the picture's shorter side is used.
     """
     side = max(1, min(side, min(mask.shape) // 4))
     y, x = np.nonzero(mask)

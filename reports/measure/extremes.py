@@ -38,7 +38,7 @@ FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """Standard deviations, in repeats: the square root of their area."""
 
 ANGLES: Final = (0.0, 60.0, 89.9)
-"""Of light and viewer, to the normal, in degrees."""
+"""Angles of light and viewer to the normal, in degrees."""
 
 GRAZING: Final = 89.9
 """Name of the grazing queries among the errors, and their angle."""
@@ -47,7 +47,7 @@ LUSTROUS: Final = 0.01
 """Least roughness that a yarn may have."""
 
 FAR: Final = 1e6
-"""How far away, in yarn spacings; single precision still holds sixteenths of a yarn there."""
+"""Distance of the far queries, in yarn spacings; single precision still holds sixteenths of a yarn there."""
 
 Array = npt.NDArray[np.float64]
 
@@ -72,17 +72,17 @@ class Extremes(NamedTuple):
     """Queries about one fabric."""
 
     queries: Queries
-    """Of all footprints, angles and places."""
+    """Queries of all footprints, angles and places."""
     size: npt.NDArray[np.float64]
     """Footprint of each, in repeats."""
     grazing: npt.NDArray[np.bool_]
     """True if light or viewer graze."""
     repeat: tuple[int, int]
-    """Of the fabric, in yarn spacings."""
+    """Extent of the fabric's repeat, in yarn spacings."""
 
     @property
     def far(self) -> Queries:
-        """The same about a million yarns away."""
+        """The same footprints a million yarns away."""
         return self.queries._replace(u=self._moved(self.queries.u, 0), v=self._moved(self.queries.v, 1))
 
     def _moved(self, place: npt.NDArray[np.float32], axis: int) -> npt.NDArray[np.float32]:
@@ -201,7 +201,7 @@ def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
     footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,
-    asked (numbers of values).
+    `asked` (number of values).
     """
     found: dict[tuple[str, str], list[Record]] = {}
     for record in records:

@@ -64,7 +64,7 @@ def measure_errors(
     fabric, role : str
         Name of the fabric, and whether general models saw it.
     options : ErrorOptions
-        How many rows, and the seed of random methods.
+        Number of rows, and the seed of random methods.
     """
     cloth, queries, stated = _held_out(manifest, folder, fabric, options)
     truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pipeline.models.method import Method
 
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where on the way from the first fabric to the second errors are measured."""
+"""Positions between the first fabric (0) and the second (1) at which errors are measured."""
 
 ROWS: Final = 1024
 """Queries at each of them."""
@@ -54,7 +54,7 @@ class Pair:
 
     first: Fabric
     second: Fabric
-    """Of the same repeat."""
+    """The second fabric, of the same repeat."""
     differs: Literal["yarns", "draft"]
 
     @property
@@ -106,7 +106,7 @@ def measure_paths(
     distribution : QueryOptions
         Distribution of the queries; the same ones at every share.
     truth : TruthOptions
-        How they are answered.
+        Options of the truth.
     rows : int
         Queries at each share.
 

@@ -64,7 +64,7 @@ def render_method(
     truth : Path
         The picture that `render_truth` wrote with the same options.
     path : Path
-        Where the method's picture goes.
+        Path of the method's picture.
     """
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)

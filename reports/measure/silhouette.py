@@ -65,7 +65,7 @@ class Silhouette(NamedTuple):
     coverage_rmse : float
         Root mean squared error of the coverage.
     displacement : float
-        How far the method's edge lies outside the true one, on average over the rows, in yarn spacings.
+        Distance of the method's edge outside the true one, mean over the rows, in yarn spacings.
     light_rmse : float
         Root mean squared error of the light, over pixels and channels.
     """

@@ -58,7 +58,7 @@ class Timing(NamedTuple):
     """Cost of a query in nanoseconds."""
 
     samples: tuple[float, ...]
-    """Of every repeat, in their order."""
+    """Times of all repeats, in their order."""
     rows: int
     """Queries in each of them."""
     waited: float = math.nan
@@ -81,7 +81,7 @@ def time_side_by_side(
     Parameters
     ----------
     contenders : sequence of Contender
-        What to time.
+        Methods with their queries.
     repeats : int
         Timed calls of each.
     warm_up : int

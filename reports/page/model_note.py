@@ -12,7 +12,7 @@ class ModelNote:
     """A method in words."""
 
     name: str
-    """As in the recipe: tells several models of one kind apart."""
+    """Name in the recipe; it distinguishes several models of one kind."""
     about: str
     """In a few words: kind and training."""
     fingerprint: str = ""

@@ -1,14 +1,15 @@
-"""Which method a scene should be rendered with: what each would err and take there, from what was measured.
+"""Choice of a method for a scene: predicted error and time of each method, from measurements.
 
-Errors and times by the size of footprints (`reports.measure.by_size`) hold for any scene: with shares p of its
-questions in classes of size,
+Errors and times by the size of footprints (`reports.measure.by_size`) hold for any scene. With the shares p of its
+queries in classes of size and the fallback share q of the method,
 
-    error^2 = sum p error_size^2,   time = questions (sum p ns_size + share of others' questions * ns of quadrature)
+    error^2 = (1 - q) sum p error_size^2 + q error_fallback^2
+    time = queries ((1 - q) sum p ns_size + q ns_fallback)
 
-and so a scene that no benchmark has rendered has a front of its own. Questions that a method does not know fall back to
-quadrature, whose error is taken as it is measured on the scene's own questions. What a method errs because it takes
-ellipses for round and curved cloth for flat is not in this prediction; where a scene was rendered by the benchmark
-(`reports.measure.scene.scene_errors`), what was measured there takes its place.
+and so there is a front of methods for a scene that no benchmark has rendered. Error and time of the fallback are
+measured on the scene's own queries. The error of a method that takes ellipses for round and curved cloth for flat is
+not in this prediction. If the benchmark rendered the scene (`reports.measure.scene.scene_errors`), its measurements
+replace the prediction.
 """
 
 from __future__ import annotations
@@ -32,24 +33,24 @@ MEASURED, PREDICTED = "measured here", "from its footprints"
 def predictions(
     sizes: pd.DataFrame,
     shares: Mapping[str, float],
-    questions: int,
-    fallback: Mapping[str, float],
-    quadrature: tuple[float, float],
+    queries: int,
+    fallback_shares: Mapping[str, float],
+    fallback_cost: tuple[float, float],
 ) -> pd.DataFrame:
-    """Return what every method would err and take in a scene.
+    """Return the predicted error and time of every method in a scene.
 
     Parameters
     ----------
     sizes : DataFrame
         From `equal_time.size_table`.
     shares : mapping
-        Share of the scene's questions in each class of footprints.
-    questions : int
-        Questions of a frame.
-    fallback : mapping
-        Share of the questions that each method leaves to quadrature; methods without an entry are left out.
-    quadrature : (float, float)
-        Error of the quadrature and its nanoseconds a question.
+        Share of the scene's queries in each class of footprints.
+    queries : int
+        Queries of a frame.
+    fallback_shares : mapping
+        Fallback share of each method; methods without an entry are left out.
+    fallback_cost : (float, float)
+        Error of the fallback and its nanoseconds a query.
 
     Returns
     -------
@@ -57,23 +58,23 @@ def predictions(
         Columns: method, setting; error (relative RMSE of the colour), ms (a frame on one thread), fallback, known,
         front. Methods that were not measured in a class that occurs are left out.
     """
-    asked = {size: share for size, share in shares.items() if share > 0}
+    present = {size: share for size, share in shares.items() if share > 0}
     lines = []
     for (method, setting), group in sizes[sizes["size"] != WHOLE].groupby(["method", "setting"], sort=False):
         by_size = {row.size: row for row in rows(group)}
-        if method not in fallback or not set(asked) <= set(by_size):
+        if method not in fallback_shares or not set(present) <= set(by_size):
             continue
-        left, (error, ns) = fallback[str(method)], quadrature
-        squared = sum(share * by_size[size].colour ** 2 for size, share in asked.items())
-        own = sum(share * by_size[size].ns for size, share in asked.items())
+        left, (error, ns) = fallback_shares[str(method)], fallback_cost
+        squared = sum(share * by_size[size].colour ** 2 for size, share in present.items())
+        own = sum(share * by_size[size].ns for size, share in present.items())
         total = math.sqrt((1.0 - left) * squared + left * error**2)
-        time = 1e-6 * questions * ((1.0 - left) * own + left * ns)
+        time = 1e-6 * queries * ((1.0 - left) * own + left * ns)
         lines.append((method, setting, total, time, left, PREDICTED))
     return _with_front(pd.DataFrame(lines, columns=list(COLUMNS)))
 
 
 def with_measured(table: pd.DataFrame, scenes: pd.DataFrame, scene: str) -> pd.DataFrame:
-    """Return predictions with what was measured in the scene itself in their place, from `summary.scene_table`."""
+    """Return predictions, replaced by measurements in the scene itself where there are any (`summary.scene_table`)."""
     here = scenes[(scenes["scene"] == scene) & scenes["colour_rrmse"].notna() & scenes["frame_time"].notna()]
     names = {"colour_rrmse": "error", "frame_time": "ms", "fallback_share": "fallback"}
     measured = here.rename(columns=names).assign(known=MEASURED)[list(COLUMNS)]
@@ -95,7 +96,7 @@ def of_method(table: pd.DataFrame, method: str) -> pd.DataFrame:
 
 
 def cheapest(table: pd.DataFrame, error: float = math.inf, ms: float = math.inf) -> Any | None:
-    """Return the row that meets a wish: within both limits, of least time; of least error if only time is limited.
+    """Return the row within both limits that has the least time, or the least error if only time is limited.
 
     None if there is none.
     """
@@ -107,7 +108,7 @@ def cheapest(table: pd.DataFrame, error: float = math.inf, ms: float = math.inf)
 
 
 def nearest(table: pd.DataFrame, error: float, ms: float) -> pd.DataFrame:
-    """Return the points of the front on either side of a wish that cannot be met: fast enough, and exact enough."""
+    """Return the points of the front nearest to limits that no method meets: fast enough, and exact enough."""
     best = table[table["front"]]
     fast = best[best["ms"] <= ms].nsmallest(1, "error")
     exact = best[best["error"] <= error].nsmallest(1, "ms")

@@ -45,7 +45,7 @@ class Accuracy:
     """One setting of the truth on one fabric."""
 
     setting: str
-    """Estimator, and points or error asked for."""
+    """Estimator, and requested points or error."""
     fabric: str
     """On which cloth."""
     rmse: float

@@ -57,7 +57,7 @@ class Bias:
 
     @property
     def result(self) -> Literal["below", "open", "above"]:
-        """True if it lies below `LIMIT`, as far as two standard errors tell."""
+        """True if it lies below `LIMIT`, two standard errors considered."""
         if abs(self.value) + 2.0 * self.standard_error <= LIMIT:
             return "below"
         return "above" if abs(self.value) - 2.0 * self.standard_error > LIMIT else "open"

@@ -1,7 +1,8 @@
-"""Where the time goes: how many queries `auto` answers by tables alone, by their borders refined, by sampling.
+"""Effort of `auto`: the shares of queries that it answers by tables alone, by refined borders, and by sampling.
 
-Answers do not say where they come from, but they tell. What is sampled as a whole takes more points if more are the
-least; of the rest, what depends on the seed was refined, and what does not is a table's own.
+Answers do not name their source, so it is found by three runs. A query is sampled as a whole if it takes more points
+when the least number of points is raised. Of the other queries, those whose answers depend on the seed were refined,
+and the rest are tables' own.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ CLASSES: Final = ("table alone", "borders refined", "sampled")
 """How a query is answered, the cheapest first."""
 
 RELATIVE_ERROR: Final = 0.01
-"""Error asked for."""
+"""Requested error."""
 
 _ROWS = 1000
 _REPEATS = 3
@@ -42,9 +43,9 @@ class Effort:
     kind: str
     """One of `CLASSES`."""
     fabric: str
-    """On which cloth."""
+    """Name of the cloth."""
     share: float
-    """Of the queries."""
+    """Share of the queries."""
     points: float
     """Nodes and points a query of this kind."""
     seconds: float

@@ -14,7 +14,7 @@ def stability(progress: Callable[[str], None] = lambda about: None) -> list[Find
     Parameters
     ----------
     progress : callable
-        Told what is computed next.
+        Receives the name of the next expression.
     """
     findings: list[Finding] = []
     for about, part in {**stability_point.PARTS, **stability_cloth.PARTS}.items():

@@ -27,7 +27,7 @@ class FrameTime(Measurement):
     scene: str
     """Name of the scene."""
     shot: Made
-    """Its frames with the truth's answers."""
+    """Frames of the scene with the truth's answers."""
     models: tuple[Trained, ...]
     """The models that answer for its cloths."""
     footprint: RoundFootprint

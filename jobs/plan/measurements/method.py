@@ -31,25 +31,25 @@ class OnFabric(Measurement):
     fabric: Coloured
     """The fabric."""
     role: Role
-    """Its role."""
+    """Role of the fabric."""
     dataset: Dataset
-    """Its held-out queries."""
+    """Held-out queries of the fabric."""
     errors: ErrorOptions
-    """How many of them."""
+    """Number of these queries."""
     frames: Made
     """The truth's frames."""
     frame_options: FrameOptions
-    """How these were rendered."""
+    """Options of the frames."""
     views: dict[View, Made]
     """The truth's pictures."""
     picture_options: PictureOptions
-    """How these were rendered."""
+    """Options of the pictures."""
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     edge: Made | None
     """The truth's edge, where cloth is curved."""
     edge_options: EdgeOptions | None
-    """How this was rendered."""
+    """Options of the edge."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -128,7 +128,7 @@ class OnFabric(Measurement):
         return sum(width * height for width, height in map(self.picture_options.size, self.views))
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of the model and of the benchmark; that of the truth is in what it reads."""
+        """Return the versions of the model and of the benchmark; that of the truth is in its inputs."""
         return {"bench": versions.BENCH, "model": self.model.options.version}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:

@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 
 class OnScene(Measurement):
-    """One setting of a model on one scene: no result is lost with another setting, a new one costs only itself."""
+    """One setting of a model on one scene: a change of one setting repeats no other measurement."""
 
     kind: Literal["scene"] = "scene"
     scene: str
     """Name of the scene."""
     shot: Made
-    """Its frames with the truth's answers."""
+    """Frames of the scene with the truth's answers."""
     model: Trained
     """The model with one setting."""
     options: SceneErrorOptions
-    """How frames are compared."""
+    """Options of the comparison."""
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     extent: tuple[int, int]

@@ -43,7 +43,7 @@ class SceneShot(Measurement):
     files: tuple[str, ...]
     """Hashes of its files; none for a scene of the package, which has a version."""
     cloths: dict[str, SceneCloth]
-    """Its cloths by the names in the scene."""
+    """Cloths by their names in the scene."""
     step: tuple[float, float, float]
     """Step of the camera from frame to frame."""
     options: ShotOptions
@@ -93,7 +93,7 @@ class SceneShot(Measurement):
 
     @property
     def records(self) -> str:
-        """None."""
+        """No Records."""
         return ""
 
     @property

@@ -27,11 +27,11 @@ class Dataset(Part):
     """A data set's rows that a measurement reads."""
 
     fingerprint: str
-    """Of the whole data set."""
+    """Fingerprint of the whole data set."""
     rows: tuple[str, ...]
     """Ids of the tasks that make the rows."""
     folder: Place
-    """Its folder."""
+    """Folder of the data set."""
 
 
 class Trained(Part):
@@ -101,7 +101,7 @@ class ModelSubject:
 
     recipe: ModelRecipe
     trainings: Mapping[str, Training]
-    """By fabric; the key of a general model's only training is empty."""
+    """Trainings by fabric; a general model has one, with an empty key."""
 
     def on(self, fabrics: Sequence[str]) -> Trained | None:
         """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""
@@ -129,7 +129,7 @@ class Subjects:
     shards: Sequence[Shard]
     """The data set."""
     trainings: Mapping[str, Mapping[str, Training]]
-    """For each model's name its trainings by fabric."""
+    """Trainings by the model's name and by fabric."""
 
     @cached_property
     def fabrics(self) -> list[FabricSubject]:

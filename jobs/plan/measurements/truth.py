@@ -24,15 +24,15 @@ class Truth(Measurement):
     fabric: Coloured
     """The fabric."""
     role: Role
-    """Its role."""
+    """Role of the fabric."""
     dataset: Dataset
-    """Its held-out queries."""
+    """Held-out queries of the fabric."""
     errors: ErrorOptions
-    """How many of them."""
+    """Number of these queries."""
     frames: Made
     """The truth's frames."""
     frame_options: FrameOptions
-    """How these were rendered."""
+    """Options of the frames."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -79,7 +79,7 @@ class Truth(Measurement):
         return 4000
 
     def versions(self) -> dict[str, int]:
-        """Return the version of the benchmark; that of the truth is in what it reads."""
+        """Return the version of the benchmark; that of the truth is in its inputs."""
         return {"bench": versions.BENCH}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:

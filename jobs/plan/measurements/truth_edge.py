@@ -55,7 +55,7 @@ class TruthEdge(Measurement):
 
     @property
     def records(self) -> str:
-        """None."""
+        """No Records."""
         return ""
 
     @property

@@ -54,7 +54,7 @@ class TruthFrames(Measurement):
 
     @property
     def records(self) -> str:
-        """None."""
+        """No Records."""
         return ""
 
     @property

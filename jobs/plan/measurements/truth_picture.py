@@ -74,7 +74,7 @@ class TruthPicture(Measurement):
 
     @property
     def records(self) -> str:
-        """None."""
+        """No Records."""
         return ""
 
     @property

@@ -48,7 +48,7 @@ class HorizonMap(NamedTuple):
         the float, negative beneath; bound of sin u; where the block begins along the cell, and how many blocks' lengths
         a yarn spacing is.
     blocks : int32 (picks * ends * SLOTS,)
-        Where the horizons of each piece begin.
+        Index of the first horizon of each piece.
     horizon : float32 (blocks * azimuths * grid * grid,)
         Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it.
     grid, azimuths : int

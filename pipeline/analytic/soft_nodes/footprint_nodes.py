@@ -92,7 +92,7 @@ def place_nodes(
     x, y, deviation_x, deviation_y : float32
         The footprint, from the corner of the cell.
     x_low, x_high, y_low, y_high : float32
-        What of the piece it covers.
+        Part of the piece that it covers.
     nodes, cells : float32 (blocks, ROWS, BLOCK_NODES), uint32 (blocks * BLOCK_NODES,)
         Written.
     line : float32 (LINE_ROWS, 8)
@@ -101,7 +101,7 @@ def place_nodes(
     Returns
     -------
     int
-        Where the nodes end.
+        Index after the last node.
     """
     warp = family == WARP
     count = np.float32(size)
@@ -139,11 +139,11 @@ def place_nodes(
         half_along = half_b * _GAUSS_WEIGHTS[along, j] * _HALF
         cell = first_cell + int(line[6, j]) * step_b
         for i in range(across):
-            block, lane = nodes[k // BLOCK_NODES], k % BLOCK_NODES
-            block[SIN, lane], block[COS, lane], block[ALONG, lane] = line[0, i], line[1, i], position
-            block[HALF_V, lane], block[HALF_ALONG, lane] = half_v * _GAUSS_WEIGHTS[across, i] * _HALF, half_along
-            block[WEIGHT, lane] = line[5, j] * line[2, i]
-            block[TURN, lane], block[LIMIT, lane] = bounds[CURVE], bounds[BOUND]
+            block, slot = nodes[k // BLOCK_NODES], k % BLOCK_NODES
+            block[SIN, slot], block[COS, slot], block[ALONG, slot] = line[0, i], line[1, i], position
+            block[HALF_V, slot], block[HALF_ALONG, slot] = half_v * _GAUSS_WEIGHTS[across, i] * _HALF, half_along
+            block[WEIGHT, slot] = line[5, j] * line[2, i]
+            block[TURN, slot], block[LIMIT, slot] = bounds[CURVE], bounds[BOUND]
             cells[k] = cell + int(line[3, i]) * step_a
             k += 1
     return k
@@ -154,9 +154,9 @@ def fill_block(nodes: Float32, cells: npt.NDArray[np.uint32], start: int) -> int
     """Fill the last block with nodes that weigh nothing; return the blocks."""
     blocks = (start + BLOCK_NODES - 1) // BLOCK_NODES
     for k in range(start, blocks * BLOCK_NODES):
-        block, lane = nodes[k // BLOCK_NODES], k % BLOCK_NODES
-        block[:, lane] = _0
-        block[COS, lane] = _1
+        block, slot = nodes[k // BLOCK_NODES], k % BLOCK_NODES
+        block[:, slot] = _0
+        block[COS, slot] = _1
         cells[k] = 0
     return blocks
 

@@ -35,7 +35,7 @@ class PieceGroup(NamedTuple):
     piece : Piece
         The mean of them.
     cells : list of (end, pick)
-        Where they lie.
+        Cells of the pieces.
     blocks : list of int
         Numbers of their horizons, one for each cell.
     """

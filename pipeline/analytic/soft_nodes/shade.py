@@ -63,7 +63,7 @@ class Directions(NamedTuple):
     size : float32
         1 / |wi + wo|^2.
     alike, right, opposite : float32
-        How their azimuths lie to each other (soft_horizons).
+        Weights of three relations of their azimuths (soft_horizons).
     """
 
     ix: np.float32

@@ -62,7 +62,7 @@ class CurvedNetwork(TextureNetwork):
     repeat : tuple of int
         Extent of the fabric's repeat in x and y, in yarn spacings.
     silhouettes : Silhouettes, optional
-        What the opacity is learnt from; needed for training alone.
+        Training rows of the opacity; needed for training only.
     fall : float
         Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
     """

@@ -35,10 +35,10 @@ class CurvedOptions(Options):
     silhouette: Literal["opacity", "grazing"] = "opacity"
     """Quantity of the silhouette: the opacity, or the grazing cosine, in which opacity is a step."""
     directions: Literal["vector", "projected"] = "vector"
-    """How directions enter: as unit vectors, or as their x and y, which cannot tell light in front from light behind;
+    """Encoding of directions: as unit vectors, or as their x and y, which are the same for light in front and behind;
     the paper does not say."""
     curvature_input: Literal["linear", "root", "touch"] = "touch"
-    """How the curvature enters: `linear` as it is, `root` its square root, or `touch`, beside the root, the share
+    """Encoding of the curvature: `linear` as it is, `root` its square root, or `touch`, beside the root, the share
     tan / sqrt(tan^2 + 2 kappa) of the viewer's tangent, which says how deep the ray dips."""
     certain: bool = True
     """Answer an opacity of 1 where every ray sinks below every yarn; only for cloths without gaps."""

@@ -1,4 +1,4 @@
-"""Rows about the silhouette as tensors: what the opacity of a curved cloth is learnt from."""
+"""Rows about the silhouette as tensors: training data of the opacity of a curved cloth."""
 
 from __future__ import annotations
 

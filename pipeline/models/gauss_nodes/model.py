@@ -1,8 +1,8 @@
 """Gauss-Legendre nodes on every piece of yarn, k across it: the patch integral by a fixed rule.
 
-Single precision, folded by the cloth's periodicity; see pipeline.analytic.gauss_nodes. What is not smooth is left over:
-the line where a yarn turns away from the light, shadows, taken as ramps as wide as horizons spread over a node, and
-highlights narrower than a node's box.
+Single precision, folded by the cloth's periodicity; see pipeline.analytic.gauss_nodes. The error comes from parts that
+are not smooth: the line where a yarn turns away from the light, shadows, taken as ramps as wide as horizons spread over
+a node, and highlights narrower than a node's box.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ def read_pyramid(
     levels : sequence of Tensor (channels, rows, columns)
         Finest first.
     u, v : Tensor (n,)
-        Where to read, in repeats.
+        Positions, in repeats.
     sigma : Tensor (n,)
         Footprint, in yarn spacings.
     texels_per_yarn : int
@@ -104,7 +104,7 @@ def read_texture(
     textures : list of Tensor (channels, rows, columns)
         Textures over one repeat; texel (r, c) has its centre at v = (r + 1/2)/rows, u = (c + 1/2)/columns.
     u, v : Tensor (n,)
-        Where to read, in repeats; any real number.
+        Positions, in repeats; any real number.
     levels : list of int64 Tensor (n,)
         Textures to read for each query.
     shares : list of Tensor (n,), optional

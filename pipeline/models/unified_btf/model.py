@@ -150,7 +150,7 @@ class UnifiedBtf:
     domain : Domain, optional
         Domain of the training; any query if left out.
     device : torch.device
-        Where it computes.
+        Device of the computation.
     """
 
     def __init__(

@@ -29,8 +29,8 @@ class BtfOptions(Options):
     max_angle: float = Field(default=89.0, gt=0, le=89.9)
     """Largest angle of the samples' directions to the macro normal, in degrees."""
     truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
-    """How samples are answered. Its physics must be that of the data set; its errors may be large, because a latent
-    averages over all samples of a texel."""
+    """Options of the truth for the samples. Its physics must be that of the data set; its errors may be large, because
+    a latent averages over all samples of a texel."""
     angles: Literal["stereographic", "disc"] = "stereographic"
     """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
     log_samples: bool = False

@@ -36,7 +36,7 @@ class Cloth(NamedTuple):
     parameters : Tensor (F, 4 or 7)
         alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness.
     placement : Placement
-        How queries about the fabrics get there.
+        Transformation of queries into standard position.
     """
 
     maps: Tensor

@@ -37,7 +37,7 @@ def encode_patch(
     Parameters
     ----------
     options : WovenOptions
-        Which one-blobs.
+        Options of the one-blobs.
     u, v : Tensor (F, n)
         Centres as shares of the repeat, in [0, 1).
     sigma : Tensor (F, n)

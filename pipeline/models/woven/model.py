@@ -84,7 +84,7 @@ class WovenNetwork(EncoderDecoder):
         latent : Tensor (F, latent)
             From `encode`.
         placement : Placement
-            Of the F fabrics.
+            Placement of the F fabrics.
         u, v : Tensor (F, n)
             Centres as shares of each fabric's own repeat.
         sigma : Tensor (F, n)
@@ -137,7 +137,7 @@ class Woven:
     domain : Domain, optional
         Domain of the training; any query if left out.
     device : torch.device
-        Where it computes.
+        Device of the computation.
     """
 
     def __init__(self, network: WovenNetwork, domain: Domain | None = None, device: torch.device | None = None) -> None:
@@ -168,7 +168,7 @@ class Woven:
             Two fabrics of one repeat. The second one is placed as the first one is, because blended latents must lie in
             the same place.
         share : float
-            Of the second one's latent; 0 is the first fabric, 1 the second.
+            Share of the second fabric's latent; 0 is the first fabric, 1 the second.
         queries : Queries
             N queries, in yarn spacings of either fabric.
 

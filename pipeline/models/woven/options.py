@@ -28,7 +28,7 @@ class WovenOptions(Options):
     encoder_channels: int = Field(default=16, ge=4, le=128)
     """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
     one_blob: Literal["none", "plain", "periodic", "local"] = "local"
-    """How centres enter: `none` as the bare numbers u, v and size; `plain` as published; `periodic` wraps u and v at
+    """Encoding of centres: `none` as the bare numbers u, v and size; `plain` as published; `periodic` wraps u and v at
     the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the queried place
     (an own change: see the model)."""
     bins: int = Field(default=8, ge=2, le=64)

@@ -1,7 +1,7 @@
 """Standard position: one representative of all shifts, mirror images and turns of a cloth.
 
 A repeat may begin at any yarn; the mirror image of a fabric is a fabric, and so is one with warp and weft exchanged by
-the mirror x = y. What these fabrics answer follows from the first one's answers: the mirrors x -> -x, y -> -y and x = y
+the mirror x = y. The answers for these fabrics follow from those for the first: the mirrors x -> -x, y -> -y and x = y
 generate the eight symmetries of the square, each mirror reverses the twist, and the exchange swaps the components of
 warp and weft. A network that sees each cloth in one standard position only, its queries moved with it, obeys all this
 exactly, and need not spend weights, rows and time on learning it. Only the symmetries that a cloth itself has, which
@@ -40,7 +40,7 @@ SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i 
 
 
 class Placement(NamedTuple):
-    """How F fabrics are brought into standard position.
+    """Transformations that bring F fabrics into standard position.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Placement(NamedTuple):
     exchange : bool (F, 1)
         Whether x and y change places afterwards.
     start : float (F, 2)
-        Where the standard repeat begins after that, as shares of it.
+        Start of the standard repeat after that, as shares of it.
     repeat : float (F, 2)
         Extent of the standard repeat in x and y, in yarn spacings.
     """
@@ -96,7 +96,7 @@ def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
     fabric : Fabric
         The fabric in standard position.
     symmetry : Symmetry
-        What is applied first.
+        Mirrors and exchange that are applied first.
     start : tuple of int
         End and pick of the result at which the standard repeat begins.
     """

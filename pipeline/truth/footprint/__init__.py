@@ -1,1 +1,1 @@
-"""Which points of the repeat a footprint covers: place, masses, mixture (rotated ellipses), sequences."""
+"""Points of the repeat under a footprint, and their weights: place, masses, mixture (rotated ellipses), sequences."""

@@ -37,7 +37,7 @@ def interval_masses(
     edges : float32 (n + 1,)
         Rising positions in their cell, in [0, 1].
     cell : float
-        Where the cell begins.
+        Start of the cell.
     masses : float32 (n,)
         Written; over a whole repeat they sum to 1.
     """

@@ -29,9 +29,9 @@ class Line(NamedTuple):
     Attributes
     ----------
     step : float
-        Between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r)).
+        Distance between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r)).
     reach : float
-        Of the points, in deviations of the line.
+        Largest distance of the points from the centre, in deviations of the line.
     three, two : float
         Largest correlations of three and of two points.
     half : int

@@ -29,7 +29,7 @@ def gloss(
     Parameters
     ----------
     variation : Variation
-        How much the floats differ.
+        Spread, seed and period of the factors.
     family, side : int
         Family of the float; 0 if it lies on top here, 1 if it lies beneath.
     pick, end : int

@@ -36,7 +36,7 @@ from pipeline.truth.geometry.march import Cell, first_cell, float_on_top, next_c
 _HALVINGS, _SECANTS = 3, 4
 _STRIP_POINTS = 8
 _NEAREST = 1e-6
-_FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are not told apart
+_FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are treated as equal
 _STEEPEST = 1e4
 _FARTHEST = 1e4  # yarn spacings
 

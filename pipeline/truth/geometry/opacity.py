@@ -256,7 +256,7 @@ def grazing_cosine(
     fabric : Fabric
         The cloth.
     u, v : float arrays, broadcast with the others
-        Where the ray enters the boundary, yarn spacings, anywhere.
+        Point where the ray enters the boundary, any, in yarn spacings.
     azimuth : float array
         Angle from x to the viewer's direction in the fabric plane, radians; the ray runs the other way.
     curvature : float array

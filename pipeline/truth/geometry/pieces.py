@@ -34,7 +34,7 @@ class Piece(NamedTuple):
     across, along : (low, high)
         Extent within the cell.
     radius : float
-        Of its yarn; 0 for a gap.
+        Radius of its yarn; 0 for a gap.
     offset, curve, half : float
         Of its float (`HeightField.floats`): middle of the cell along the yarn, 1 / bend radius, half length, which is
         infinite for a yarn that never changes side.

@@ -178,12 +178,12 @@ def _sum_pieces(
     moved: Float64,
     squares: Float64,
 ) -> tuple[float, float, float, int]:
-    """Write the sums over all nodes, what borders move in them, and their squared errors.
+    """Write the sums over all nodes, their changes by borders, and their squared errors.
 
     Returns
     -------
     area, area_error, moved_area : float
-        The denominator, its squared error, and what borders move in it.
+        The denominator, its squared error, and its change by borders.
     nodes : int
         Nodes visited.
     """
@@ -270,7 +270,7 @@ def _scatter(
 ) -> int:
     """Write the specular shares of a piece of yarn, 0 unless a node is `lit`, and add them to the sums.
 
-    What goes straight through is added too. Returns the number of finer nodes visited beyond one a node.
+    The unscattered light is added too. Returns the number of finer nodes visited beyond one a node.
     """
     piece = table.pieces[p]
     start, count, fine, family = piece[START], piece[COLUMNS] * piece[ROWS], piece[FINE], piece[FAMILY]

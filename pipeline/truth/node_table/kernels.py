@@ -15,7 +15,7 @@ from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 SMOOTH: Final = np.float32(0.0005)
-"""Squared error of a node's share by what curves within it, relative to its square."""
+"""Squared error of a node's share from curvature within it, relative to its square."""
 
 _EDGE: Final = np.float32(0.01)
 _EDGE_JUMP: Final = np.float32(0.1)
@@ -78,7 +78,7 @@ def weigh(
 def borders(
     first: Float32, second: Float32, margins: Float32, columns: int
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """Return what the borders of shadows, found between nodes, add to the sums of two shares, and their squared errors.
+    """Return the changes of two sums by borders of shadows between nodes, and their squared errors.
 
     Where the margin changes sign from one node to the next, the border lies where its straight line crosses 0, and the
     visible node counts up to there instead of half-way. Where the margin jumps, half-way is as good as anything.
@@ -116,7 +116,7 @@ def borders(
 def _crossing(
     before: np.float32, m: np.float32, n: np.float32, after: np.float32, change: np.float32, across: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Return what a border between nodes of margins m and n adds to the visible one's share, and its squared error.
+    """Return the change of the visible node's share by a border between margins m and n, and its squared error.
 
     `before` and `after` are the margins beyond them, `change` how much m and n differ, and `across` the change at a
     right angle, which shares the border with the links in that direction.
@@ -241,7 +241,7 @@ def crossing(
     thickness: np.float32,
     areas: Float32,
 ) -> np.float32:
-    """Return the sum of what crosses the layer unscattered, exp(-T Lambda), from each node's share of the area."""
+    """Return the unscattered light through the layer, the sum of exp(-T Lambda) times each node's share of the area."""
     total = _0
     for k in range(len(areas)):
         cos_o = ox * nx[k] + oy * ny[k] + oz * nz[k]

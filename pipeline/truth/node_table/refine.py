@@ -64,7 +64,7 @@ def refine(
             if share <= 0.0:
                 continue
             if not (_on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)):
-                # What curves within the node.
+                # Error from curvature within the node.
                 for kind, part in ((0, s), (2, c)):
                     residual = part - mean[kind + family] * a
                     variance[kind + family] += residual * residual * SMOOTH

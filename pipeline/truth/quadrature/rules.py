@@ -3,7 +3,7 @@
 The integrand jumps at shadow edges and bends where the yarn turns away from the light or the viewer, which it does
 along its edges under any slanted direction, shadows or not. Where a grid of nodes meets such edges, its lines in the
 direction that crosses more of them are cut at each, found by bisection, and every piece of a line gets a rule of its
-own. What is left for the other direction is smooth wherever edges run across the lines.
+own. The integrand of the other direction is then smooth wherever edges run across the lines.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pipeline.truth.scattering.point import Directions, point_share
 
 _BISECTIONS: Final = 8
 LEVELS: Final = 6
-"""How many rules there are; level l has 2^(l + 1) nodes an axis."""
+"""Number of rules; level l has 2^(l + 1) nodes an axis."""
 
 _RULES: Final = [np.polynomial.legendre.leggauss(count) for count in (2, 4, 8, 16, 32, 64)]
 _NODES: Final = np.concatenate([nodes for nodes, _ in _RULES])  # rule of 2^(l + 1) nodes from 2^(l + 1) - 2 on
@@ -40,7 +40,7 @@ def _weight_across(part: Float64, axis: Axis, a: float) -> float:
 
 @kernel
 def _shares(cloth: ClothSide, directions: Directions, part: Float64, a: float, b: float, shares: Float64) -> int:
-    """Write what a point of a part adds to the sums; return which of viewer, light and back it sees, as bits."""
+    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits."""
     picks, ends = cloth.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
     x, y = (b, across) if part[KIND] == WEFT else (across, b)

@@ -1,1 +1,1 @@
-"""How one point of a yarn scatters light: microflake (flakes), slab (a layer of flakes), point (with visibility)."""
+"""Scattering at one point of a yarn: microflake (flakes), slab (a layer of flakes), point (with visibility)."""

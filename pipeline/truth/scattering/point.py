@@ -73,7 +73,7 @@ def directions_of(ix: float, iy: float, iz: float, ox: float, oy: float, oz: flo
 def point_share(
     front: HeightField, back: HeightField, x: float, y: float, directions: Directions, choices: Choices
 ) -> tuple[int, float, float, float, float]:
-    """Return what the point (x, y) of the repeat adds to numerators and denominator.
+    """Return the shares of the point (x, y) of the repeat in the numerators and the denominator.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def point_share(
     family : int
         WARP, WEFT or GAP.
     area, specular, diffuse, through : float
-        A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); what goes straight through, times A(wo).
+        A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); the unscattered share, times A(wo).
     """
     light, viewer = directions.light, directions.viewer
     family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
@@ -103,7 +103,7 @@ def point_share(
             return family, 0.0, 0.0, 0.0, 0.0
         return family, viewer.z, 0.0, 0.0, viewer.z
 
-    # What the viewer sees of the point.
+    # Visibility of the point to the viewer.
     cos_o = viewer.x * nx + viewer.y * ny + viewer.z * nz
     if cos_o <= 0.0 or nz <= 0.0 or (choices.shadows and not visible(front, x, y, z, side, viewer)):
         return family, 0.0, 0.0, 0.0, 0.0
@@ -115,7 +115,7 @@ def point_share(
     sigma_o = sigma(viewer.x, viewer.y, viewer.z, tx, ty, tz, alpha)
     through = area * unscattered(sigma_o, cos_o, front.thickness)
 
-    # What light reaches it, from the front or through the cloth.
+    # Light that reaches it, from the front or through the cloth.
     cos_i = light.x * nx + light.y * ny + light.z * nz
     # Over a curved cloth the front may see a light below its tangent plane; one that it does not see is behind.
     lit, transmitted = False, False

@@ -26,7 +26,7 @@ def difference_maps(
     Parameters
     ----------
     picture, truth : array_like (H, W, 3)
-        What `errors` was measured on, by `reports.measure.scene.image_error.image_errors`.
+        The pictures that `image_errors` measured (`reports.measure.scene.image_error`).
     epsilon : float
         As in `relative_differences`.
     """

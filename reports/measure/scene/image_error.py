@@ -46,7 +46,7 @@ class Measure(NamedTuple):
     high: float
     floor: float
     pixels: int
-    """Behind it."""
+    """Number of pixels in the mean."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class ImageErrors:
     mse: Error
     mse_relative: Error
     perceived: dict[Metric, Measure]
-    """By the keys of `PERCEIVED`."""
+    """Perceptual measures, by the keys of `PERCEIVED`."""
     maps: dict[str, Floats]
     """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
     mask: Mask

@@ -81,7 +81,7 @@ def measure_scene(
     shot : Shot
         The scene's frames.
     options : SceneErrorOptions
-        How pictures are compared, and the seed of random methods.
+        Options of the comparison, and the seed of random methods.
     pictures : mapping
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
         of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.difference_maps`).

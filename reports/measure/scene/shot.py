@@ -47,11 +47,11 @@ class ClothQueries:
     Attributes
     ----------
     fabric : Fabric
-        What it is.
+        The cloth's fabric.
     queries : Queries
         The queries.
     frame, pixel : int64 (M,)
-        Which frame, and which of its H W pixels.
+        Index of the frame, and of the pixel in it, below H W.
     weight : float32 (M, 3)
         Linear RGB irradiance.
     mean, standard_error : float32 (M, 4)
@@ -98,7 +98,7 @@ class Shot:
     Attributes
     ----------
     name : str
-        Of the scene.
+        Name of the scene.
     base : float32 (F, H, W, 3)
         Linear RGB without the light that the cloth scatters.
     cloths : list of ClothQueries
