@@ -177,11 +177,11 @@ def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
 
 
 def write_frames(path, fabric):
-    """Write one frame of 8 x 8 pixels, each with a question that is answered by darkness."""
+    """Write one frame of 8 x 8 pixels, each with one query whose answer is 0."""
     queries = draw_queries(QueryOptions(), (5, 5), 1, 0, 64)
     columns = queries._asdict() | {"frame": np.zeros(64, np.int64), "pixel": np.arange(64)}
     columns |= {"weight": np.ones((64, 3), np.float32)}
-    columns |= dict.fromkeys(("mean", "standard_error", "stand_in"), np.zeros((64, 4), np.float32))
+    columns |= dict.fromkeys(("mean", "standard_error", "fallback_values"), np.zeros((64, 4), np.float32))
     about = {"name": "sphere", "cloths": {"a": fabric.model_dump(mode="json")}}
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"a.{name}": column for name, column in columns.items()}
