@@ -208,7 +208,11 @@ def read_records(paths: Iterable[Path]) -> list[Record]:
         except FileNotFoundError as error:
             raise BadInput(str(path), "", "does not exist", "records are needed; run the benchmark first") from error
         except ValidationError as error:
-            raise BadInput(str(path), "", "holds no records", "run the benchmark again") from error
+            fault = error.errors(include_url=False)[0]
+            where = ".".join(map(str, fault["loc"]))
+            why = fault["msg"].removeprefix("Value error, ")
+            found = f"holds no records of this version ({where}: {why})" if where else "holds no records"
+            raise BadInput(str(path), "", found, "run the benchmark again") from error
     return records
 
 

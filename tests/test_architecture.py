@@ -97,6 +97,32 @@ def test_imports_point_upstream(module):
     assert not wrong, f"{module} imports {wrong}, which come after it"
 
 
+TESTS = {
+    ".".join(path.relative_to(ROOT / "tests").with_suffix("").parts): path
+    for package in ("weaves", "pipeline", "reports")
+    for path in sorted((ROOT / "tests" / package).rglob("*.py"))
+}
+"""Tests by the module that they would be beside it; those of `jobs` and of the whole tree may import all."""
+
+QUERIES = "pipeline.shards.queries"
+"""Draws the random queries of most tests, those of rooms before it too."""
+
+
+def last_layer(test: str) -> int:
+    """Return the last place in the order that a test may import from; fixtures serve all rooms below their folder."""
+    room, _, name = test.rpartition(".")
+    if name != "conftest":
+        return layer(test)
+    return max(index for index, package in enumerate(ORDER) if f"{package}.".startswith(f"{room}."))
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_tests_import_nothing_from_rooms_further_down(test):
+    names = [name for name in imported(TESTS[test]) if ours(name) and name != QUERIES]
+    wrong = [name for name in names if layer(name) > last_layer(test)]
+    assert not wrong, f"tests/{test.replace('.', '/')}.py imports {wrong}, which come after what it tests"
+
+
 @pytest.mark.parametrize("module", MODULES)
 def test_heavy_libraries_stay_at_home(module):
     for name in imported(MODULES[module]):

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, MetricRow
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
@@ -30,7 +31,7 @@ from reports.tables.number_format import (
     size,
     times,
 )
-from reports.tables.summary import BASELINE, COMPONENTS, rows
+from reports.tables.summary import BASELINE, rows
 
 Row = dict[str, Any]
 

@@ -85,8 +85,9 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
             yield f"### {str(role).capitalize()}: {count}, {part['queries'].max():,} queries"
             lines = [(_name(row), *_error_cells(row)) for row in summary.rows(part)]
             yield markdown_table(("method", "MSE", "× lower", "95 %", "colour"), lines)
-        said = [headline(*key, errors, timing, paper=key[0] == "woven") for key in _methods(errors)]
-        yield "\n".join(f"- {sentence}" for sentence in said if sentence)
+        found = [headline(*key, errors, timing, paper=key[0] == "woven") for key in _methods(errors)]
+        if sentences := [f"- {sentence}" for sentence in found if sentence]:
+            yield "\n".join(sentences)
     aliasing = summary.aliasing_table(records)
     if len(aliasing):
         yield "## Aliasing on a receding plane"

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER
 from reports.error import ratio
 from reports.record import TRUTH, Metric, Record, to_table
@@ -27,8 +28,6 @@ PAPER: Final = (4.1, 0.83)
 
 FRAME: Final = 1920 * 1080
 """Queries of a frame, one a pixel."""
-
-COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")
 
 _KEYS: Final = ["method", "setting"]
 

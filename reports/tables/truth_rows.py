@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from pipeline.truth.conventions import COMPONENTS
 from reports.record import Record
 from reports.tables.number_format import NONE, missing, percent, plain, times
-from reports.tables.summary import COMPONENTS
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias
 from reports.truth.effort import Effort

@@ -5,11 +5,11 @@ import pytest
 from pipeline.analytic.exact_points import PointSampler
 from pipeline.shards.generate import ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.options import BenchOptions
 from reports.record import Record
-from reports.tables.summary import COMPONENTS
 from weaves.fabric import load_fabric
 
 COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)

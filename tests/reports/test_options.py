@@ -1,10 +1,12 @@
 import subprocess
 import sys
+from typing import get_args
 
 import pytest
 from pydantic import ValidationError
 
-from reports.options import BenchOptions
+from pipeline.models.runtimes import RUNTIMES
+from reports.options import BenchOptions, RuntimeName
 
 
 def test_sizes_belong_to_their_scenes():
@@ -23,7 +25,11 @@ def test_what_cannot_be_measured_is_refused(change):
 
 
 def test_options_load_nothing_heavy():
-    heavy = ("numpy", "numba", "torch", "matplotlib", "pandas", "OpenEXR")
+    heavy = ("numba", "pyarrow", "scipy", "torch", "matplotlib", "pandas", "OpenEXR")
     code = f"import sys, reports.options; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_names_of_runtimes_are_those_of_the_models():
+    assert set(RUNTIMES) == set(get_args(RuntimeName))

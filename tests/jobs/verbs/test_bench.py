@@ -2,18 +2,21 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from jobs.cli import main
 from jobs.plan.plan import plan
-from jobs.recipe.load import load_recipe
+from jobs.recipe.load import load_recipe, recipe_names
 from jobs.run.ledger import Ledger, measure
-from jobs.verbs.bench import RECORDS, STABILITY, TRUTH, measured_alone
+from jobs.verbs.bench import BENCHES, RECORDS, STABILITY, TRUTH, measured_alone
 from reports.record import read_records
-from reports.truth import accuracy, bias, effort, throughput
+from reports.truth import accuracy, bias, effort, stability, throughput
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias
 from reports.truth.effort import Effort
+from reports.truth.finding import RECORDS as FINDINGS
+from reports.truth.finding import judge
 
 
 @pytest.mark.parametrize("name", ["stability", "truth"])
@@ -22,7 +25,7 @@ def test_a_scheduler_or_workers_are_refused(tmp_path, capsys, name, option):
     assert main(["bench", name, "--out", str(tmp_path), *option]) == 2
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
-    assert f"bench {name}" in complaint and option[0] in complaint and "this machine" in complaint
+    assert f"bench {name}" in complaint and option[0] in complaint and "this process" in complaint
     assert not list(tmp_path.iterdir())
 
 
@@ -79,3 +82,18 @@ def test_the_page_alone_is_made_again_when_they_change(files, tmp_path, name):
         assert missing() == ["report"]
     records.unlink()
     assert missing() == []
+
+
+def test_no_recipe_bears_the_name_of_a_measurement():
+    assert not set(BENCHES) & set(recipe_names())
+
+
+@pytest.mark.parametrize(("value", "code"), [(1.0, 0), (1.1, 1)])
+def test_the_verb_writes_records_and_fails_if_an_expression_does(monkeypatch, tmp_path, capsys, value, code):
+    finding = judge("x", "corner", "float32", {"x": np.arange(1)}, [value], [1.0], 1e-6)
+    monkeypatch.setattr(stability, "stability", lambda progress: [finding])
+    assert main(["bench", "stability", "--out", str(tmp_path)]) == code
+    shown = capsys.readouterr()
+    assert ("limit" if code else "ok") in shown.out
+    assert ("x in float32, corner: worst error 1.0e-01" in shown.err) == bool(code)
+    assert FINDINGS.from_records(read_records([tmp_path / STABILITY]))[0].worst == pytest.approx(value - 1)

@@ -73,12 +73,14 @@ def test_what_is_not_there_is_one_sentence(compare, write, tmp_path):
     a = write("a")
     (tmp_path / "empty").mkdir()
     (tmp_path / "broken.json").write_text("[1]")
+    (tmp_path / "old.json").write_text('[{"method": "woven", "metric": "mean_error", "value": 1.0}]')
     lone = write("lone") / "report/quick" / OF_A_PAGE
     machine_path(lone).unlink()
     for other, words in (
         (tmp_path / "missing", "does not exist"),
         (tmp_path / "empty", "holds no page"),
         (tmp_path / "broken.json", "holds no records"),
+        (tmp_path / "old.json", "of this version (0.metric: 'mean_error' is no metric of reports.catalogue)"),
         (lone, "missing or damaged"),
     ):
         for pair in ((a, other), (other, a)):

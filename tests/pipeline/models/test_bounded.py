@@ -6,7 +6,6 @@ import pytest
 from pipeline.models.bounded import Bounded, counterpart
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
-from reports.measure.furnace import measure_furnace
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -27,14 +26,6 @@ class Bright:
 
     def bytes_stored(self, fabric):
         return 7
-
-
-@pytest.mark.parametrize("name", ["polyester_lining", "silk_charmeuse", "twill_4_4", "voile"])
-def test_the_brightest_method_returns_at_most_what_arrives(name):
-    # The integral is a sum over 256 directions of a smooth lobe: good to 1 %.
-    found = {r.metric: r.value for r in measure_furnace(Bounded(Bright()), load_fabric(name), "seen")}
-    assert found["furnace_diffuse"] <= 1.01
-    assert found["furnace_specular"] < 0.6
 
 
 def test_what_is_below_the_bound_stays_as_it_is():

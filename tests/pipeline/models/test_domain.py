@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.models.domain import Domain
+from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -151,3 +152,25 @@ def test_networks_of_one_fabric_each_know_all_of_theirs():
 def test_kinds_are_those_that_were_trained_on():
     assert PLAIN.kinds == frozenset()
     assert Domain.of({"queries": WIDE.model_dump()}, FABRICS).kinds == {"behind", "stretch", "curvature"}
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    low=st.floats(0.05, 1.0),
+    factor=st.floats(1.0, 20.0),
+    angle=st.floats(20.0, 89.0),
+    stretch=st.sampled_from([1.0, 6.0]),
+    curvature=st.sampled_from([(0.0, 0.0), (0.01, 0.1)]),
+    margin=st.sampled_from([1.0, 1.25, 2.0]),
+)
+def test_a_model_taught_what_a_scene_requires_answers_for_it(low, factor, angle, stretch, curvature, margin):
+    """But for the rarest: 5e-4 at either end of the sizes, and of the largest ratio, curvature and angles."""
+    options = QueryOptions(sigma=(low, low * factor), max_angle=angle, stretch=stretch, curvature=curvature)
+    asked = draw_queries(options, (4, 4), 2, 0, 4000)
+    taught = Requirement.of(
+        "made up", 1, {"denim": asked}, (0.0, 0.3, 1.0), ("small", "middle", "large"), margin
+    ).queries()
+    domain = Domain.of({"queries": taught.model_dump()}, [DENIM])
+    assert not domain.faults(asked, "m")
+    # Two ends and four quantities, of 4,000 queries: two each, and one more for the quantile between two of them.
+    assert domain.out_of_domain(DENIM, asked).sum() <= 6 * 3

@@ -9,7 +9,6 @@ from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.woven.options import WovenOptions
-from pipeline.training.options import TrainingOptions
 
 MODEL = TypeAdapter(ModelOptions)
 
@@ -48,14 +47,6 @@ def test_options_lie_in_the_file_of_their_model(model):
 def test_bad_model_options_are_refused(table):
     with pytest.raises(ValidationError):
         MODEL.validate_python(table)
-
-
-@pytest.mark.parametrize(
-    "table", [{"steps": 0}, {"batch": 0}, {"learning_rate": -1e-3}, {"device": "tpu"}, {"warm_up": 0.9}, {"epochs": 3}]
-)
-def test_bad_training_options_are_refused(table):
-    with pytest.raises(ValidationError):
-        TrainingOptions.model_validate(table)
 
 
 def test_options_need_no_heavy_library():

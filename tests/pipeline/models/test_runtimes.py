@@ -1,7 +1,6 @@
 """Ways to run a method: closed forms of their rounding, agreement in single precision, and what a machine lacks."""
 
 from concurrent.futures import ThreadPoolExecutor
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
-from reports.options import RuntimeName
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 
@@ -62,10 +60,6 @@ class Linear:
 
 def asked(rows=50, **options):
     return draw_queries(QueryOptions(**options), DENIM.weave.repeat, 3, 0, rows)
-
-
-def test_the_names_are_those_of_the_recipe():
-    assert set(RUNTIMES) == set(get_args(RuntimeName))
 
 
 @pytest.mark.parametrize(("runtime", "answer"), [("eager-bf16", 1.0), ("eager-fp16", NEAR_ONE)])

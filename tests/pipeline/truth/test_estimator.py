@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.exact_points import PointSampler
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
@@ -230,16 +229,9 @@ def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
     for other in (0.0, 89.9):
         queries = _queries(_direction(theta, 13), _direction(other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, TruthOptions(estimator="owen", min_count=64, max_count=128), 1)
-        for values in (answers.mean, answers.standard_error, PointSampler(fabric).sample(queries, 1, 0)):
+        for values in (answers.mean, answers.standard_error):
             assert np.isfinite(values).all()
             assert (values >= 0).all()
-
-
-def test_point_sampling_converges_to_the_truth():
-    fabric = load_fabric("basket")
-    queries = _queries(_direction(30, 0), _direction(45, 120), sigma=0.7)
-    exact = estimate(fabric, queries, EXACT, 1)
-    np.testing.assert_allclose(PointSampler(fabric).sample(queries, 400_000, 1), exact.mean, rtol=0.03)
 
 
 @pytest.mark.parametrize(

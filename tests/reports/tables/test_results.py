@@ -21,6 +21,17 @@ def test_the_file_says_where_its_numbers_come_from(made_up):
     assert "## Scenes" not in page, "what was not measured has no section"
 
 
+def test_without_two_random_points_there_are_no_ratios(made_up):
+    named = Provenance(recipe="standard")
+    others = [r.model_copy(update={"provenance": named}) for r in made_up if r.method != "point_sampled"]
+    page = results_page(others, MACHINE, "file")
+    (line,) = (
+        line for line in page.partition("### Unseen")[2].partition("##")[0].splitlines() if line.startswith("| woven")
+    )
+    assert [cell.strip() for cell in line.split("|")][3:5] == ["–", "–"]
+    assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
+
+
 def test_every_line_of_a_table_has_as_many_cells(made_up):
     named = Provenance(recipe="standard")
     page = results_page([r.model_copy(update={"provenance": named}) for r in made_up], MACHINE, "file")

@@ -6,6 +6,7 @@ from reports.record import Record
 from reports.tables.method_rows import timing_columns, timing_rows
 from reports.tables.summary import (
     aliasing_table,
+    energy_table,
     error_table,
     fabric_table,
     picture_table,
@@ -148,3 +149,13 @@ def test_nothing_measured_gives_empty_tables():
     for table in (error_table, fabric_table, picture_table, aliasing_table, timing_table, summary_table):
         assert table([]).empty
     assert spectra([]) == {}
+
+
+def test_energy_is_the_worst_over_fabrics():
+    records = []
+    for fabric, value in (("denim", 0.5), ("basket", 0.9), ("voile", 0.7)):
+        subject = Record(method="m", fabric=fabric, scene="queries")
+        names = ("furnace_diffuse", "furnace_specular", "furnace_colour")
+        records += [subject.of(name, factor * value, 9) for name, factor in zip(names, (1.0, 0.5, 0.25), strict=True)]
+    (found,) = rows(energy_table(records))
+    assert (found.diffuse, found.specular, found.colour, found.fabrics) == (0.9, 0.45, 0.225, 3)

@@ -6,12 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from jobs.cli import main
-from jobs.recipe.load import recipe_names
-from jobs.verbs.bench import BENCHES, STABILITY
 from pipeline.compiled import float32 as single
 from reports.record import Record, read_records, this_machine, write_records
-from reports.truth import formulas, stability, stability_cloth, stability_point
+from reports.truth import formulas, stability_cloth, stability_point
 from reports.truth.corners import draw, kernel_sigma, kernel_slab, textbook_slab
 from reports.truth.finding import RECORDS, Finding, failures, judge
 
@@ -132,17 +129,3 @@ def test_records_hold_the_findings(tmp_path):
     assert again[0] == findings[0]
     assert [f.fault for f in again] == [f.fault for f in findings]
     assert again[1].corner == "a | b"
-
-
-def test_no_recipe_bears_the_name_of_a_measurement():
-    assert not set(BENCHES) & set(recipe_names())
-
-
-@pytest.mark.parametrize(("value", "code"), [(1.0, 0), (1.1, 1)])
-def test_the_verb_writes_records_and_fails_if_an_expression_does(monkeypatch, tmp_path, capsys, value, code):
-    monkeypatch.setattr(stability, "stability", lambda progress: [found([value], [1.0])])
-    assert main(["bench", "stability", "--out", str(tmp_path)]) == code
-    shown = capsys.readouterr()
-    assert ("limit" if code else "ok") in shown.out
-    assert ("x in float32, corner: worst error 1.0e-01" in shown.err) == bool(code)
-    assert RECORDS.from_records(read_records([tmp_path / STABILITY]))[0].worst == pytest.approx(value - 1)

@@ -14,7 +14,6 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from reports.measure.furnace import DIRECTIONS, furnace_queries
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -141,17 +140,3 @@ def test_irregular_drafts_of_many_floats(side):
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
     truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
     assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.04
-
-
-def test_without_shadows_no_cloth_makes_light():
-    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
-
-    Diffuse: exactly bounded. Specular, scattered once: far below.
-    """
-    for name in ("polyester_lining", "silk_charmeuse", "voile"):
-        fabric = load_fabric(name)
-        reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
-        energy = 2.0 * math.pi * reading.bounds.reshape(-1, DIRECTIONS, 4).mean(axis=1)
-        assert energy[:, 2:].sum(axis=1).max() < 1.005
-        assert energy[:, :2].sum(axis=1).max() < 0.7
-        assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from pipeline.analytic.soft_nodes.features import (
     EXCHANGED,
@@ -13,14 +12,11 @@ from pipeline.analytic.soft_nodes.features import (
     read_queries,
 )
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.query import Queries
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
 SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}
-GENERATORS = [SYMMETRIES[1], SYMMETRIES[2], SYMMETRIES[4]]
 
 
 @pytest.fixture(scope="module")
@@ -32,41 +28,9 @@ def lopsided():
     return fabric.model_copy(update={"draft": draft, "warp": warp})
 
 
-def image_of(symmetry, cloth, asked):
-    """Return the image of a cloth and of queries about it."""
-    one = Placement(
-        torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
-        torch.tensor([[symmetry.exchange]]),
-        torch.zeros(1, 2),
-        torch.ones(1, 2),
-    )
-    ends, picks = cloth.weave.repeat
-    u, v, wi, wo = one.move(*(torch.from_numpy(c)[None] for c in (asked.u / ends, asked.v / picks, asked.wi, asked.wo)))
-    image = moved(cloth, symmetry)
-    ends, picks = image.weave.repeat
-    there = Queries.round(u[0].numpy() * ends, v[0].numpy() * picks, asked.sigma, wi[0].numpy(), wo[0].numpy())
-    return image, there
-
-
 @pytest.fixture(scope="module")
 def table(lopsided):
     return tabulate(lopsided)
-
-
-@pytest.mark.parametrize("symmetry", GENERATORS)
-def test_mirror_images_have_the_same_features_and_exchanges_permute_them(symmetry, lopsided, table):
-    """Most rows to rounding, of grids to 8 bits too; where a node lies on the border of two cells, rounding decides."""
-    image_table = tabulate(moved(lopsided, symmetry))
-    for size in SIZES.values():
-        asked = draw_queries(QueryOptions(sigma=size), lopsided.weave.repeat, 1, 0, 100)
-        _, there = image_of(symmetry, lopsided, asked)
-        here, (found, components, _) = read_queries(table, asked), read_queries(image_table, there)
-        expected = here[0][:, EXCHANGED] * EXCHANGED_SIGN if symmetry.exchange else here[0]
-        error = np.abs(found - expected).max(axis=1)
-        assert np.median(error) < 2e-3
-        assert np.quantile(error, 0.9) < 0.05
-        swapped = here[1][:, [1, 0, 3, 2]] if symmetry.exchange else here[1]
-        assert np.median(np.abs(components - swapped).max(axis=1)) < 1e-3
 
 
 def test_exchanging_twice_changes_nothing():

@@ -1,0 +1,45 @@
+"""Point sampling with exact shadows: it converges to the truth, and stays finite at the extremes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.exact_points import PointSampler
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+
+EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
+
+
+def _queries(wi, wo, sigma, rows=1, centre=(0.3, 0.7)):
+    """Return equal queries about directions of (polar angle, azimuth) in degrees."""
+    ones = np.ones(rows, np.float32)
+    directions = []
+    for theta, phi in (np.radians(wi), np.radians(wo)):
+        w = (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+        directions.append(np.tile(np.float32(w), (rows, 1)))
+    return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
+
+
+def test_points_converge_to_the_truth():
+    fabric = load_fabric("basket")
+    queries = _queries((30, 0), (45, 120), sigma=0.7)
+    exact = estimate(fabric, queries, EXACT, 1)
+    np.testing.assert_allclose(PointSampler(fabric).sample(queries, 400_000, 1), exact.mean, rtol=0.03)
+
+
+@pytest.mark.parametrize("sigma", [1e-4, 1e4])
+@pytest.mark.parametrize("theta", [0.0, 89.9])
+@pytest.mark.parametrize("roughness", [0.01, 1.0])
+def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
+    silk = load_fabric("silk_charmeuse")
+    yarns = {name: getattr(silk, name).model_copy(update={"roughness": roughness}) for name in ("warp", "weft")}
+    sampler = PointSampler(silk.model_copy(update=yarns))
+    for other in (0.0, 89.9):
+        queries = _queries((theta, 13), (other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
+        values = sampler.sample(queries, 1, 0)
+        assert np.isfinite(values).all()
+        assert (values >= 0).all()

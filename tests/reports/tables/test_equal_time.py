@@ -1,0 +1,51 @@
+"""Errors at equal time: the rival's curve, class by class."""
+
+import math
+
+import pytest
+
+from reports.measure.by_size import MEASURES
+from reports.record import Record
+from reports.tables.equal_time import equal_time_table, error_at, size_table
+
+
+def test_the_curve_of_a_parameter_is_straight_in_both_logarithms():
+    # Error falls as time^-1/2, as that of random points does: exactly so at times between the settings.
+    curve = [(t, t**-0.5) for t in (100.0, 400.0, 1600.0)]
+    assert error_at(curve, 250.0) == pytest.approx(250.0**-0.5)
+    assert math.isnan(error_at(curve, 99.0))
+    assert error_at(curve, 1e6) == pytest.approx(1600.0**-0.5)
+
+
+def test_a_setting_that_a_faster_one_beats_does_not_help_its_family():
+    assert error_at([(100.0, 0.1), (200.0, 0.5), (400.0, 0.05)], 200.0) == pytest.approx(math.sqrt(0.1 * 0.05))
+
+
+def test_from_what_is_lost_in_noise_on_nothing_is_left_to_beat():
+    curve = [(100.0, 0.2), (200.0, 0.0), (400.0, 0.1)]
+    assert error_at(curve, 150.0) == pytest.approx(0.2)
+    assert error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
+
+
+def records():
+    """One method, and a rival with two settings that is better at small footprints and worse at large ones."""
+    times = {("ours", ""): 200.0, ("points", "k = 1"): 100.0, ("points", "k = 4"): 400.0}
+    errors = {("ours", ""): (0.1, 0.1), ("points", "k = 1"): (0.1, 0.8), ("points", "k = 4"): (0.025, 0.2)}
+    for (method, setting), ns in times.items():
+        subject = Record(method=method, setting=setting)
+        yield subject.of("size_time", ns, 10, curve=((0.0, ns), (1.0, ns)))
+        small, large = errors[method, setting]
+        for metric, _ in MEASURES.values():
+            yield subject.of(metric, 0.1, 10, curve=((0.0, small), (1.0, large)))
+
+
+def test_a_method_is_compared_with_every_setting_at_its_own_time():
+    table = equal_time_table(size_table(list(records())))
+    assert set(table["method"]) == {"ours"} and set(table["rival"]) == {"points"}
+    ratio = table[table["measure"] == "specular"].set_index("size")["ratio"]
+    assert ratio["below .1"] == pytest.approx(0.5)
+    assert ratio["1 to 3"] == pytest.approx(4.0)
+
+
+def test_no_records_give_an_empty_table():
+    assert equal_time_table(size_table([])).empty
