@@ -86,7 +86,7 @@ def test_families_are_equally_likely():
 
 
 def test_a_population_without_drafts_is_refused():
-    with pytest.raises(ValueError, match="at least one draft must be left"):
+    with pytest.raises(ValueError, match="at least one draft must remain"):
         Population(count=1, families=("plain",), exclude=("plain",))
 
 
