@@ -80,7 +80,7 @@ def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
 
 
 def test_unknown_scenes_and_cloths_are_named(tmp_path):
-    assert "did you mean 'table'?" in refused(lambda: load_scene("tabel"))
+    assert "did you mean 'drape'?" in refused(lambda: load_scene("drappe"))
     assert "no such file" in refused(lambda: load_scene(tmp_path / "no.toml"))
     assert "does not exist" in refused(lambda: load(load_scene(tmp_path / "no.xml"), OPTIONS))
     path = written(tmp_path, BALL + SUN + CAMERA)
