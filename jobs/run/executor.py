@@ -3,15 +3,15 @@
 A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
 only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry). At most one task
 a core is handed out at a time: dask, which cannot know how long a task takes, would park short ones behind a training.
+A task that measures time runs in a process of its own (`jobs.run.alone`) while the workers have nothing to do; with
+`--scheduler` it runs in a worker, because the driver's machine may not be the one to measure.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-import signal
 import time
-import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -21,22 +21,14 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from jobs.plan.task import STAGES, Stage, Task, urgencies
-from jobs.run.ledger import Ledger, Product, measure
-from jobs.run.progress import KERNELS, TOPIC, Board, Compiling
+from jobs.run.alone import run_alone
+from jobs.run.child import ONE_THREAD, interrupts_held
+from jobs.run.ledger import Ledger
+from jobs.run.outcome import KILLED, Outcome, one_line, work
+from jobs.run.progress import KERNELS, LOOK, TOPIC, Board, Compiling
 from weaves.errors import BadInput, WorkFailed
 
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 _SECONDS_BETWEEN_SIGNS = 0.2
-_SECONDS_TO_RESTART = 600  # on a busy machine a worker takes minutes to load what it needs
-
-
-class Outcome(NamedTuple):
-    """Result of a task from a worker: its products, or the reason of its failure."""
-
-    files: dict[str, Product]
-    seconds: float
-    reason: str = ""
-    traceback: str = ""
 
 
 class Preparation(NamedTuple):
@@ -131,14 +123,20 @@ def execute(
             while todo or running:
                 ready = [task for task in todo.values() if finished.issuperset(task.needs)]
                 ready.sort(key=lambda task: (task.alone, -urgency[task.id]))
+                ended: list[tuple[Task, Outcome]] = []
                 for task in _admitted(ready, list(running.values()), slots=sum(client.nthreads().values())):
-                    running[_submit(client, todo.pop(task.id), out)] = task
-                    board.begin(task)
-                if not running:
+                    board.begin(todo.pop(task.id))
+                    if task.alone and not scheduler:
+                        ended.append((task, run_alone(task, out, board)))
+                    else:
+                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}")] = task
+                if not running and not ended:
                     break  # what is left waits for tasks that failed
-                for future in _first_ended(running):
-                    task = running.pop(future)
-                    outcome = _outcome(future)
+                if not ended:
+                    while not (futures := _ended(running)):
+                        board.waiting_for(running.values(), workers=len(client.nthreads()))
+                    ended = [(running.pop(future), _outcome(future)) for future in futures]
+                for task, outcome in ended:
                     if outcome.reason:
                         ledger.fail(task, outcome.reason, outcome.traceback)
                         summary.failed.append(task)
@@ -166,7 +164,7 @@ def _prepare(client: Any, preparations: Sequence[Preparation], console: Console)
                 one = waiting.pop(0)
                 running[client.submit(_prepare_one, one, pure=False)] = one.name
                 shown.begin(one.name)
-            for future in _first_ended(running):
+            for future in _ended(running):
                 shown.end(running.pop(future))
         client.unsubscribe_topic(KERNELS)
 
@@ -198,16 +196,8 @@ def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> lis
     return admitted if admitted or running else list(ready[:1])
 
 
-def _submit(client: Any, task: Task, out: Path) -> Any:
-    """Hand a task to the cluster; one that must be alone gets a fresh process."""
-    if task.alone and client.cluster is not None:
-        # Which also forgets results: a worker's end would have dask compute them again.
-        client.restart(timeout=_SECONDS_TO_RESTART)
-    return client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}")
-
-
 def _work(task: Task, out: str) -> Outcome:
-    """Do one task in a worker and measure its products; a failure becomes a reason, never an exception."""
+    """Do one task in a worker."""
     from distributed import get_worker
 
     worker, last = get_worker(), 0.0
@@ -218,15 +208,7 @@ def _work(task: Task, out: str) -> Outcome:
             worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
             last = now
 
-    start = time.perf_counter()
-    try:
-        task.run(Path(out), progress)
-        files = {Path(path).name: measure(Path(out) / path) for path in task.products}
-    except (BadInput, WorkFailed) as error:
-        return Outcome({}, time.perf_counter() - start, str(error))
-    except Exception as error:
-        return Outcome({}, time.perf_counter() - start, _sentence(error), traceback.format_exc())
-    return Outcome(files, time.perf_counter() - start)
+    return work(task, Path(out), progress)
 
 
 def _outcome(future: Any) -> Outcome:
@@ -238,16 +220,18 @@ def _outcome(future: Any) -> Outcome:
         outcome: Outcome = future.result()
         return outcome
     if isinstance(error, KilledWorker):
-        return Outcome({}, 0.0, "the process that ran it was killed several times over; is there enough memory?")
-    return Outcome({}, 0.0, _sentence(error))
+        return Outcome({}, 0.0, KILLED)
+    return Outcome({}, 0.0, one_line(error))
 
 
-def _first_ended(running: Iterable[Any]) -> list[Any]:
-    """Wait until at least one of these futures has ended, and return those that have."""
+def _ended(running: Iterable[Any]) -> list[Any]:
+    """Wait a while until at least one of these futures has ended, and return those that have."""
     from distributed import CancelledError, wait
 
     try:
-        return list(wait(list(running), return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
+        return list(wait(list(running), timeout=LOOK, return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
+    except TimeoutError:
+        return []
     except (CancelledError, OSError) as error:
         raise WorkFailed(
             "the dask scheduler is gone; what was finished is kept, run the same command to go on"
@@ -272,42 +256,28 @@ def _client(scheduler: str, workers: int) -> Iterator[Any]:
             yield client
         return
     resource_tracker.ensure_running()  # when it is started later, it lets Ctrl-C through again
-    # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
-    with _interrupts_held(), dask.config.set({"distributed.nanny.pre-spawn-environ": _ONE_THREAD}):
-        cluster = LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
-            silence_logs=logging.CRITICAL,
-        )
-        client = Client(cluster)  # type: ignore[no-untyped-call]
-    try:
-        yield client
-    finally:
-        with _interrupts_held():
-            client.close()  # type: ignore[no-untyped-call]
-            cluster.close()
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of the block.
-
-    Threads and processes that start within the block never receive Ctrl-C, although a terminal sends it to every
-    process. Only the driver receives it, and stops the workers.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _sentence(error: BaseException) -> str:
-    """Return an unexpected exception in one line."""
-    lines = str(error).strip().splitlines() or [""]
-    return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__
+    settings = {
+        # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
+        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
+        # A worker that is replaced slowly, or dies again, is not given up: its supervisor always starts another.
+        "distributed.deploy.lost-worker-timeout": "1000 days",
+    }
+    with dask.config.set(settings):
+        with interrupts_held():
+            cluster = LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address=None,
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
+                silence_logs=logging.CRITICAL,
+            )
+            client = Client(cluster)  # type: ignore[no-untyped-call]
+        try:
+            yield client
+        finally:
+            with interrupts_held():
+                client.close()  # type: ignore[no-untyped-call]
+                cluster.close()

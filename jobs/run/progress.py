@@ -5,10 +5,11 @@ Bars are weighted by what each task is expected to cost.
 
 from __future__ import annotations
 
+import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import TracebackType
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -21,6 +22,11 @@ TOPIC = "progress"
 
 KERNELS = "kernels"
 """Dask topic on which workers name each kernel that is compiled or read from the cache."""
+
+LOOK: Final = 5.0
+"""Seconds between two looks at how long nothing was reported."""
+
+_SILENCE: Final = 60.0  # seconds without a report until the first line says so
 
 
 class Compiling:
@@ -82,6 +88,7 @@ class Board:
         self._planned = Counter(task.stage for task in tasks)
         self._ended: Counter[Stage] = Counter()
         self._rows: dict[Stage, TaskID] = {}
+        self._heard, self._silence = time.monotonic(), _SILENCE
         for stage in STAGES:
             if total := sum(task.cost for task in tasks if task.stage == stage):
                 self._rows[stage] = self._bars.add_task(stage, total=total, start=False, count=self._count(stage))
@@ -99,18 +106,38 @@ class Board:
         """Start the clock of a task's stage."""
         if not self._bars.tasks[self._rows[task.stage]].started:
             self._bars.start_task(self._rows[task.stage])
+        self._reported()
 
     def hear(self, event: tuple[float, Any]) -> None:
         """Take a message of a worker about a task under way."""
         _, message = event
-        if task := self._tasks.get(message["task"]):
-            self._advance(task, min(1.0, float(message["fraction"])))
+        self.advance(message["task"], float(message["fraction"]))
+
+    def advance(self, id: str, fraction: float) -> None:
+        """Show the finished share of a task under way."""
+        self._reported()
+        if task := self._tasks.get(id):
+            self._advance(task, min(1.0, fraction))
+
+    def waiting_for(self, tasks: Iterable[Task], workers: int) -> None:
+        """Say what a run waits for when nothing was reported for a minute, and again after 2, 4, … minutes."""
+        silence = time.monotonic() - self._heard
+        if silence < self._silence:
+            return
+        self._silence *= 2
+        titles = ", ".join(f"{task.stage} {task.title}" for task in tasks)
+        where = f"{workers} workers" if workers > 1 else "1 process" if workers else "no worker: the scheduler has none"
+        self._bars.console.print(f"nothing reported for {silence:.0f} s; under way: {titles} ({where})", style="yellow")
 
     def end(self, task: Task) -> None:
         """Count a task as ended, done or failed."""
+        self._reported()
         self._ended[task.stage] += 1
         self._advance(task, 1.0)
         del self._tasks[task.id]
+
+    def _reported(self) -> None:
+        self._heard, self._silence = time.monotonic(), _SILENCE
 
     def _advance(self, task: Task, fraction: float) -> None:
         step = fraction - self._fractions[task.id]

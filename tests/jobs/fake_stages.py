@@ -102,7 +102,13 @@ def chain():
     return [*shards, task("net", FakeTraining, needs=shards)]
 
 
+def timed():
+    """Two shards, then a task that runs alone for a minute."""
+    shards = [task(f"shard {index}") for index in range(2)]
+    return [*shards, task("long", FakeTiming, needs=shards, seconds=60)]
+
+
 if __name__ == "__main__":
     from jobs.run.executor import execute
 
-    execute(chain(), Path(sys.argv[1]), workers=2)
+    execute({"chain": chain, "timed": timed}[sys.argv[2]](), Path(sys.argv[1]), workers=2)

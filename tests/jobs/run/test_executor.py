@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import dask.config
 import psutil
 import pytest
 from rich.console import Console
@@ -88,6 +89,25 @@ def test_a_killed_worker_costs_one_retry(tmp_path, fake):
     assert starts.count("victim") == 2
 
 
+def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path, fake):
+    """By default dask never replaces a worker that is not back when its time is over, and the run stands still."""
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "50ms"}):
+        tasks = [fake.task(f"victim {index}", dies=True) for index in range(2)]
+        summary = execute(tasks, tmp_path, workers=1, console=quiet())
+    assert len(summary.ran) == 2
+
+
+def test_tasks_that_run_alone_have_a_process_each(tmp_path, fake):
+    tasks = [fake.task(f"timed {index}", fake.FakeTiming, dies=index == 3) for index in range(5)]
+    failing = fake.task("fails", fake.FakeTiming, fails="ValueError('late')")
+    summary = execute([*tasks, failing], tmp_path, workers=2, console=quiet())
+    assert {task.title for task in summary.ran} == {task.title for task in tasks}
+    assert Ledger(tmp_path).reason(failing) == "ValueError: late"
+    starts = [event for event in fake.events(tmp_path) if event["event"] == "start"]
+    assert len(starts) == len({event["pid"] for event in starts}) == 7  # one of them died and was replaced
+    assert {event["threads"] for event in starts} == {"1"}
+
+
 def test_work_left_out_before_is_named(tmp_path, fake):
     with pytest.raises(WorkFailed, match="train: 8 tasks that it needs are not done; run `twillight generate` first"):
         execute(fake.chain(), tmp_path, stages=["train"], console=quiet())
@@ -98,8 +118,8 @@ def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
         execute(fake.chain(), tmp_path, scheduler="nonsense://", console=quiet())
 
 
-def driver(out):
-    command = [sys.executable, str(HERE / "fake_stages.py"), str(out)]
+def driver(out, plan="chain"):
+    command = [sys.executable, str(HERE / "fake_stages.py"), str(out), plan]
     path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
     # A background shell hands down an ignored SIGINT; the driver is to hear it as from a terminal.
     process = subprocess.Popen(
@@ -111,10 +131,14 @@ def driver(out):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 30
-    while len(list((out / "ledger").glob("[!.]*.json"))) < 2:  # whole ones
+    while len(list((out / "ledger").glob("[!.]*.json"))) < 2 or (plan == "timed" and '"long"' not in log(out)):
         assert time.monotonic() < deadline and process.poll() is None
         time.sleep(0.02)
     return process, psutil.Process(process.pid).children(recursive=True)
+
+
+def log(out):
+    return (out / "log.jsonl").read_text()
 
 
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGINT])
@@ -140,6 +164,15 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(tmp_path, fake, blow):
     assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
     expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
     assert hashes(tmp_path) == expected
+
+
+def test_a_task_that_runs_alone_ends_with_the_driver(tmp_path, fake):
+    process, children = driver(tmp_path, "timed")
+    process.kill()
+    process.communicate(timeout=30)
+    _, alive = psutil.wait_procs(children, timeout=10)
+    assert not alive
+    assert [event["event"] for event in fake.events(tmp_path) if event["name"] == "long"] == ["start"]
 
 
 def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):

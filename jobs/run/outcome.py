@@ -1,0 +1,43 @@
+"""Do one task and measure its products. A failure becomes a reason, never an exception, so it can cross processes."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from pathlib import Path
+from typing import NamedTuple
+
+from jobs.plan.task import Progress, Task
+from jobs.run.ledger import Product, measure
+from weaves.errors import BadInput, WorkFailed
+
+KILLED = "the process that ran it was killed several times over; is there enough memory?"
+"""Reason of a task whose process died before it could report."""
+
+
+class Outcome(NamedTuple):
+    """Result of a task: its products, or the reason of its failure."""
+
+    files: dict[str, Product]
+    seconds: float
+    reason: str = ""
+    traceback: str = ""
+
+
+def work(task: Task, out: Path, progress: Progress) -> Outcome:
+    """Do a task below the output folder `out`."""
+    start = time.perf_counter()
+    try:
+        task.run(out, progress)
+        files = {Path(path).name: measure(out / path) for path in task.products}
+    except (BadInput, WorkFailed) as error:
+        return Outcome({}, time.perf_counter() - start, str(error))
+    except Exception as error:
+        return Outcome({}, time.perf_counter() - start, one_line(error), traceback.format_exc())
+    return Outcome(files, time.perf_counter() - start)
+
+
+def one_line(error: BaseException) -> str:
+    """Return an unexpected exception in one line."""
+    lines = str(error).strip().splitlines() or [""]
+    return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__

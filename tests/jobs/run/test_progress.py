@@ -1,0 +1,36 @@
+import io
+
+import pytest
+from rich.console import Console
+
+from jobs.run import progress
+from jobs.run.progress import Board
+
+
+@pytest.fixture
+def fake(monkeypatch, request):
+    monkeypatch.syspath_prepend(request.path.parents[1])
+    import fake_stages
+
+    return fake_stages
+
+
+def test_silence_is_told_after_a_minute_and_less_and_less_often(fake, monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    out = io.StringIO()
+    task = fake.task("tweed")
+    with Board([task], Console(file=out, width=200)) as board:
+        said = []
+        for now in range(0, 600, 5):
+            before = len(out.getvalue())
+            board.waiting_for([task], workers=2)
+            if "nothing reported" in out.getvalue()[before:]:
+                said.append(now)
+        assert said == [60, 120, 240, 480]
+        board.advance(task.id, 0.5)
+        board.waiting_for([task], workers=0)
+        now += 61
+        board.waiting_for([task], workers=0)
+    assert "under way: generate tweed (2 workers)" in out.getvalue()
+    assert out.getvalue().count("no worker: the scheduler has none") == 1
