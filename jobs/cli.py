@@ -12,6 +12,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -37,6 +38,19 @@ Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; 
 Workers = Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")]
 
 OUT = Path("out")
+
+
+@dataclass(frozen=True)
+class TruthFlags:
+    """Options of the truth on the command line; None: the default of `pipeline.truth.options.TruthOptions`."""
+
+    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, quadrature, owen, mc, …")] = None
+    relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None
+    absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None
+    max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None
+    footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None
+    frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
+    normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
 
 
 @app.command(name="list", sort_key=0)
@@ -101,13 +115,7 @@ def evaluate(
     out: Annotated[Path, Parameter(help="Parquet file to write.")],
     model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
     extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
-    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, quadrature, owen, mc, …")] = None,
-    relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None,
-    absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None,
-    max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None,
-    footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None,
-    frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None,
-    normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None,
+    truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),
     seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
     workers: Annotated[int, Parameter(help="Threads; 0: one per core.")] = 0,
     skip_bad: Annotated[bool, Parameter(help="List rows that cannot be evaluated, and continue.")] = False,
@@ -117,15 +125,7 @@ def evaluate(
     from jobs.verbs.evaluate import truth_options
     from weaves.fabric import load_fabric
 
-    chosen = {
-        "estimator": estimator,
-        "relative_error": relative_error,
-        "absolute_error": absolute_error,
-        "max_count": max_count,
-        "footprint": footprint,
-        "frame": frame,
-        "normaliser": normaliser,
-    }
+    chosen = asdict(truth)
     options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
     if model is not None:
         from jobs.verbs.evaluate_model import answerer, refuse_truth_options

@@ -31,7 +31,7 @@ class Shard(Task):
 
     stage: ClassVar[Stage] = "generate"
 
-    question: AnyShardTask
+    shard: AnyShardTask
     """Rows of one fabric, and how they are answered."""
     role: str
     """Role of the fabric in the data set: seen, population or unseen."""
@@ -41,21 +41,21 @@ class Shard(Task):
     @property
     def is_extra(self) -> bool:
         """True if single models alone read its rows."""
-        return isinstance(self.question, ExtraShardTask)
+        return isinstance(self.shard, ExtraShardTask)
 
     @property
     def group(self) -> str:
         """Role and split, or kind of extra rows."""
-        question = self.question
-        what = question.kind.replace("_", " ") if isinstance(question, ExtraShardTask) else question.split
+        shard = self.shard
+        what = shard.kind.replace("_", " ") if isinstance(shard, ExtraShardTask) else shard.split
         return f"{self.role} · {what}"
 
     @property
     def title(self) -> str:
         """Fabric, split and rows."""
-        question = self.question
-        last = question.start + question.rows - 1
-        return f"{question.fabric.name} {question.split} rows {question.start}–{last}"
+        shard = self.shard
+        last = shard.start + shard.rows - 1
+        return f"{shard.fabric.name} {shard.split} rows {shard.start}–{last}"
 
     @property
     def products(self) -> tuple[str, ...]:
@@ -65,12 +65,12 @@ class Shard(Task):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return self.rows * SECONDS_A_POINT * _points(self.question)
+        return self.rows * SECONDS_A_POINT * _points(self.shard)
 
     @property
     def rows(self) -> int:
         """Rows of the shard."""
-        return self.question.rows
+        return self.shard.rows
 
     @property
     def size(self) -> int:
@@ -83,14 +83,14 @@ class Shard(Task):
 
     def identity(self) -> dict[str, Any]:
         """Return the identity that the shard itself holds."""
-        return self.question.identity()
+        return self.shard.identity()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Write the shard to its first folder and link it into the others."""
         from pipeline.shards.generate import generate_shard
 
         first, *others = (out / path for path in self.products)
-        generate_shard(self.question, first, progress)
+        generate_shard(self.shard, first, progress)
         for other in others:
             link(first, other)
 
@@ -98,7 +98,7 @@ class Shard(Task):
 def shards(recipe: Recipe) -> list[Shard]:
     """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows; extra rows last."""
     rows: list[tuple[str, AnyShardTask]] = [*_own_rows(recipe), *_extra_rows(recipe)]
-    parts = [Shard(question=question, role=role, folders=()) for role, question in rows]
+    parts = [Shard(shard=shard, role=role, folders=()) for role, shard in rows]
     folder = f"datasets/{recipe.name}-{fingerprint(sorted(part.id for part in parts if not part.is_extra), 8)}"
     return [part.model_copy(update={"folders": (folder,)}) for part in parts]
 
@@ -161,11 +161,11 @@ def _cut(total: int, most: int) -> Iterator[tuple[int, int]]:
         yield start, min(most, total - start)
 
 
-def _points(question: AnyShardTask) -> float:
+def _points(shard: AnyShardTask) -> float:
     """Estimate the points of a row."""
-    if isinstance(question, ShardTask):
-        return points_a_row(question.truth)
-    extra = question.extra
+    if isinstance(shard, ShardTask):
+        return points_a_row(shard.truth)
+    extra = shard.extra
     return points_a_row(extra.truth) if isinstance(extra, AngularSamples) else float(extra.points)
 
 

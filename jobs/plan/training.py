@@ -107,7 +107,7 @@ def trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dic
 
 def _training(model: ModelRecipe, fabrics: Sequence[str], parts: Sequence[Shard]) -> Training:
     splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
-    read = [part for part in parts if part.question.fabric.name in fabrics and part.question.split in splits]
+    read = [part for part in parts if part.shard.fabric.name in fabrics and part.shard.split in splits]
     return Training(
         options=model.options,
         training=model.training,

@@ -1,4 +1,4 @@
-"""What every process that a run starts gets: one thread, and no Ctrl-C, which the driver alone receives."""
+"""Settings of every process that a run starts: one thread, and no Ctrl-C, which the driver alone receives."""
 
 from __future__ import annotations
 

@@ -34,15 +34,15 @@ class ManifestFile:
     def _enter(self, part: Shard) -> None:
         from pipeline.shards.manifest import ShardEntry
 
-        name, question = Path(part.products[0]).name, part.question
+        name, shard = Path(part.products[0]).name, part.shard
         if self._ledger.state(part) == "done":
             self._entries[part.id] = ShardEntry(
                 file=name,
-                fabric=question.fabric.name,
-                kind=question.kind,
-                split=question.split,
-                start=question.start,
-                rows=question.rows,
+                fabric=shard.fabric.name,
+                kind=shard.kind,
+                split=shard.split,
+                start=shard.start,
+                rows=shard.rows,
                 sha256=self._ledger.products(part)[name].sha256,
             )
 

@@ -120,7 +120,7 @@ class Board:
             self._advance(task, min(1.0, fraction))
 
     def waiting_for(self, tasks: Iterable[Task], workers: int) -> None:
-        """Say what a run waits for when nothing was reported for a minute, and again after 2, 4, … minutes."""
+        """Name the tasks under way when nothing was reported for a minute, and again after 2, 4, … minutes."""
         silence = time.monotonic() - self._heard
         if silence < self._silence:
             return

@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 from pipeline import versions
 from pipeline.atomic import atomic_path
 from pipeline.fingerprint import file_sha256
-from pipeline.shards.questions import (
+from pipeline.shards.query_file import (
     ANSWERS,
     OPTIONAL,
     ROW_GROUP,
@@ -33,8 +33,8 @@ from pipeline.shards.questions import (
     Faults,
     blocks,
     check_columns,
-    open_questions,
-    questions_of,
+    checked_queries,
+    open_queries,
     refuse_bad,
 )
 from pipeline.shards.schema import SCHEMA_VERSION
@@ -152,11 +152,11 @@ def evaluate_file(
     if out.exists() and queries.exists() and out.samefile(queries):
         raise BadInput("evaluate", "--out", str(out), "must not be the file of the queries")
 
-    def wrong(questions: Queries) -> dict[int, tuple[str, object, str]]:
-        found = faults(questions)
-        return (other.faults(questions) | found) if other else found
+    def wrong(batch: Queries) -> dict[int, tuple[str, object, str]]:
+        found = faults(batch)
+        return (other.faults(batch) | found) if other else found
 
-    with open_questions(queries) as file, ExitStack() as stack:
+    with open_queries(queries) as file, ExitStack() as stack:
         check_columns(queries, file.schema_arrow)
         if not skip_bad:
             refuse_bad(queries, file, fabric.weave.repeat, wrong)
@@ -172,12 +172,12 @@ def evaluate_file(
         summary = Summary()
         crew = _Crew(fabric, options, seed, stack.enter_context(_threads(1 if other else threads)), other)
         for block in blocks(queries, file):
-            questions, bad = questions_of(block, summary.rows, fabric.weave.repeat, wrong)
+            batch, bad = checked_queries(block, summary.rows, fabric.weave.repeat, wrong)
             if listing:
                 listing.writerows(bad)
-            good = np.ones(len(questions.u), np.bool_)
+            good = np.ones(len(batch.u), np.bool_)
             good[[row.row - summary.rows for row in bad]] = False
-            answers = _answers(crew, questions, good, summary, chunk, file.metadata.num_rows, progress)
+            answers = _answers(crew, batch, good, summary, chunk, file.metadata.num_rows, progress)
             writer.write_table(
                 pa.table([*block.columns, *_arrays(answers, good, other is None)], schema=schema), ROW_GROUP
             )
@@ -198,17 +198,17 @@ class _Crew:
         self.fabric, self.options, self.seed, self.pool, self.other = fabric, options, seed, pool, other
         self._met: set[tuple[bool, bool]] = set()
 
-    def prepare(self, questions: Queries) -> None:
+    def prepare(self, batch: Queries) -> None:
         """Load kernels and tabulate the sides of the fabric that queries need, before threads start."""
         if self.other:
             return
-        sides = np.stack([questions.wi[:, 2] < 0, questions.wo[:, 2] < 0], axis=1)
+        sides = np.stack([batch.wi[:, 2] < 0, batch.wo[:, 2] < 0], axis=1)
         for row in np.unique(sides, axis=0, return_index=True)[1].tolist():
             key = bool(sides[row, 0]), bool(sides[row, 1])
             if key not in self._met:
                 self._met.add(key)
                 # A wide footprint and a narrow one, for they may use different tables.
-                wi, wo = (np.repeat(w[row : row + 1], 2, axis=0) for w in (questions.wi, questions.wo))
+                wi, wo = (np.repeat(w[row : row + 1], 2, axis=0) for w in (batch.wi, batch.wo))
                 centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.1], np.float32)
                 estimate(self.fabric, Queries.round(centre, centre, widths, wi, wo), self.options, self.seed, 0)
 
@@ -217,10 +217,10 @@ class _Crew:
         return self.pool.map(self._answer, runs)
 
     def _answer(self, run: tuple[Queries, int]) -> Answers:
-        questions, first = run
+        batch, first = run
         if self.other is None:
-            return estimate(self.fabric, questions, self.options, self.seed, first)
-        mean, transparency = self.other.answer(questions)
+            return estimate(self.fabric, batch, self.options, self.seed, first)
+        mean, transparency = self.other.answer(batch)
         nothing = np.zeros_like(mean)
         return Answers.opaque(mean, nothing, np.zeros(len(mean), np.int32))._replace(transparency=transparency)
 
@@ -237,7 +237,7 @@ def _threads(count: int) -> Iterator[Executor]:
 
 def _answers(
     crew: _Crew,
-    questions: Queries,
+    batch: Queries,
     good: npt.NDArray[np.bool_],
     summary: Summary,
     chunk: int,
@@ -250,9 +250,9 @@ def _answers(
     cuts = {0, rows, *range(0, rows, chunk), *(np.flatnonzero(np.diff(good)) + 1).tolist()}
     edges = list(pairwise(sorted(cuts)))
     # Kernels are loaded and the fabric is tabulated outside the clock.
-    crew.prepare(questions.take(good))
+    crew.prepare(batch.take(good))
     begun = time.perf_counter()
-    parts = crew.answers((questions.take(slice(start, stop)), first + start) for start, stop in edges if good[start])
+    parts = crew.answers((batch.take(slice(start, stop)), first + start) for start, stop in edges if good[start])
     for start, stop in edges:
         if good[start]:
             part = next(parts)

@@ -104,16 +104,11 @@ def train(
         interval = math.ceil(training.steps / training.curve_points)
         looks = math.ceil(training.curve_points / training.held_out_points) * interval
         for step in range(first, training.steps):
-            factor = rate_factor(step, training)
-            for group, peak in zip(optimiser.param_groups, peaks, strict=True):
-                group["lr"] = factor * peak
+            _set_rate(optimiser, peaks, rate_factor(step, training))
             network.schedule(step / training.steps)
             with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                 loss = learnt(batches.step(step), order.random(step))
-            optimiser.zero_grad()
-            loss.backward()
-            norm = nn.utils.clip_grad_norm_(network.parameters(), training.gradient_clip)
-            optimiser.step()
+            norm = _descend(network, optimiser, loss, training.gradient_clip)
 
             # Note the loss; look at it only now and then, because looking waits for the device.
             state.add(step, loss.detach(), norm)
@@ -134,13 +129,33 @@ def train(
         weights = state.weights()
         card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"])}
         card["validation"] = held_out.figures(weights)
-    # One key of metadata: safetensors writes several in no fixed order.
-    metadata = {"twillight": json.dumps({"model": options.model, "name": options.name, "identity": identity})}
-    atomic_write(folder / WEIGHTS, safetensors.torch.save(weights, metadata=metadata))
-    atomic_write(folder / CARD, json.dumps(card, indent=1, sort_keys=True).encode() + b"\n")
+    _write(folder, weights, card, identity)
     (folder / CHECKPOINT).unlink(missing_ok=True)
     (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
+
+
+def _set_rate(optimiser: torch.optim.Optimizer, peaks: Sequence[float], factor: float) -> None:
+    """Set the learning rate of each group of parameters to a share of its peak."""
+    for group, peak in zip(optimiser.param_groups, peaks, strict=True):
+        group["lr"] = factor * peak
+
+
+def _descend(network: nn.Module, optimiser: torch.optim.Optimizer, loss: torch.Tensor, clip: float) -> torch.Tensor:
+    """Take one step of the optimiser; return the norm of the gradient before it was clipped."""
+    optimiser.zero_grad()
+    loss.backward()  # type: ignore[no-untyped-call]
+    norm = nn.utils.clip_grad_norm_(network.parameters(), clip)
+    optimiser.step()
+    return norm
+
+
+def _write(folder: Path, weights: dict[str, torch.Tensor], card: dict[str, Any], identity: str) -> None:
+    """Write weights and card."""
+    # One key of metadata: safetensors writes several in no fixed order.
+    metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
+    atomic_write(folder / WEIGHTS, safetensors.torch.save(weights, metadata=metadata))
+    atomic_write(folder / CARD, json.dumps(card, indent=1, sort_keys=True).encode() + b"\n")
 
 
 def rate_factor(step: int, training: TrainingOptions) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -64,12 +64,13 @@ def measure_by_size(
     folder: Path,
     options: TimingOptions,
     provenance: Provenance | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
     Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
     many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
-    edge of the class, value); its value is that over all classes.
+    edge of the class, value); its value is that over all classes. `progress` receives the finished share.
     """
     classes, shares = _classes(manifest, folder)
     methods = [
@@ -77,17 +78,23 @@ def measure_by_size(
     ]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
     errors: dict[tuple[int, str], list[tuple[float, float]]] = {}
-    for low, members in classes.items():
+    for done, (low, members) in enumerate(classes.items()):
+        progress(done / len(classes))
         contenders = []
         for index, method in enumerate(methods):
             own = [one for one in members if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
-            asked_of = [(cloth, queries) for cloth, queries, _ in own]
-            contenders.append(affordable(Contender(method.predict, asked_of), LONGEST, FEWEST))
+            drawn = [(cloth, queries) for cloth, queries, _ in own]
+            contenders.append(affordable(Contender(method.predict, drawn), LONGEST, FEWEST))
             for name, error in _errors(method, own, options.seed):
                 errors.setdefault((index, name), []).append((low, error))
-        timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
+        timings = time_side_by_side(
+            contenders,
+            options.timing_repeats,
+            options.warm_up,
+            progress=lambda share, done=done: progress((done + share) / len(classes)),  # type: ignore[misc]
+        )
         for index, timing in enumerate(timings):
             times[index].append((low, timing.quartiles[1]))
     records = []

@@ -201,7 +201,7 @@ def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
     footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,
-    `asked` (number of values).
+    `answers` (their number).
     """
     found: dict[tuple[str, str], list[Record]] = {}
     for record in records:
@@ -224,7 +224,7 @@ def _row(method: str, setting: str, records: Sequence[Record]) -> dict[str, obje
     row |= {"grazing": worst("extreme_grazing", False), "lustrous": worst("extreme_error", True)}
     row |= {name: worst(metric) for name, metric in _WORST.items()}
     row |= {"not_finite": total("extreme_not_finite"), "negative": total("extreme_negative")}
-    return row | {"asked": sum(record.count for record in records if record.metric == "extreme_not_finite")}
+    return row | {"answers": sum(record.count for record in records if record.metric == "extreme_not_finite")}
 
 
 def error_name(size: float) -> str:

@@ -8,7 +8,7 @@ no number depends on earlier work.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import count, cycle, islice
 from pathlib import Path
@@ -114,8 +114,11 @@ def measure_timing(
     folder: Path,
     options: TimingOptions,
     provenance: Provenance | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
     """Time methods side by side on held-out queries of all named fabrics; note bytes, memory and the cost of a fabric.
+
+    `progress` receives the finished share.
 
     Returns
     -------
@@ -133,7 +136,8 @@ def measure_timing(
 
     truth = TruthOptions.model_validate(manifest.about["truth"])
     entries, records, edits = [], [], count(1)
-    for method in methods:
+    for index, method in enumerate(methods):
+        progress(0.3 * index / len(methods))
         covered = [(cloth, queries) for cloth, queries in sample if method.covers(cloth)]
         if not covered:
             continue
@@ -148,17 +152,21 @@ def measure_timing(
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
     exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
     entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
-    return records + _times(entries, options)
+    return records + _times(entries, options, lambda share: progress(0.3 + 0.7 * share))
 
 
-def _times(entries: Sequence[tuple[Record, Contender]], options: TimingOptions) -> list[Record]:
+def _times(
+    entries: Sequence[tuple[Record, Contender]], options: TimingOptions, progress: Callable[[float], None]
+) -> list[Record]:
     """Return the times of all contenders on every number of threads, all of them in turns."""
     runs = [
         (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
         for subject, contender in entries
         for threads in thread_counts(options.threads)
     ]
-    timings = time_side_by_side([contender for _, contender in runs], options.timing_repeats, options.warm_up)
+    timings = time_side_by_side(
+        [contender for _, contender in runs], options.timing_repeats, options.warm_up, progress=progress
+    )
     records = []
     for (subject, contender), timing in zip(runs, timings, strict=True):
         low, median, high = timing.quartiles

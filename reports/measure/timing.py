@@ -75,6 +75,7 @@ def time_side_by_side(
     repeats: int,
     warm_up: int = 3,
     clock: Callable[[], int] = time.perf_counter_ns,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Timing]:
     """Time methods in turns.
 
@@ -88,6 +89,8 @@ def time_side_by_side(
         Calls of each before that.
     clock : callable
         Returns nanoseconds.
+    progress : callable
+        Receives the finished share, between two rounds.
 
     Returns
     -------
@@ -98,10 +101,11 @@ def time_side_by_side(
     elapsed: list[list[int]] = [[] for _ in contenders]
     ran = [0] * len(contenders)
     with ThreadPoolExecutor(max((contender.threads for contender in contenders), default=1)) as pool:
-        for _ in range(warm_up):
+        for turn in range(warm_up):
             for contender in contenders:
                 _call(contender, pool)
-        for _ in range(repeats):
+            progress((turn + 1) / (warm_up + repeats))
+        for turn in range(repeats):
             for index, contender in enumerate(contenders):
                 synchronise()
                 start, ran_before = clock(), time.thread_time_ns()
@@ -109,6 +113,7 @@ def time_side_by_side(
                 synchronise()
                 elapsed[index].append(clock() - start)
                 ran[index] += time.thread_time_ns() - ran_before
+            progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
         Timing(
             tuple(reading / contender.rows for reading in readings), contender.rows, _waited(contender, readings, own)

@@ -275,7 +275,7 @@ def extreme_rows(table: pd.DataFrame) -> list[Row]:
         errors = [percent(getattr(row, name)) for name in map(error_name, FOOTPRINTS)]
         errors += [percent(row.grazing), percent(row.lustrous)]
         others = [NONE if missing(x) else "0" if x == 0 else f"{x:.1e}" for x in (row.rounding, row.far, row.large)]
-        wrong = [f"{count} of {row.asked} ✗" if count else "0" for count in (row.not_finite, row.negative)]
+        wrong = [f"{count} of {row.answers} ✗" if count else "0" for count in (row.not_finite, row.negative)]
         lines.append(row_of(row.method, row.setting) | {"cells": [*errors, *others, *wrong]})
     return groups(lines)
 

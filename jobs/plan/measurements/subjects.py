@@ -152,7 +152,7 @@ class Subjects:
             part.id
             for name in names
             for part in self.shards
-            if part.question.fabric.name == name and part.question.split == "test"
+            if part.shard.fabric.name == name and part.shard.split == "test"
         ]
         return Dataset(fingerprint=self._fingerprint, rows=tuple(rows), folder=folder_of(self.shards))
 

@@ -116,7 +116,10 @@ class Timing(Measurement):
         loaded = [(one, one.model.methods(out)) for one in self.models]
         methods = [method for _, found in loaded for method in found]
         variants = [run for one, found in loaded for run in one.model.variants(found, one.ways)]
-        records = measure_timing(methods + variants, manifest, folder, self.options, about)
-        progress(0.6)
+        records = measure_timing(
+            methods + variants, manifest, folder, self.options, about, lambda share: progress(0.6 * share)
+        )
         records += [record for one, found in loaded for record in one.not_run(found, about)]
-        return records + measure_by_size(methods, manifest, folder, self.options, about)
+        return records + measure_by_size(
+            methods, manifest, folder, self.options, about, lambda share: progress(0.6 + 0.4 * share)
+        )

@@ -6,25 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, Self
 
-from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.subjects import Subjects
-from jobs.plan.task import Coloured, Made, Progress
-from pipeline import versions
+from jobs.plan.measurements.truth_image import TruthImage
+from jobs.plan.task import Progress
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.truth.options import TruthOptions
 from reports.options import PictureOptions
 from weaves.fabric import Fabric
 
-BYTES_A_PIXEL = 28
 
-
-class TruthPicture(Measurement):
+class TruthPicture(TruthImage):
     """The truth's picture of a fabric in one view. Every recipe and every model shares it."""
 
     kind: Literal["truth picture"] = "truth picture"
-    fabric: Coloured
-    """The fabric."""
     scene: View
     """The view."""
     extent: tuple[int, int]
@@ -58,54 +53,24 @@ class TruthPicture(Measurement):
         }
 
     @property
-    def group(self) -> str:
-        """The truth's pictures."""
-        return "truth of the pictures"
-
-    @property
-    def title(self) -> str:
-        """Fabric and view."""
-        return f"truth of {self.fabric.name}, {self.scene}"
-
-    @property
-    def name(self) -> str:
-        """Beginning of the name of its file."""
-        return f"truth-{self.fabric.name}-{self.scene}"
-
-    @property
-    def records(self) -> str:
-        """No Records."""
-        return ""
-
-    @property
     def pictures(self) -> tuple[Picture, ...]:
         """The picture."""
         return (Picture(self.fabric.name, self.scene, "truth", "", f"{self.stem}.exr"),)
 
     @property
-    def products(self) -> tuple[str, ...]:
-        """The picture."""
-        return (f"{self.stem}.exr",)
+    def shows(self) -> str:
+        """The view."""
+        return self.scene
 
     @property
-    def made(self) -> Made:
-        """The picture, as other measurements read it."""
-        return Made(task=self.id, path=self.products[0])
+    def pixels(self) -> int:
+        """Number of its pixels."""
+        return self.extent[0] * self.extent[1]
 
     @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        width, height = self.extent
-        return width * height * SECONDS_A_POINT * points_a_row(self.truth)
-
-    @property
-    def size(self) -> int:
-        """Estimated bytes."""
-        return self.extent[0] * self.extent[1] * BYTES_A_PIXEL
-
-    def versions(self) -> dict[str, int]:
-        """Return the versions of the truth and of the benchmark."""
-        return {"truth": versions.TRUTH, "bench": versions.BENCH}
+    def estimator(self) -> TruthOptions:
+        """Options of the truth."""
+        return self.truth
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""

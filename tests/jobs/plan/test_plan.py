@@ -23,9 +23,9 @@ def test_every_row_once_in_tasks_of_shard_rows(tasks):
     rows = {}
     for task in tasks:
         if task.stage == "generate":
-            key = task.question.fabric.name, task.question.split
-            assert task.question.start == rows.get(key, 0)
-            rows[key] = task.question.start + task.rows
+            key = task.shard.fabric.name, task.shard.split
+            assert task.shard.start == rows.get(key, 0)
+            rows[key] = task.shard.start + task.rows
             assert task.rows <= 1000
     named = {(name, split): count for name in ("denim", "own", "twill_4_4") for split, count in SPLITS.items()}
     assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
@@ -56,7 +56,7 @@ def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
 
 def test_without_a_model_of_one_material_the_unseen_fabric_has_no_training_rows(files):
     tasks = edited(files, '[[models]]\nmodel = "neumip"\n', "")
-    assert {task.question.split for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
+    assert {task.shard.split for task in tasks if task.stage == "generate" and "twill_4_4" in task.title} == {"test"}
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tas
 
 
 def test_what_lies_between_fabrics_needs_the_training_alone(files, tasks):
-    """Its pairs are presets: no row and no fabric of the recipe enters but through the network and the questions."""
+    """Its pairs are presets: no row and no fabric of the recipe enters but through the network and the queries."""
     (task,) = [task for task in tasks if task.title.startswith("latents")]
     assert task.title == "latents of woven" and list(task.needs) == ids(tasks, "train", "woven")
     assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "latents") == [task.id]
@@ -233,9 +233,9 @@ def test_the_full_plan_is_paper_sized():
 def test_rows_that_nobody_learns_from_are_not_drawn():
     quick = load_recipe("quick")
     idle = dataclasses.replace(quick, models=tuple(m for m in quick.models if not m.learns))
-    drawn = {task.question.split for task in plan(idle) if task.stage == "generate"}
+    drawn = {task.shard.split for task in plan(idle) if task.stage == "generate"}
     assert drawn == {"test"}
-    every = {task.question.split for task in plan(quick) if task.stage == "generate"}
+    every = {task.shard.split for task in plan(quick) if task.stage == "generate"}
     assert every == {"train", "validation", "test"}
 
 
@@ -271,16 +271,14 @@ def test_extra_rows_are_tasks_that_equal_models_share(files, tasks):
     recipe = load_recipe(files.write())
     after = plan(recipe)
     extra = {task.id: task for task in after if task.stage == "generate" and "samples" in task.title}
-    names = {task.question.fabric.name for task in extra.values()}
+    names = {task.shard.fabric.name for task in extra.values()}
     assert names == {fabric.name for fabric in recipe.fabrics}
     for fabric in recipe.fabrics:
         ends, picks = fabric.weave.repeat
-        rows = sum(task.rows for task in extra.values() if task.question.fabric.name == fabric.name)
+        rows = sum(task.rows for task in extra.values() if task.shard.fabric.name == fabric.name)
         assert rows == 60 * 4 * ends * picks
     trainings = [task for task in after if task.stage == "train"]
-    read = {
-        task.title: {extra[need].question.fabric.name for need in task.needs if need in extra} for task in trainings
-    }
+    read = {task.title: {extra[need].shard.fabric.name for need in task.needs if need in extra} for task in trainings}
     assert read["unified_btf on 5 fabrics"] == names - {"twill_4_4"}
     assert read["btf_autoencoder on twill_4_4"] == {"twill_4_4"}
     assert read["woven on 5 fabrics"] == set()

@@ -179,7 +179,7 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files)
     products = [path for task in tasks for path in task.products]
     assert len(set(products)) == len(products)
     shared = [task for task in tasks if task.stage == "generate" and len(task.products) == 2]
-    assert {task.question.fabric.name for task in shared} == {"denim", "twill_4_4"}
+    assert {task.shard.fabric.name for task in shared} == {"denim", "twill_4_4"}
     for task in shared:
         first, second = task.products
         assert first.startswith("datasets/tiny-") and second.startswith("datasets/twin-")
@@ -215,7 +215,7 @@ def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
 def test_a_recipe_whose_models_are_all_taught_elsewhere_draws_test_rows_alone(asks):
     recipe = asks()
     alone = dataclasses.replace(recipe, models=recipe.models[-1:])
-    assert {part.question.split for part in shards(alone)} == {"test"}
+    assert {part.shard.split for part in shards(alone)} == {"test"}
 
 
 def test_a_recipe_may_pass_on_what_a_third_one_trains(asks, files):

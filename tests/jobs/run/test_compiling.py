@@ -15,7 +15,7 @@ def names(tasks):
 
 
 def test_a_task_asks_for_what_it_uses_alone(tasks):
-    training_rows = [t for t in tasks if t.stage == "generate" and t.question.truth.estimator == "node_table"]
+    training_rows = [t for t in tasks if t.stage == "generate" and t.shard.truth.estimator == "node_table"]
     assert names(training_rows) == {"node_table"}
     assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
     assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"quadrature", "prefiltered"}

@@ -18,7 +18,7 @@ from pipeline.truth.options import TruthOptions
 ROWS = 40
 
 
-def questions():
+def query_columns():
     rng = np.random.default_rng(2)
     ones = np.ones(ROWS)
     wi = {"wi_x": 0.6 * ones, "wi_y": 0.0 * ones, "wi_z": 0.8 * ones}
@@ -28,10 +28,10 @@ def questions():
 
 @pytest.fixture
 def twillight(capsys, monkeypatch, tmp_path):
-    """Run the verb in a folder with a file of questions; return exit code, output and complaint."""
+    """Run the verb in a folder with a file of queries; return exit code, output and complaint."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    pq.write_table(pa.table(questions()), "queries.parquet")
+    pq.write_table(pa.table(query_columns()), "queries.parquet")
 
     def call(*tokens, fabric="denim"):
         code = main(["evaluate", fabric, *tokens])
@@ -60,7 +60,7 @@ def test_a_summary_tells_what_was_done(twillight, tmp_path):
 
 
 def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
-    columns = questions()
+    columns = query_columns()
     columns["sigma"][3] = 0.0
     pq.write_table(pa.table(columns), tmp_path / "queries.parquet")
     code, text, complaint = twillight("queries.parquet", "--out", "result.parquet", "--skip-bad")
@@ -95,7 +95,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, t
     (tmp_path / "file").write_text("no table")
     content = (tmp_path / "queries.parquet").read_bytes()
     (tmp_path / "cut.parquet").write_bytes(content[:-100])
-    columns = questions()
+    columns = query_columns()
     columns["wi_z"][[4, 9]] = 3.0
     pq.write_table(pa.table(columns), tmp_path / "bad.parquet")
     before = sorted(path.name for path in tmp_path.iterdir())
@@ -125,7 +125,7 @@ def test_ctrl_c_says_that_nothing_was_written(twillight, tmp_path, monkeypatch):
 def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(twillight, tmp_path):
     """The process kills itself after half of the rows, with rows already handed to the writer."""
     code = (
-        "import os, signal, pipeline.shards.questions as q, pipeline.shards.evaluate as e\n"
+        "import os, signal, pipeline.shards.query_file as q, pipeline.shards.evaluate as e\n"
         "from pathlib import Path; from weaves.fabric import load_fabric\n"
         "from pipeline.truth.options import TruthOptions\n"
         "q.ROW_GROUP = 8\n"

@@ -128,10 +128,10 @@ def test_torch_compiles_a_module_and_any_thread_may_call_it():
     method = Linear(np.arange(12).reshape(4, 3), constant=2.0)
     run = RunBy(method, "compile")
     run.prepare(DENIM)
-    questions = [asked(rows) for rows in (1, 50, 600)]
+    several = [asked(rows) for rows in (1, 50, 600)]
     with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(lambda queries: run.predict(DENIM, queries), questions))
-    for queries, answers in zip(questions, found, strict=True):
+        found = list(pool.map(lambda queries: run.predict(DENIM, queries), several))
+    for queries, answers in zip(several, found, strict=True):
         np.testing.assert_allclose(answers, method.predict(DENIM, queries), rtol=1e-5, atol=1e-5)
 
 

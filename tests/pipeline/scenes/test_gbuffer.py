@@ -1,4 +1,4 @@
-"""Places and questions: two lights on the same places, one of them behind."""
+"""Places and queries: two lights on the same places, one of them behind."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def gbuffer():
     )
 
 
-def test_questions_repeat_their_places(gbuffer):
+def test_queries_repeat_their_places(gbuffer):
     queries = gbuffer.queries((4, 4))
     assert queries.u.tolist() == [3.0, 0.0, 3.0] and queries.v.tolist() == [3.0, 0.0, 3.0]
     assert queries.sigma_minor.tolist() == [0.5, 1.5, 0.5]
@@ -54,7 +54,7 @@ def test_lights_add_up_over_what_is_seen_through(gbuffer):
     assert picture[~gbuffer.mask] == pytest.approx(background[~gbuffer.mask])
 
 
-def test_each_question_takes_its_own_sides_colours(gbuffer):
+def test_each_query_takes_its_own_sides_colours(gbuffer):
     voile = load_fabric("voile")
     components = np.ones((3, 4))
     mixed = shade(voile, components, gbuffer.transmitted)

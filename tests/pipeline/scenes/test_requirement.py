@@ -1,4 +1,4 @@
-"""What a scene asks: ranges that hold its questions, and nothing that never occurs."""
+"""What a scene asks: ranges that hold its queries, and nothing that never occurs."""
 
 import numpy as np
 import pytest

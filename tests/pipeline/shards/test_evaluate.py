@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import pipeline.shards.evaluate as evaluate_module
-import pipeline.shards.questions as questions_module
+from pipeline.shards import query_file
 from pipeline.shards.evaluate import Summary, bad_list, evaluate_file
 from pipeline.shards.schema import QUERY_COLUMNS, STANDARD_ERRORS
 from pipeline.truth.conventions import COMPONENTS
@@ -26,7 +26,7 @@ ROWS = 300
 SEED = 5
 
 
-def questions(rows=ROWS, seed=1):
+def query_columns(rows=ROWS, seed=1):
     """Return the least columns that a file needs, in float64."""
     rng = np.random.default_rng(seed)
     columns = {"u": rng.random(rows) * 4, "v": rng.random(rows) * 4, "sigma": np.exp(rng.normal(size=rows))}
@@ -46,7 +46,7 @@ def expected(columns, start=0):
 
 
 class Case:
-    """A file of questions in a folder of its own, and its result."""
+    """A file of queries in a folder of its own, and its result."""
 
     def __init__(self, folder):
         self.queries, self.out = folder / "queries.parquet", folder / "deep" / "result.parquet"
@@ -86,7 +86,7 @@ def same(table, answers, rows=slice(None)):
 
 
 def test_the_answers_are_those_of_estimate_and_other_columns_are_carried_along(case):
-    columns = questions()
+    columns = query_columns()
     tags = pa.array([f"tag {k % 3}" for k in range(ROWS)]).dictionary_encode()
     nested = pa.array([[k] if k % 2 else None for k in range(ROWS)])
     given = pa.table({"id": np.arange(ROWS), "tag": tags, **columns, "nested": nested})
@@ -99,7 +99,7 @@ def test_the_answers_are_those_of_estimate_and_other_columns_are_carried_along(c
 
 
 def test_a_result_read_alone_is_understood(case):
-    case.write(questions(3)).run()
+    case.write(query_columns(3)).run()
     schema = case.result().schema
     about = json.loads(schema.metadata[b"twillight"])
     assert about["truth"] == OPTIONS.model_dump(mode="json") and about["seed"] == SEED
@@ -112,7 +112,7 @@ def test_a_result_read_alone_is_understood(case):
 @pytest.mark.parametrize("estimator", ["owen", "auto"])
 def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, monkeypatch, estimator):
     case.options = OPTIONS.model_copy(update={"estimator": estimator})
-    columns = questions()
+    columns = query_columns()
     columns["wi_z"][::5] *= -1.0
     columns["wo_z"][::7] *= -1.0
     case.write(columns).run()
@@ -123,7 +123,7 @@ def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, mon
     case.write(columns, row_group_size=17).run()
     assert case.result().equals(table)
     # Blocks that end inside row groups.
-    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
+    monkeypatch.setattr(query_file, "ROW_GROUP", 64)
     case.run(chunk=10)
     assert case.result().equals(table)
 
@@ -132,8 +132,8 @@ def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, mon
 def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
     """Blocks of 64 rows in chunks of 5 from both sides, lit from both, some rows bad."""
     case.options = OPTIONS.model_copy(update={"estimator": estimator})
-    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
-    columns = questions()
+    monkeypatch.setattr(query_file, "ROW_GROUP", 64)
+    columns = query_columns()
     columns["wi_z"][::5] *= -1.0
     columns["wo_z"][::7] *= -1.0
     columns["sigma"][[9, 10, 200]] = 0.0
@@ -151,7 +151,7 @@ def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
 def test_what_stops_a_thread_stops_everything(case):
     """The table knows nothing of tiny footprints: the first such row in the file is named, whoever meets it first."""
     case.options = OPTIONS.model_copy(update={"estimator": "node_table"})
-    columns = questions()
+    columns = query_columns()
     columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 1.0)
     with pytest.raises(BadInput, match="row 150"):
         case.write(columns).run(chunk=10, threads=4)
@@ -160,7 +160,7 @@ def test_what_stops_a_thread_stops_everything(case):
 
 @pytest.mark.parametrize("row_group_size", [10, 1000])
 def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, monkeypatch, row_group_size):
-    case.write(questions(), row_group_size)
+    case.write(query_columns(), row_group_size)
     blocks, asked = [], []
 
     def spy(fabric, queries, options, seed, start):
@@ -169,11 +169,11 @@ def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, mo
 
     def held(block, *rest):
         blocks.append((block.num_rows, block.nbytes))
-        return questions_module.questions_of(block, *rest)
+        return query_file.checked_queries(block, *rest)
 
-    monkeypatch.setattr(questions_module, "ROW_GROUP", 64)
+    monkeypatch.setattr(query_file, "ROW_GROUP", 64)
     monkeypatch.setattr(evaluate_module, "estimate", spy)
-    monkeypatch.setattr(evaluate_module, "questions_of", held)
+    monkeypatch.setattr(evaluate_module, "checked_queries", held)
     case.run(chunk=16)
     assert [rows for rows, _ in blocks] == [64, 64, 64, 64, 44]
     assert max(nbytes for _, nbytes in blocks) <= 9 * (64 * 8 + 64 // 8)  # nine columns, and a bit a null
@@ -181,7 +181,7 @@ def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, mo
 
 
 def test_single_precision_and_missing_columns_are_what_they_stand_for(case):
-    columns = questions()
+    columns = query_columns()
     case.write(columns).run()
     table = case.result()
     single = {name: np.asarray(column, np.float32) for name, column in columns.items()}
@@ -196,7 +196,7 @@ def test_single_precision_and_missing_columns_are_what_they_stand_for(case):
 
 
 def test_places_far_off_keep_their_digits_in_double_precision(case):
-    columns = questions()
+    columns = query_columns()
     columns["u"], columns["v"] = (np.round(columns[name] * 2**20) / 2**20 for name in ("u", "v"))
     case.write(columns).run()
     near = case.result()
@@ -206,8 +206,8 @@ def test_places_far_off_keep_their_digits_in_double_precision(case):
 
 
 def spoilt():
-    """Return questions with six bad rows, and what is wrong with each."""
-    columns = questions()
+    """Return queries with six bad rows, and what is wrong with each."""
+    columns = query_columns()
     columns["sigma"][7] = -1.0
     columns["sigma"][8] = 1e-60
     columns["u"][120] = math.nan
@@ -243,19 +243,19 @@ def test_bad_rows_are_skipped_listed_and_change_no_other_row(case):
     result, good = case.result(), np.ones(ROWS, bool)
     good[[index for index, *_ in faults]] = False
     np.testing.assert_array_equal(result["count"].is_valid().to_numpy(), good)
-    same(result, expected(questions()).take(good), good)
+    same(result, expected(query_columns()).take(good), good)
     # The same bytes in any chunks, and an empty list where nothing is bad.
     first = case.out.read_bytes()
     case.run(skip_bad=True, chunk=3)
     assert case.out.read_bytes() == first
-    case.write(questions()).run(skip_bad=True)
+    case.write(query_columns()).run(skip_bad=True)
     assert bad_list(case.out).read_text().splitlines() == ["row,column,value,reason"]
 
 
 def test_files_without_a_good_row_are_answered(case):
-    assert case.write({name: column[:0] for name, column in questions().items()}).run().rows == 0
+    assert case.write({name: column[:0] for name, column in query_columns().items()}).run().rows == 0
     assert case.result().num_rows == 0
-    columns = questions(4) | {"sigma": np.zeros(4)}
+    columns = query_columns(4) | {"sigma": np.zeros(4)}
     summary = case.write(columns).run(skip_bad=True)
     assert summary.bad == 4 and math.isnan(summary.median_relative_error)
     assert case.result()["count"].null_count == 4
@@ -275,14 +275,14 @@ def test_files_without_a_good_row_are_answered(case):
     ],
 )
 def test_files_that_ask_nothing_are_refused(case, change, said):
-    assert said in case.write(change(pa.table(questions()))).refused()
+    assert said in case.write(change(pa.table(query_columns()))).refused()
 
 
 def test_files_that_are_not_whole_are_refused(case):
     assert "no such file" in case.refused()
     case.queries.write_text("u,v\n1,2\n")
     assert "not a whole Parquet file" in case.refused()
-    content = case.write(questions()).queries.read_bytes()
+    content = case.write(query_columns()).queries.read_bytes()
     case.queries.write_bytes(content[: len(content) // 2])
     assert "not a whole Parquet file" in case.refused()
     case.queries.write_bytes(b"")
@@ -290,7 +290,7 @@ def test_files_that_are_not_whole_are_refused(case):
 
 
 def test_a_page_that_was_damaged_leaves_nothing(case):
-    pq.write_table(pa.table(questions(20_000)), case.queries, write_page_checksum=True, compression="none")
+    pq.write_table(pa.table(query_columns(20_000)), case.queries, write_page_checksum=True, compression="none")
     content = bytearray(case.queries.read_bytes())
     content[len(content) // 2] ^= 1
     case.queries.write_bytes(content)
@@ -301,7 +301,7 @@ def test_a_page_that_was_damaged_leaves_nothing(case):
 
 
 def test_outputs_that_cannot_be_written_are_refused_before_any_work(case, monkeypatch, tmp_path):
-    case.write(questions())
+    case.write(query_columns())
     monkeypatch.setattr(evaluate_module, "estimate", None)
     before = case.queries.read_bytes()
     (tmp_path / "link.parquet").symlink_to(case.queries)
@@ -312,7 +312,7 @@ def test_outputs_that_cannot_be_written_are_refused_before_any_work(case, monkey
 
 
 def test_an_evaluation_that_is_stopped_leaves_what_was_there(case, monkeypatch):
-    case.write(questions()).run()
+    case.write(query_columns()).run()
     before = case.out.read_bytes()
 
     def stop(share):

@@ -93,7 +93,7 @@ def test_identity_follows_optics_and_not_colours():
     assert TASK.model_copy(update={"start": 0}).identity() != TASK.identity()
 
 
-def test_splits_and_fabrics_ask_different_questions(folder):
+def test_splits_and_fabrics_draw_different_queries(folder):
     generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
     first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
     assert not np.intersect1d(first.u, second.u).size

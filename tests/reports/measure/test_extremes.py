@@ -95,7 +95,7 @@ def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
         return answers
 
     found = measured(Scaled(spoil=spoil))
-    # Near and far: 18 questions a footprint, each twice.
+    # Near and far: 18 queries a footprint, each twice.
     assert found["", "extreme_not_finite"].value == 2 * 2 * 18
     assert found["", "extreme_negative"].value == 2 * 18
     assert [size for size, _ in found["", "extreme_error"].curve] == [1e-2, 1.0, 1e4]

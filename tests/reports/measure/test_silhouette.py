@@ -26,7 +26,7 @@ DENIM = load_fabric("denim")
 
 
 class Flat:
-    """What a method without curvature answers: always the same, and it remembers the questions."""
+    """What a method without curvature answers: always the same, and it remembers the queries."""
 
     name, setting = "flat", ""
 

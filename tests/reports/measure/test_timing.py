@@ -8,7 +8,7 @@ from reports.measure.timing import Contender, affordable, set_threads, synchroni
 from reports.record import cores
 
 
-def questions(rows):
+def many_queries(rows):
     vectors = np.tile(np.float32([0, 0, 1]), (rows, 1))
     scalars = np.zeros(rows, np.float32)
     return [(None, Queries.round(scalars, scalars, scalars + 1, vectors, vectors))]
@@ -37,8 +37,8 @@ def method(clock, calls, label, durations):
 def test_methods_take_turns_after_the_warm_up():
     clock, calls = Clock(), []
     contenders = [
-        Contender(method(clock, calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), questions(10)),
-        Contender(method(clock, calls, "b", [10**9] * 4 + [500] * 22), questions(100) + questions(150)),
+        Contender(method(clock, calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), many_queries(10)),
+        Contender(method(clock, calls, "b", [10**9] * 4 + [500] * 22), many_queries(100) + many_queries(150)),
     ]
     a, b = time_side_by_side(contenders, repeats=11, warm_up=2, clock=clock)
     assert calls == ["a", "b", "b"] * 13
@@ -57,7 +57,7 @@ def test_on_several_threads_each_makes_the_call_at_the_same_time():
         names.add(threading.current_thread().name)
         barrier.wait()
 
-    (timing,) = time_side_by_side([Contender(predict, questions(10), threads=3)], repeats=2, warm_up=1)
+    (timing,) = time_side_by_side([Contender(predict, many_queries(10), threads=3)], repeats=2, warm_up=1)
     assert timing.rows == 30
     assert len(names) == 3
 
@@ -70,7 +70,7 @@ def test_slow_methods_answer_fewer_queries(cost, rows):
     def predict(fabric, queries):
         clock.now += cost * len(queries.u)
 
-    chosen = affordable(Contender(predict, questions(1000) * 2), longest=0.05, clock=clock)
+    chosen = affordable(Contender(predict, many_queries(1000) * 2), longest=0.05, clock=clock)
     assert [len(queries.u) for _, queries in chosen.queries] == [rows, rows]
 
 
@@ -81,8 +81,8 @@ def test_thread_counts_are_said_once():
 
 def test_real_time_passes():
     work = np.random.default_rng(0).random((60, 60))
-    slow = Contender(lambda fabric, queries: [work @ work for _ in range(20)], questions(1))
-    fast = Contender(lambda fabric, queries: None, questions(1))
+    slow = Contender(lambda fabric, queries: [work @ work for _ in range(20)], many_queries(1))
+    fast = Contender(lambda fabric, queries: None, many_queries(1))
     timed = time_side_by_side([slow, fast], repeats=20)
     assert timed[0].quartiles[1] > timed[1].quartiles[1] > 0
 

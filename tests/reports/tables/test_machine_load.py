@@ -8,7 +8,7 @@ import pytest
 from reports.measure.timing import Contender, time_side_by_side
 from reports.record import Record
 from reports.tables.machine_load import QUIET, busy, waited, waiting
-from tests.reports.measure.test_timing import questions
+from tests.reports.measure.test_timing import many_queries
 
 
 def spinning(seconds, share):
@@ -26,7 +26,10 @@ def spinning(seconds, share):
 def test_time_that_a_method_did_not_run_is_waiting():
     """Asleep for nine tenths: other work can only add to it, and its own running is a tenth at most."""
     idle, many = time_side_by_side(
-        [Contender(spinning(0.01, 0.1), questions(10)), Contender(spinning(0.01, 0.1), questions(10), threads=2)],
+        [
+            Contender(spinning(0.01, 0.1), many_queries(10)),
+            Contender(spinning(0.01, 0.1), many_queries(10), threads=2),
+        ],
         repeats=5,
         warm_up=1,
     )

@@ -24,7 +24,7 @@ def found(fallback=None, quadrature=(0.02, 1e5)):
     return predictions(SIZES, SHARES, 10_000, fallback or {"fast": 0.0, "exact": 0.0, "half": 0.0}, quadrature)
 
 
-def test_squared_errors_and_times_weigh_as_the_questions_occur():
+def test_squared_errors_and_times_weigh_as_the_queries_occur():
     table = found().set_index("method")
     assert table.loc["fast", "error"] == pytest.approx(math.sqrt(0.25 * 0.04 + 0.75 * 0.01))
     assert table.loc["exact", "ms"] == pytest.approx(1e-6 * 10_000 * (0.25 * 1000 + 0.75 * 500))

@@ -81,7 +81,7 @@ def test_the_same_work_gives_the_same_bytes(shot, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == shot[1].read_bytes()
 
 
-def test_a_picture_is_the_base_and_the_light_of_its_questions(shot):
+def test_a_picture_is_the_base_and_the_light_of_its_queries(shot):
     frames, _ = shot
     pictures = frames.pictures()
     assert pictures.shape == (3, 32, 40, 3) and np.isfinite(pictures).all() and (pictures >= 0).all()
@@ -162,7 +162,7 @@ def test_what_an_eye_sees_is_scored_where_it_can_be(shot, monkeypatch):
     assert 10 > found["x 1"]["fovvideovdp"].value > found["x 1.3"]["fovvideovdp"].value
 
 
-def test_a_frames_time_weighs_every_cloth_by_its_questions(shot, monkeypatch):
+def test_a_frames_time_weighs_every_cloth_by_its_queries(shot, monkeypatch):
     """With a clock that says 1, 2, 3, ... microseconds a query of the first, second, third cloth of a method."""
     frames, _ = shot
     counts = [len(cloth.frame) for cloth in frames.first().cloths]

@@ -52,7 +52,7 @@ def _whole(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def open_questions(path: Path) -> Iterator[pq.ParquetFile]:
+def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
     """Open a Parquet file whose pages are verified as they are read.
 
     Raises
@@ -112,7 +112,7 @@ def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong:
     asked = [name for name in QUERY_COLUMNS if name in file.schema_arrow.names]
     first, count, start = None, 0, 0
     for block in blocks(path, file, asked):
-        _, bad = questions_of(block, start, repeat, wrong)
+        _, bad = checked_queries(block, start, repeat, wrong)
         first = first or next(iter(bad), None)
         count += len(bad)
         start += len(block)
@@ -122,7 +122,7 @@ def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong:
         raise BadInput(str(path), f"row {first.row}, column {first.column}", first.value, allowed)
 
 
-def questions_of(
+def checked_queries(
     block: pa.Table, start: int, repeat: tuple[int, int], wrong: Faults = faults
 ) -> tuple[Queries, list[BadRow]]:
     """Return a block's queries in single precision and its bad rows.
@@ -143,9 +143,9 @@ def questions_of(
             # A place far off would lose its digits: fold it into the repeat first.
             far = np.isfinite(column) & (single[name] != column)
             single[name][far] = np.fmod(column[far], repeat[name == "v"]).astype(np.float32)
-    questions = queries_of(single)
-    return questions, [
-        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(wrong(questions).items())
+    batch = queries_of(single)
+    return batch, [
+        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(wrong(batch).items())
     ]
 
 
