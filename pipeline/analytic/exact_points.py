@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, independent_pair, r2_pair
 from pipeline.truth.monte_carlo import add_point, place_point, query_directions
@@ -42,7 +42,7 @@ class PointSampler:
         return sum(array.nbytes for array in self.model.front if isinstance(array, np.ndarray))
 
 
-@kernel
+@allocating_kernel
 def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool) -> Float32:
     rows = len(columns.u)
     mean = np.zeros((rows, 4), np.float32)

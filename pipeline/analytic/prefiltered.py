@@ -22,7 +22,7 @@ import numpy as np
 
 from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab_float32 import reflection
 from weaves.fabric import Fabric
@@ -127,7 +127,7 @@ def pyramid(fabric: Fabric, texels_per_yarn: int) -> Pyramid:
     )
 
 
-@kernel
+@allocating_kernel
 def _answer(
     maps: Pyramid, u: Float32, v: Float32, deviation: Float32, wi: Float32, wo: Float32, widening: int
 ) -> Float32:

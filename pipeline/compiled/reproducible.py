@@ -64,8 +64,11 @@ _subroutines: dict[frozenset[str], dict[Any, Any]] = {}
 
 
 def _compile_by_flags(self: BaseContext, *arguments: Any, **keywords: Any) -> Any:
-    """Compile what numba writes in Python itself, once for each set of fast-math flags instead of once for all."""
-    flags = frozenset(getattr(self.fastmath, "flags", ()))
+    """Compile what numba writes in Python itself, once for each set of flags instead of once for all.
+
+    The flags are those of fast mathematics, and whether references to arrays are counted.
+    """
+    flags = frozenset({*getattr(self.fastmath, "flags", ()), *(("nrt",) if self.enable_nrt else ())})
     self.cached_internal_func = _subroutines.setdefault(flags, {})
     return _compile_subroutine(self, *arguments, **keywords)
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
@@ -96,7 +96,7 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
     return seen
 
 
-@kernel
+@allocating_kernel
 def sample_rows(
     cloth: ClothSide,
     columns: Columns,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import fast_kernel, kernel
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel
 from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
@@ -20,7 +20,7 @@ A multiplication with an addition is one; so is a maximum, a comparison or a cho
 """
 
 
-@kernel
+@allocating_kernel
 def evaluate_points(model: ClothSide, table: Table, columns: Columns, visibility: bool) -> tuple[float, int]:
     """Evaluate all nodes for every query: specular, and with `visibility` all else; return their sum and count."""
     nodes = table.normal.shape[1]

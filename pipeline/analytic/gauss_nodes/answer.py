@@ -54,7 +54,7 @@ from pipeline.analytic.horizon_points.shading import (
 )  # fmt: skip
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
 from pipeline.compiled.arrays import Float32, Mask
-from pipeline.compiled.decorators import fast_kernel, kernel
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
 from pipeline.truth.footprint.place import EVENLY
@@ -110,7 +110,7 @@ class GaussNodesTable:
         return self.map.bytes_stored() + sum(array.nbytes for array in self.nodes)
 
 
-@kernel
+@allocating_kernel
 def _answer(
     table: HorizonMap,
     fixed: GaussNodes,

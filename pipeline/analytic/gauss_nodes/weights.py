@@ -20,7 +20,9 @@ def even_densities(weights: Float32, s: np.float32, out: Float32) -> None:
     """Write the limit of `axis_densities` for a wide Gaussian: the nodes' weights, times its mean density."""
     share = s * np.float32(math.sqrt(2.0 * math.pi)) / np.float32(len(out))
     for c in range(len(out)):
-        out[c] = weights * share
+        for rule in range(len(weights)):
+            for k in range(weights.shape[1]):
+                out[c, rule, k] = weights[rule, k] * share
 
 
 @fast_kernel

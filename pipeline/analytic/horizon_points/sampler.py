@@ -34,7 +34,7 @@ from pipeline.analytic.horizon_points.shading import (
     shade_all,
 )  # fmt: skip
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.footprint.place import EVENLY
@@ -80,7 +80,7 @@ class HorizonSampler:
         return self.map.bytes_stored()
 
 
-@kernel
+@allocating_kernel
 def _sample(
     table: HorizonMap,
     u: Float32,

@@ -23,7 +23,7 @@ import numpy as np
 
 from pipeline.analytic.importance.point import flake_scatter_pdf, sample_flake_scatter
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import r2_pair
@@ -59,7 +59,7 @@ class Lobes(NamedTuple):
     cosine: Float64
 
 
-@kernel
+@allocating_kernel
 def find_lobes(
     model: ClothSide,
     columns: Columns,
@@ -137,7 +137,7 @@ def _widen(tangent: Float64, alpha: Float64, share: Float64, families: Index, wi
         alpha[broad], share[broad] = min(math.sqrt(rough * rough + apart), 1.0), BROAD * whole
 
 
-@kernel
+@allocating_kernel
 def draw(lobes: Lobes, wo: Float64, random: Float64) -> Float64:
     """Return a unit wi for each query, (N, 3), from three numbers in [0, 1), (N, 3)."""
     found = np.zeros((len(wo), 3))
@@ -161,7 +161,7 @@ def draw(lobes: Lobes, wo: Float64, random: Float64) -> Float64:
     return found
 
 
-@kernel
+@allocating_kernel
 def densities(lobes: Lobes, wi: Float64, wo: Float64) -> Float64:
     """Return the density with which `draw` finds each unit wi, (N,), in 1/sr over the whole sphere."""
     found = np.zeros(len(wo))

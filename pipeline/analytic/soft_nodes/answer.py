@@ -28,7 +28,7 @@ from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fix
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_axis
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
 
@@ -47,7 +47,7 @@ _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
-@kernel
+@allocating_kernel
 def sum_queries(
     table: Table,
     u: Float32,

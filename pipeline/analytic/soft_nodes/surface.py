@@ -57,13 +57,23 @@ def piece_rows(yarn: Float64, piece: Piece, across: Rule, along: Rule) -> Float6
     half_along = 0.5 * np.repeat(np.diff(along.borders), columns)
     bound = min(piece.steepest, STEEPEST)
     fibre = Fibre(float(own[SIN_TWIST]), float(own[COS_TWIST]), float(own[BETA]))
-    return _rows(
-        sines, places, half_across, half_along, float(radius), float(piece.sign * piece.curve), float(bound), fibre
+    found = np.zeros((ROWS, len(sines)))
+    _fill_rows(
+        sines,
+        places,
+        half_across,
+        half_along,
+        float(radius),
+        float(piece.sign * piece.curve),
+        float(bound),
+        fibre,
+        found,
     )
+    return found
 
 
 @fast_kernel
-def _rows(
+def _fill_rows(
     sines: Float64,
     places: Float64,
     half_across: Float64,
@@ -72,9 +82,9 @@ def _rows(
     curvature: float,
     limit: float,
     fibre: Fibre,
-) -> Float64:
-    """Return the rows of all nodes of a piece of yarn, (ROWS, nodes)."""
-    found = np.zeros((ROWS, len(sines)))
+    found: Float64,
+) -> None:
+    """Write the rows of all nodes of a piece of yarn, (ROWS, nodes)."""
     for k in range(len(sines)):
         cos_v = math.sqrt((1.0 - sines[k]) * (1.0 + sines[k]))
         angles, inner = bend(sines[k], cos_v, radius, places[k], curvature, limit)
@@ -87,4 +97,3 @@ def _rows(
         for axis in range(3):
             by_u, by_v = turning(_AXES[axis, 0], _AXES[axis, 1], _AXES[axis, 2], t, angles, fibre)
             found[7 + axis, k], found[10 + axis, k] = step_u * by_u, step_v * by_v
-    return found

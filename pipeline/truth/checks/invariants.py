@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.checks.check_result import ROUNDING, CheckResult, exact, largest, quotient, worst
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.estimator import ESTIMATORS, estimate
@@ -245,7 +245,7 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
     return found
 
 
-@kernel
+@allocating_kernel
 def _lattice(
     cloth: ClothSide,
     columns: Columns,

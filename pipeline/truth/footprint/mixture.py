@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.query import Queries
 
 
@@ -86,7 +86,7 @@ def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Float32,
     return x, y, correlation
 
 
-@kernel
+@allocating_kernel
 def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""
     found = np.empty((3, len(major)))

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Mask
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.geometry.heightfield import (
     AXIS_DROP,
     BEND_RADIUS,
@@ -170,7 +170,7 @@ def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: flo
     return best
 
 
-@kernel
+@allocating_kernel
 def horizons(
     field: HeightField,
     x: Float64,

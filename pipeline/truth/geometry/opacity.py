@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
@@ -115,7 +115,7 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
     return not (has_gaps(front) and _passes(front, back, x, y, towards))
 
 
-@kernel
+@allocating_kernel
 def _opacity_rows(
     cloth: ClothSide,
     columns: Columns,
@@ -215,7 +215,7 @@ def opacity(
     return mean.astype(np.float32), error.astype(np.float32)
 
 
-@kernel
+@allocating_kernel
 def _grazing_rows(
     field: HeightField,
     u: Float64,

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.footprint.mixture import Line
 from pipeline.truth.footprint.place import GAUSSIAN
@@ -106,7 +106,7 @@ def node_directions(wi: Float64, wo: Float64, azimuths: int) -> NodeDirections:
     )
 
 
-@kernel
+@allocating_kernel
 def sum_rows(
     cloth: ClothSide,
     table: Table,
@@ -200,8 +200,9 @@ def _sum_pieces(
         a, c = _weigh_piece(cloth, table, towards, shares, start, stop, family)
         if family == GAP:
             shares.speculars[start:stop] = _0
-            shares.areas[start:stop] = towards.oz * shares.lit[start:stop]
-            shares.margins[start:stop] = shares.lit_margins[start:stop]
+            for k in range(start, stop):
+                shares.areas[k] = towards.oz * shares.lit[k]
+                shares.margins[k] = shares.lit_margins[k]
             a = c / towards.oz
             sums[4] += a
         else:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
     BEND,
@@ -220,7 +220,7 @@ def _positions(
     return grids[0], grids[1], grids[2], grids[3]
 
 
-@kernel
+@allocating_kernel
 def _surface(field: HeightField, x: Float64, y: Float64) -> Float32:
     """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
     found = np.zeros((7, len(x)), np.float32)

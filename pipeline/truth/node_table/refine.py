@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
@@ -28,7 +28,7 @@ UNSEEN: Final = 0.002
 _NEGLIGIBLE: Final = 1e-5
 
 
-@kernel
+@allocating_kernel
 def refine(
     cloth: ClothSide,
     table: Table,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 
 
 class NodeShares(NamedTuple):
@@ -34,7 +34,7 @@ class NodeShares(NamedTuple):
     lit_margins: Float32
 
 
-@kernel
+@allocating_kernel
 def no_shares(nodes: int) -> NodeShares:
     """Return arrays for so many nodes, all 0."""
     return NodeShares(
@@ -48,7 +48,7 @@ def no_shares(nodes: int) -> NodeShares:
     )
 
 
-@kernel
+@allocating_kernel
 def with_weight(shares: NodeShares, weight: Float32) -> NodeShares:
     """Return shares that use other weights; the remaining arrays are the same."""
     return NodeShares(

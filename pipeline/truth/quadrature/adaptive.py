@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, Raw
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.symmetry import first_cells
@@ -53,7 +53,7 @@ _SLIVER: Final = 2.0  # n nodes an axis miss slivers of light and shade of 2 n^-
 _WORST: Final = 0.0625  # parts with this share of the worst one's squared error are refined with it
 
 
-@kernel
+@allocating_kernel
 def integrate_rows(
     cloth: ClothSide,
     columns: Columns,
@@ -154,7 +154,7 @@ def integrate_rows(
     return means, errors, counts
 
 
-@kernel
+@allocating_kernel
 def _all_parts(
     pieces: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, x_pieces: Float64, y_pieces: Float64
 ) -> Float64:

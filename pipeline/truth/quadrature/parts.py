@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Mask
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
@@ -49,7 +49,7 @@ class Axis(NamedTuple):
     repeat: float
 
 
-@kernel
+@allocating_kernel
 def rectangles(field: HeightField, wanted_cells: Mask) -> Float64:
     """Return the rectangles on which the fabric is smooth, (P, 6), that begin in the cells wanted.
 

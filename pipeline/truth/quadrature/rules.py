@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide
 from pipeline.truth.geometry.heightfield import GAP, WEFT
 from pipeline.truth.quadrature.parts import A0, A1, B0, B1, BOX_WEIGHT, HALF, KIND, MIDDLE, Axis, density
@@ -60,7 +60,7 @@ def _shares(cloth: ClothSide, directions: Directions, part: Float64, a: float, b
     return state
 
 
-@kernel
+@allocating_kernel
 def integrate(
     cloth: ClothSide,
     directions: Directions,

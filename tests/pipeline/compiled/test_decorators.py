@@ -4,6 +4,7 @@ Kernels of a small copy, and the real ones in a slow test, in fresh processes: t
 read the cache, and every process uses the kernels in an order of its own.
 """
 
+import ast
 import os
 import shutil
 import subprocess
@@ -18,7 +19,7 @@ ROOT = Path(__file__).parents[3]
 # the same function as `fast`, with an operation that numba writes in Python (`x**2`).
 KERNELS = """
 import numpy as np
-from pipeline.compiled.decorators import fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_kernel, kernel
 
 @kernel
 def shared(x):
@@ -54,7 +55,7 @@ def smooth(x, out):
         for k in range(len(x) - 1):
             out[j] += np.sqrt(abs(x[k] * x[k + 1] + np.float32(0.3) * x[k] * x[j])) / (np.float32(1.7) + x[k] * x[k])
 
-@fast_kernel
+@allocating_kernel
 def twice(x):
     out = np.zeros(5, np.float32)
     smooth(x[:48], out)
@@ -181,6 +182,87 @@ print(*sorted({name.rpartition("-")[0].rpartition(".")[2] for name in names}))
 
 def test_each_kernel_is_announced_when_it_is_compiled(copies):
     assert answers(start(copies[0], NAMES)).split() == ["fast", "inverse_length", "shared"]
+
+
+ARRAYS = """
+import numpy as np
+from pipeline.compiled.decorators import allocating_kernel, kernel
+
+@kernel
+def total(x, first, last):
+    part, sum_ = x[first:last], 0.0
+    for k in range(len(part)):
+        sum_ += part[k] ** 2
+    return sum_
+
+@allocating_kernel
+def totals(x, rows):
+    found = np.zeros(rows)
+    for k in range(rows):
+        found[k] = total(x[k], k, k + 2)
+    return found
+
+@kernel
+def slice_of(x):
+    return x[1:3]
+
+@kernel
+def slice_in_a_tuple(x):
+    return 1, (x[1:3], 2)
+
+@kernel
+def allocates(x):
+    return np.zeros(3)[0] + x[0]
+"""
+
+
+def test_arrays_are_counted_where_they_are_made_and_nowhere_else(copies):
+    (copies[0] / "pipeline" / "truth" / "small.py").write_text(ARRAYS)
+    script = """
+import sys
+import numba
+import numpy as np
+from pipeline.truth.small import *
+
+x = np.arange(20.0).reshape(4, 5)
+before = sys.getrefcount(x), sys.getrefcount(row := x[0])
+made = totals(x, 4)
+assert np.array_equal(made, [(x[k, k : k + 2] ** 2).sum() for k in range(4)])
+assert total(row, 1, 3) == 5 and (sys.getrefcount(x), sys.getrefcount(row)) == before
+print("NRT_incref" in "".join(total.inspect_llvm().values()), "NRT_MemInfo" in "".join(totals.inspect_llvm().values()))
+for wrong in (slice_of, slice_in_a_tuple, allocates):
+    try:
+        print(wrong(row))
+    except (TypeError, numba.errors.NumbaError):
+        print("refused")
+"""
+    assert answers(start(copies[0], script)).split() == ["False", "True", *["refused"] * 3]
+
+
+def test_kernels_that_borrow_arrays_call_none_that_returns_them():
+    """The caller would have to release such an array, and does not count."""
+    decorated = {}
+    for path in (ROOT / "pipeline").rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.decorator_list:
+                decorators = {ast.unparse(decorator) for decorator in node.decorator_list}
+                if any(name.endswith("kernel") for name in decorators):
+                    decorated[path, node.name] = node, "allocating_kernel" in decorators
+    assert len(decorated) > 150
+    makers = {
+        name
+        for (_, name), (node, allocates) in decorated.items()
+        if allocates and ast.unparse(node.returns) not in ("None", "int", "float", "bool")
+    }
+    assert "no_shares" in makers and "refine" not in makers
+    for (path, name), (node, allocates) in decorated.items():
+        if not allocates:
+            called = {
+                call.func.id
+                for call in ast.walk(node)
+                if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+            }
+            assert not called & makers, f"{path}: {name} calls {called & makers}"
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from pipeline.analytic.importance.point import flake_scatter_pdf, flake_scatter_weight, sample_flake_scatter
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.sequences import independent_pair, owen_pair
 from pipeline.truth.scattering.microflake import density, sigma
 from pipeline.truth.scattering.slab import reflection, transmission
@@ -32,7 +32,7 @@ PAIRS = {
 CONFIGURATIONS = [(alpha, pair) for alpha in (0.1, 0.3, 1.0) for pair in PAIRS]
 
 
-@kernel
+@allocating_kernel
 def _directions(w, t, alpha, key, count, even):
     """Return `count` sampled directions, from independent or from evenly spread random numbers."""
     directions = np.empty((count, 3))
@@ -42,7 +42,7 @@ def _directions(w, t, alpha, key, count, even):
     return directions
 
 
-@kernel
+@allocating_kernel
 def _cell_integrals(w, t, alpha, rows, columns, nodes):
     """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints.
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.sequences import derive, mix, owen_pair, uniform
 
 LEVEL = 1e-4
 
 
-@kernel
+@allocating_kernel
 def _pairs(key, count):
     points = np.empty((count, 2))
     for k in range(count):
@@ -18,7 +18,7 @@ def _pairs(key, count):
     return points
 
 
-@kernel
+@allocating_kernel
 def _uniforms(key, count, dimension):
     numbers = np.empty(count)
     for k in range(count):
