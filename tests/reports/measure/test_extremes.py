@@ -128,7 +128,7 @@ def test_the_table_keeps_the_worst_and_lustrous_cloth_apart():
     (row,) = extremes_table([*records, subject.of("mse", 1.0, 9)]).to_dict("records")
     assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
     assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
-    assert (row["not_finite"], row["asked"], row["negative"]) == (4, 180, 0)
+    assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
 
 
 def methods():
