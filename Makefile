@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/installed
 
-.PHONY: report run list plan generate check train bench status savings readme results test test-slow lint clean
+.PHONY: report run list plan generate check train bench status savings readme results test tests test-slow lint clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -38,9 +38,12 @@ results: RECIPE = standard
 results: $(READY)
 	@$(BIN)/twillight results $(RECIPE) --file reports/RESULTS.md
 
-# Linters, types, and the tests in one process a core. Every test process computes on one thread.
-test: lint
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow" --numprocesses logical --maxprocesses 8 --dist loadscope
+# Linters and types beside the tests, which have one process a core. Every test process computes on one thread.
+test: $(READY)
+	@$(MAKE) --no-print-directory --jobs 2 lint tests
+
+tests: $(READY)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow" --numprocesses logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 # The tests marked slow: long statistics, every kernel compiled from nothing, every recipe made small. Takes long.
 test-slow: $(READY)

@@ -14,8 +14,8 @@ ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa:
 
 @pytest.fixture(scope="module")
 def tasks():
-    """The measurements of a recipe that has every kind."""
-    recipes = (load_recipe("smoke"), load_recipe("curved"))
+    """The measurements of recipes that together have every kind."""
+    recipes = map(load_recipe, ("smoke", "standard", "curved"))
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 

@@ -102,6 +102,12 @@ def written(page_input, tmp_path_factory):
     return folder, Page(index.read_text(encoding="utf-8"))
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Leave plots empty: drawing takes most of the time of a page, and tests of words and tables do not look at them."""
+    monkeypatch.setattr("reports.page.page.render", lambda plot, scheme, *data: b"")
+
+
 def test_page_is_whole_and_needs_nothing_else(written):
     folder, page = written
     assert page.files
@@ -142,6 +148,7 @@ def test_the_front_is_named_and_shown(written):
     assert set(front.loc[~front["front"], "method"]) == {"neumip"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_methods_that_learn_nothing_make_no_headline(page_input, tmp_path):
     note = ModelNote("woven", "a rule", kind="gauss_nodes")
     models = [note, *page_input.models[1:]]
@@ -149,6 +156,7 @@ def test_methods_that_learn_nothing_make_no_headline(page_input, tmp_path):
     assert "Woven reaches" not in page.words and "NeuMIP reaches" in page.words
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_silhouettes_are_shown_where_they_were_measured(written, page_input, tmp_path):
     assert "silhouettes" not in written[1].ids and "#silhouettes" not in written[1].targets
     subject = Record(method="curved", fabric="denim", role="seen")
@@ -202,6 +210,7 @@ def test_a_page_of_nothing_claims_nothing(page_input, tmp_path):
     assert all((tmp_path / link).is_file() for link in page.files)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path):
     assert "stability" not in written[1].ids
     assert "#stability" not in written[1].targets
@@ -221,6 +230,7 @@ def test_stability_is_shown_where_it_was_measured(written, page_input, tmp_path)
     assert page.words.count("float32") == 1
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_methods_at_their_extremes_are_shown_and_what_was_not_run_is_said(page_input, tmp_path):
     subject = Record(method="woven", setting="eager-bf16")
     records = [
@@ -239,6 +249,7 @@ def test_methods_at_their_extremes_are_shown_and_what_was_not_run_is_said(page_i
     assert len(pd.read_csv(tmp_path / "tables" / "extremes.csv")) == 1
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_lies_between_fabrics_is_shown_where_it_was_measured(written, page_input, tmp_path):
     assert "latents" not in written[1].ids and "#latents" not in written[1].targets
     subject = Record(method="woven", fabric="denim")
@@ -258,6 +269,7 @@ def test_what_lies_between_fabrics_is_shown_where_it_was_measured(written, page_
     assert table["share"].tolist() == [*SHARES, *SHARES[::-1]]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_accuracy_costs_is_shown_where_it_was_measured(written, page_input, tmp_path):
     assert "accuracy" not in written[1].ids
     accuracies = [
@@ -331,6 +343,7 @@ def test_scenes_show_intervals_noise_frames_and_maps(scenes, tmp_path):
     assert "pyfvvdp was not installed" in words
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_same_scenes_give_the_same_tables(scenes, tmp_path):
     for name in ("one", "two"):
         write_page(tmp_path / name, scenes)
