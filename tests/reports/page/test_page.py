@@ -104,7 +104,7 @@ def written(page_input, tmp_path_factory):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Leave plots empty: drawing takes most of the time of a page, and tests of words and tables do not look at them."""
+    """Leave plots empty: they take most of the time of a page, and tests of words and tables do not look at them."""
     monkeypatch.setattr("reports.page.page.render", lambda plot, scheme, *data: b"")
 
 
