@@ -42,7 +42,8 @@ def _model(entry, folder):
     if CLASSES[entry["model"]].learns:
         training = TrainingOptions(**entry.get("training", {})).model_dump()
         least = {"steps": 8, "batch": 64, "checkpoint_every": 4, "validation_rows": 128}
-        entry["training"] = _scaled(training, least)
+        # Smaller batches are noisier, and the warm-up is a step or two: at the whole rate a training may diverge.
+        entry["training"] = _scaled(training, least) | {"learning_rate": 0.1 * training["learning_rate"]}
     return entry
 
 
