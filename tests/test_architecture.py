@@ -275,11 +275,8 @@ LARGER = {
     "pipeline.analytic.soft_nodes.shade.shade_fixed",
     "pipeline.analytic.soft_nodes.shade.shade_footprint",
     "pipeline.analytic.soft_nodes.weights.wave_weights",
-    "pipeline.truth.node_table.kernels.reflected",
-    "pipeline.truth.node_table.kernels.transmitted",
-    "pipeline.truth.node_table.kernels.weigh",
 }
-"""Kernels that exceed the limit: bundled arguments cost them about a quarter of their speed (reports/LOG.md)."""
+"""Kernels that still exceed the limit; bundled arguments cost them no speed (reports/LOG.md)."""
 
 
 def test_functions_have_few_parameters_and_lines():

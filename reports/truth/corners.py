@@ -13,6 +13,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pipeline.truth.node_table import kernels
+from pipeline.truth.node_table.directions import Direction
+from pipeline.truth.node_table.kernels import Layer, Normals, Tangents
 from pipeline.truth.scattering import microflake, slab
 from reports.truth import formulas
 from reports.truth.formulas import Array, Vector
@@ -133,9 +135,10 @@ def node_slab(corners: Corners, behind: bool) -> Array:
         t = [part[k : k + 1] for part in corners.t]
         sign = np.float32(-1 if behind else 1)
         wi, wo = [sign * part[k] for part in corners.wi], [part[k] for part in corners.wo]
-        optics = (alpha**2, corners.thickness[k], 1 / max(size, 1e-12), alpha**3 / (4 * math.pi))
-        scalars = [np.float32(number) for number in optics]
-        result[k] = function(0 * one, 0 * one, one, one, *t, *wi, *wo, *scalars, one, 0 * one)
+        layer = Layer(*(np.float32(x) for x in (alpha**2, corners.thickness[k], alpha**3 / (4 * math.pi))))
+        inverse = np.float32(1 / max(size, 1e-12))
+        level, tangent = Normals(0 * one, 0 * one, one, one), Tangents(*t)
+        result[k] = function(level, tangent, _direction(wi), _direction(wo), inverse, layer, one, 0 * one)
     return result
 
 
@@ -146,9 +149,14 @@ def node_crossing(corners: Corners) -> Array:
     result = np.zeros(len(corners.alpha))
     for k, alpha in enumerate(corners.alpha.tolist()):
         t, wo = [part[k : k + 1] for part in corners.t], [part[k] for part in corners.wo]
-        scalars = np.float32(alpha**2), corners.thickness[k]
-        result[k] = function(0 * one, 0 * one, one, *t, *wo, *scalars, one)
+        layer = Layer(np.float32(alpha**2), corners.thickness[k], np.float32(0))
+        result[k] = function(Normals(0 * one, 0 * one, one, one), Tangents(*t), _direction(wo), layer, one)
     return result
+
+
+def _direction(w: list[np.float32]) -> Direction:
+    """Return a direction for loops over nodes that read no horizon."""
+    return Direction(w[0], w[1], w[2], slope=np.float32(0), first=0, second=0, turn=np.float32(0))
 
 
 def around_axis(random: np.random.Generator, count: int, apart: float = 0.0) -> tuple[Vector, Vector]:

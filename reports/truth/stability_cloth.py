@@ -13,6 +13,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX, BOX_SIDE, place
 from pipeline.truth.geometry import heightfield
 from pipeline.truth.node_table import kernels
+from pipeline.truth.node_table.directions import Direction
+from pipeline.truth.node_table.kernels import Layer, Normals, Tangents
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.truth import formulas
@@ -83,9 +85,10 @@ def sums() -> list[Finding]:
     random = np.random.default_rng(8)
     none, one = np.zeros(_PIECE, np.float32), np.ones(_PIECE, np.float32)
     total: Callable[..., Any] = kernels.crossing
-    scalars = np.array(
-        [0, 0, 1, 1, 0], np.float32
-    )  # the direction, alpha^2, and a layer of no thickness: areas are summed
+    zero, unit = np.float32(0), np.float32(1)
+    normal, tangent = Normals(none, none, one, one), Tangents(none, none, none)
+    # The viewer is above, and the layer has no thickness: areas are summed.
+    viewer, layer = Direction(zero, zero, unit, zero, 0, 0, zero), Layer(unit, zero, zero)
     for corner, terms, listed in (
         # Every piece is wrong alike, by half the rounding of each addition in a row at most.
         ("4 M terms alike", np.full(_TERMS, 0.1, np.float32), _PIECE / _LANES * _ROUNDING / 2),
@@ -94,7 +97,7 @@ def sums() -> list[Finding]:
     ):
         value = 0.0
         for piece in terms.reshape(-1, _PIECE):
-            value += total(none, none, one, none, none, none, *scalars, piece)
+            value += total(normal, tangent, viewer, layer, piece)
         naive = np.cumsum(terms)[-1:]
         truth = [math.fsum(terms.tolist())]
         inputs = {"terms": [_TERMS]}

@@ -24,9 +24,10 @@ from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import FINE_LINE
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.node_table.answer import _sum_pieces, node_directions
+from pipeline.truth.node_table.answer import _sum_pieces
 from pipeline.truth.node_table.build import COLUMNS, FAMILY, ROWS, START
 from pipeline.truth.node_table.cascade import WIDE
+from pipeline.truth.node_table.directions import node_directions
 from pipeline.truth.node_table.kernels import SMOOTH
 from pipeline.truth.node_table.refine import UNSEEN
 from pipeline.truth.node_table.shares import no_shares, with_weight

@@ -2,5 +2,5 @@
 
 cascade is `auto`: a coarse table, a fine one, sampling. tables keeps the nodes of the last cloths; build makes them.
 answer sums over nodes for each query, refine samples the nodes on borders of shadows. weights spreads a footprint over
-nodes; kernels has the loops over nodes, shares their arrays.
+nodes; kernels has the loops over nodes, shares their arrays, directions the light and viewer.
 """

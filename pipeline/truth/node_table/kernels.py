@@ -6,12 +6,14 @@ array holds one number a node of a piece. The loops have no branch and no call l
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.truth.node_table.directions import Direction
+from pipeline.truth.node_table.shares import NodeShares
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 SMOOTH: Final = np.float32(0.0005)
@@ -25,50 +27,77 @@ _JUMP = np.float32(3.0)
 _TINY = np.float32(1e-30)
 
 
+class Normals(NamedTuple):
+    """Unit normals of nodes, float32 (N,), and 1 / z."""
+
+    x: Float32
+    y: Float32
+    z: Float32
+    inverse: Float32
+
+
+class Tangents(NamedTuple):
+    """Unit tangents of the fibres at nodes, float32 (N,)."""
+
+    x: Float32
+    y: Float32
+    z: Float32
+
+
+class Horizons(NamedTuple):
+    """Slopes of the nodes' horizons at the two azimuths around a direction, float32 (N,)."""
+
+    first: Float32
+    second: Float32
+
+
+class Layer(NamedTuple):
+    """The layer of flakes on a piece of yarn.
+
+    Attributes
+    ----------
+    square : float32
+        alpha^2.
+    thickness : float32
+        Optical thickness.
+    scale : float32
+        alpha^3 / (4 pi), divided by the number of fine nodes in a node.
+    """
+
+    square: np.float32
+    thickness: np.float32
+    scale: np.float32
+
+
 @fast_kernel
 def weigh(
-    nx: Float32,
-    ny: Float32,
-    nz: Float32,
-    inverse: Float32,
-    weight: Float32,
-    ix: np.float32,
-    iy: np.float32,
-    iz: np.float32,
-    ox: np.float32,
-    oy: np.float32,
-    oz: np.float32,
-    slope_i: np.float32,
-    low_i: Float32,
-    high_i: Float32,
-    turn_i: np.float32,
-    slope_o: np.float32,
-    low_o: Float32,
-    high_o: Float32,
-    turn_o: np.float32,
+    normal: Normals,
+    light: Direction,
+    light_horizon: Horizons,
+    viewer: Direction,
+    viewer_horizon: Horizons,
     blend: np.float32,
-    lit: Float32,
-    areas: Float32,
-    diffuses: Float32,
-    margins: Float32,
-    lit_margins: Float32,
+    shares: NodeShares,
 ) -> tuple[np.float32, np.float32]:
-    """Write each node's weight if it is seen and lit, and its shares of area and diffuse; return the sums of both.
+    """Write which nodes are lit, their shares of area and diffuse, and their margins; return the sums of both shares.
 
     The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not.
     """
     area, diffuse = _0, _0
-    for k in range(len(weight)):
-        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
-        cos_i = ix * nx[k] + iy * ny[k] + iz * nz[k]
-        margin_o = slope_o - low_o[k] - turn_o * (high_o[k] - low_o[k])
-        margin_i = min(min(slope_i - low_i[k] - turn_i * (high_i[k] - low_i[k]), cos_i), margin_o)
-        visible = weight[k] if margin_o > _0 else _0
-        both = weight[k] if margin_i > _0 else _0
-        projected = cos_o * inverse[k]
+    for k in range(len(shares.weight)):
+        cos_o = max(viewer.x * normal.x[k] + viewer.y * normal.y[k] + viewer.z * normal.z[k], _0)
+        cos_i = light.x * normal.x[k] + light.y * normal.y[k] + light.z * normal.z[k]
+        low, high = viewer_horizon.first[k], viewer_horizon.second[k]
+        margin_o = viewer.slope - low - viewer.turn * (high - low)
+        low, high = light_horizon.first[k], light_horizon.second[k]
+        margin_i = min(min(light.slope - low - light.turn * (high - low), cos_i), margin_o)
+        visible = shares.weight[k] if margin_o > _0 else _0
+        both = shares.weight[k] if margin_i > _0 else _0
+        projected = cos_o * normal.inverse[k]
         a = visible * projected
-        c = both * projected * (blend * cos_i + (_1 - blend) * iz)
-        lit[k], areas[k], diffuses[k], margins[k], lit_margins[k] = both, a, c, margin_o, margin_i
+        c = both * projected * (blend * cos_i + (_1 - blend) * light.z)
+        shares.lit[k], shares.areas[k], shares.diffuses[k] = both, a, c
+        shares.margins[k], shares.lit_margins[k] = margin_o, margin_i
         area += a
         diffuse += c
     return area, diffuse
@@ -131,10 +160,10 @@ def _crossing(
 
 @inlined_fast_kernel
 def _products(
-    wx: np.float32, wy: np.float32, wz: np.float32, tx: np.float32, ty: np.float32, tz: np.float32
+    w: Direction, tx: np.float32, ty: np.float32, tz: np.float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Return w x t and w.t."""
-    return wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx, wx * tx + wy * ty + wz * tz
+    return w.y * tz - w.z * ty, w.z * tx - w.x * tz, w.x * ty - w.y * tx, w.x * tx + w.y * ty + w.z * tz
 
 
 @inlined_fast_kernel
@@ -146,42 +175,32 @@ def _sigma(x: np.float32, y: np.float32, z: np.float32, along: np.float32, squar
 
 @fast_kernel
 def reflected(
-    nx: Float32,
-    ny: Float32,
-    nz: Float32,
-    inverse: Float32,
-    tx: Float32,
-    ty: Float32,
-    tz: Float32,
-    ix: np.float32,
-    iy: np.float32,
-    iz: np.float32,
-    ox: np.float32,
-    oy: np.float32,
-    oz: np.float32,
-    square: np.float32,
-    thickness: np.float32,
+    normal: Normals,
+    tangent: Tangents,
+    light: Direction,
+    viewer: Direction,
     size: np.float32,
-    scale: np.float32,
+    layer: Layer,
     lit: Float32,
     speculars: Float32,
 ) -> np.float32:
     """Add each node's share of the reflected specular component to `speculars`; return the sum.
 
-    `square` is alpha^2, `size` one over the squared length of wi + wo, `scale` alpha^3 / (4 pi) over the finer nodes.
+    `size` is 1 / |wi + wo|^2.
     """
     total = _0
     for k in range(len(lit)):
-        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
-        cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
+        nx, ny, nz = normal.x[k], normal.y[k], normal.z[k]
+        cos_o = max(viewer.x * nx + viewer.y * ny + viewer.z * nz, _0)
+        cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
         # The half vector's products with the tangent are sums of those of wi and wo.
-        ax, ay, az, along_i = _products(ix, iy, iz, tx[k], ty[k], tz[k])
-        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
+        ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
+        bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
         vx, vy, vz, along = ax + bx, ay + by, az + bz, along_i + along_o
-        q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
-        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, square), _sigma(bx, by, bz, along_o, square)
-        flakes = lit[k] * scale * inverse[k]
-        value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, thickness)
+        q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
+        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
+        flakes = lit[k] * layer.scale * normal.inverse[k]
+        value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
         speculars[k] += value
         total += value
     return total
@@ -189,62 +208,39 @@ def reflected(
 
 @fast_kernel
 def transmitted(
-    nx: Float32,
-    ny: Float32,
-    nz: Float32,
-    inverse: Float32,
-    tx: Float32,
-    ty: Float32,
-    tz: Float32,
-    ix: np.float32,
-    iy: np.float32,
-    iz: np.float32,
-    ox: np.float32,
-    oy: np.float32,
-    oz: np.float32,
-    square: np.float32,
-    thickness: np.float32,
+    normal: Normals,
+    tangent: Tangents,
+    light: Direction,
+    viewer: Direction,
     size: np.float32,
-    scale: np.float32,
+    layer: Layer,
     lit: Float32,
     speculars: Float32,
 ) -> np.float32:
-    """Do the same for light from behind, of which (ix, iy, iz) is the opposite, -wi."""
+    """Do the same for light from behind, of which `light` is the opposite, -wi."""
     total = _0
     for k in range(len(lit)):
-        cos_o = max(ox * nx[k] + oy * ny[k] + oz * nz[k], _0)
-        cos_i = max(ix * nx[k] + iy * ny[k] + iz * nz[k], _0)
-        ax, ay, az, along_i = _products(ix, iy, iz, tx[k], ty[k], tz[k])
-        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
+        nx, ny, nz = normal.x[k], normal.y[k], normal.z[k]
+        cos_o = max(viewer.x * nx + viewer.y * ny + viewer.z * nz, _0)
+        cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
+        ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
+        bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
         vx, vy, vz, along = bx - ax, by - ay, bz - az, along_o - along_i
-        q = size * (square * (vx * vx + vy * vy + vz * vz) + along * along)
-        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, square), _sigma(bx, by, bz, along_o, square)
-        flakes = lit[k] * scale * inverse[k]
-        value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, thickness)
+        q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
+        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
+        flakes = lit[k] * layer.scale * normal.inverse[k]
+        value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
         speculars[k] += value
         total += value
     return total
 
 
 @fast_kernel
-def crossing(
-    nx: Float32,
-    ny: Float32,
-    nz: Float32,
-    tx: Float32,
-    ty: Float32,
-    tz: Float32,
-    ox: np.float32,
-    oy: np.float32,
-    oz: np.float32,
-    square: np.float32,
-    thickness: np.float32,
-    areas: Float32,
-) -> np.float32:
+def crossing(normal: Normals, tangent: Tangents, viewer: Direction, layer: Layer, areas: Float32) -> np.float32:
     """Return the unscattered light through the layer, the sum of exp(-T Lambda) times each node's share of the area."""
     total = _0
     for k in range(len(areas)):
-        cos_o = ox * nx[k] + oy * ny[k] + oz * nz[k]
-        bx, by, bz, along_o = _products(ox, oy, oz, tx[k], ty[k], tz[k])
-        total += areas[k] * unscattered(_sigma(bx, by, bz, along_o, square), cos_o, thickness)
+        cos_o = viewer.x * normal.x[k] + viewer.y * normal.y[k] + viewer.z * normal.z[k]
+        bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
+        total += areas[k] * unscattered(_sigma(bx, by, bz, along_o, layer.square), cos_o, layer.thickness)
     return total

@@ -7,7 +7,18 @@ import pytest
 
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, height_field
 from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, tabulate
-from pipeline.truth.node_table.kernels import crossing, reflected, transmitted, weigh
+from pipeline.truth.node_table.directions import Direction
+from pipeline.truth.node_table.kernels import (
+    Horizons,
+    Layer,
+    Normals,
+    Tangents,
+    crossing,
+    reflected,
+    transmitted,
+    weigh,
+)
+from pipeline.truth.node_table.shares import no_shares
 from pipeline.truth.scattering import microflake, slab
 from weaves.fabric import load_fabric
 
@@ -23,6 +34,16 @@ part."""
 
 def unit(x, y):
     return np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
+
+
+def direction(w):
+    """Return a direction that rises by 1, half-way between two azimuths."""
+    return Direction(*w, slope=np.float32(1.0), first=0, second=1, turn=np.float32(0.5))
+
+
+def layer(field, family):
+    alpha = float(field.yarn[family, ALPHA])
+    return Layer(*(np.float32(x) for x in (alpha**2, field.thickness, alpha**3 / (4 * math.pi))))
 
 
 @pytest.fixture(scope="module")
@@ -76,12 +97,11 @@ def specular(cloth, case, behind, **factors):
     given = wi.astype(np.float64) * (-1 if behind else 1)
     size = np.float32(1.0 / ((given + wo) ** 2).sum())
     for family, _, fine in pieces(table):
-        alpha = float(field.yarn[family, ALPHA])
         parts = [np.ascontiguousarray(row[fine]) for row in table.fine]
         lit, shares = np.ones_like(parts[0]), np.zeros_like(parts[0])
         function = transmitted if behind else reflected
-        scalars = (alpha**2, field.thickness, size, alpha**3 / (4 * math.pi))
-        total = function(*parts, *wi, *wo, *(np.float32(x) for x in scalars), lit, shares)
+        surface, towards = (Normals(*parts[:4]), Tangents(*parts[4:])), (direction(wi), direction(wo))
+        total = function(*surface, *towards, size, layer(field, family), lit, shares)
         wide = np.stack(parts).astype(np.float64)
         expected = scattered(field, family, given, wo.astype(np.float64), wide[:3], wide[4:], wide[3], **factors)
         yield shares, total, expected
@@ -112,28 +132,23 @@ def test_area_diffuse_and_unscattered(cloth, case):
     field, table = cloth
     wi, wo = (unit(*w).astype(np.float32) for w in case)
     for family, nodes, fine in pieces(table):
-        normal = [np.ascontiguousarray(row[nodes]) for row in table.normal]
-        count = len(normal[0])
-        weight, low = np.ones(count, np.float32), np.full(count, -1e3, np.float32)
-        lit, areas, diffuses, margins, lit_margins = np.zeros((5, count), np.float32)
-        blend, rise, turn = np.float32(field.yarn[family, BLEND]), np.float32(1.0), np.float32(0.5)
-        found = weigh(
-            *normal, weight, *wi, *wo, rise, low, low, turn, rise, low, low, turn, blend, lit, areas, diffuses, margins,
-            lit_margins,
-        )  # fmt: skip
+        normal = Normals(*(np.ascontiguousarray(row[nodes]) for row in table.normal))
+        count = len(normal.x)
+        shares, low = no_shares(count), np.full(count, -1e3, np.float32)
+        shares.weight[:] = 1.0
+        flat, blend = Horizons(low, low), np.float32(field.yarn[family, BLEND])
+        found = weigh(normal, direction(wi), flat, direction(wo), flat, blend, shares)
         n, i, o = np.stack(normal[:3]).astype(np.float64), wi.astype(np.float64), wo.astype(np.float64)
         cos_i, area = i @ n, np.maximum(o @ n, 0.0) / n[2]
         own = float(field.yarn[family, BLEND])
         expected = np.where(cos_i > 0, area * (own * cos_i + (1.0 - own) * i[2]), 0.0)
-        np.testing.assert_allclose(areas, area, rtol=RTOL, atol=1e-6)
-        np.testing.assert_allclose(diffuses, expected, rtol=RTOL, atol=1e-6)
+        np.testing.assert_allclose(shares.areas, area, rtol=RTOL, atol=1e-6)
+        np.testing.assert_allclose(shares.diffuses, expected, rtol=RTOL, atol=1e-6)
         assert found == pytest.approx((area.sum(), expected.sum()), rel=RTOL)
 
-        tangent = [np.ascontiguousarray(row[fine]) for row in table.fine[4:]]
+        tangent = Tangents(*(np.ascontiguousarray(row[fine]) for row in table.fine[4:]))
         alpha = float(field.yarn[family, ALPHA])
-        crossed = crossing(
-            *normal[:3], *tangent, *wo, np.float32(alpha**2), np.float32(field.thickness), areas
-        )  # fmt: skip
+        crossed = crossing(normal, tangent, direction(wo), layer(field, family), shares.areas)
         t = np.stack(tangent).astype(np.float64)
         through = [
             slab.unscattered(microflake.sigma(*o, *t[:, k], alpha), float(o @ n[:, k]), field.thickness)
