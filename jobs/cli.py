@@ -1,6 +1,7 @@
 """Command line of twillight: the verbs in the order of work.
 
-Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C. A verb's
+Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C, 128 and the
+number of another signal that ends a process. A verb's
 modules are imported when it runs, so that help is fast.
 """
 
@@ -8,18 +9,24 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
 from weaves.errors import BadInput, WorkFailed
+
+if TYPE_CHECKING:
+    from jobs.run.cluster import Scheduler
 
 app = App(
     name="twillight",
@@ -34,10 +41,29 @@ app = App(
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
 Out = Annotated[Path, Parameter(help="Folder of all products.")]
-Scheduler = Annotated[str, Parameter(help="Address of a running dask scheduler; default: this machine.")]
-Workers = Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")]
 
 OUT = Path("out")
+
+_CONTINUES = "finished work is kept, and the same command continues"
+
+
+@dataclass(frozen=True)
+class WorkerFlags:
+    """Processes that do the tasks."""
+
+    workers: Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
+    scheduler: Annotated[
+        str, Parameter(help="Address or scheduler file of a running dask scheduler; default: this machine.")
+    ] = ""
+    tls_ca: Annotated[str, Parameter(help="Certificate of the scheduler's authority, a PEM file.")] = ""
+    tls_certificate: Annotated[str, Parameter(help="Own certificate for the scheduler, a PEM file.")] = ""
+    tls_key: Annotated[str, Parameter(help="Its key, a PEM file.")] = ""
+
+    def place(self) -> Scheduler:
+        """Return the scheduler as a run takes it."""
+        from jobs.run.cluster import Scheduler
+
+        return Scheduler(self.scheduler, self.tls_ca, self.tls_certificate, self.tls_key)
 
 
 @dataclass(frozen=True)
@@ -51,6 +77,9 @@ class TruthFlags:
     footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None
     frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
+
+
+On = Annotated[WorkerFlags, Parameter(name="*")]
 
 
 @app.command(name="list", sort_key=0)
@@ -100,11 +129,11 @@ def plan(recipe: RecipeName) -> None:
 
 
 @app.command(sort_key=4)
-def generate(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Compute the ground truth: the shards of a recipe's data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["generate"], out, scheduler, workers)
+    work(recipe, ["generate"], out, on.place(), on.workers)
 
 
 @app.command(sort_key=5)
@@ -154,11 +183,11 @@ def check(
 
 
 @app.command(sort_key=7)
-def train(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+def train(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Train the models of a recipe on its data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["train"], out, scheduler, workers)
+    work(recipe, ["train"], out, on.place(), on.workers)
 
 
 @app.command(sort_key=8)
@@ -172,35 +201,34 @@ def bench(
     ],
     *,
     out: Out = OUT,
-    scheduler: Scheduler = "",
-    workers: Workers = 0,
+    on: On = WorkerFlags(),
 ) -> None:
     """Measure error, aliasing and time of every method, or stability, speed and accuracy of the truth."""
     from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
-        bench_alone(recipe, out, scheduler, workers)
+        bench_alone(recipe, out, on.place(), on.workers)
         return
     from jobs.verbs.run import work
 
-    work(recipe, ["bench"], out, scheduler, workers)
+    work(recipe, ["bench"], out, on.place(), on.workers)
 
 
 @app.command(sort_key=9)
-def report(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+def report(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Write the page: pictures, tables and plots of all measurements."""
     from jobs.verbs.run import work
 
-    work(recipe, ["report"], out, scheduler, workers)
+    work(recipe, ["report"], out, on.place(), on.workers)
 
 
 @app.command(sort_key=10)
-def run(recipe: RecipeName, *, out: Out = OUT, scheduler: Scheduler = "", workers: Workers = 0) -> None:
+def run(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Generate, train, bench and report; finished tasks are skipped."""
     from jobs.plan.task import STAGES
     from jobs.verbs.run import work
 
-    work(recipe, STAGES, out, scheduler, workers)
+    work(recipe, STAGES, out, on.place(), on.workers)
 
 
 @app.command(sort_key=11)
@@ -272,11 +300,38 @@ def results(
     written(recipe, out, file, readme)
 
 
+class _Stopped(KeyboardInterrupt):
+    """A signal that ends a process, handled as Ctrl-C is."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"stopped by {signal.Signals(number).name}; {_CONTINUES}")
+        self.code = 128 + number
+
+
+@contextmanager
+def _signals() -> Iterator[None]:
+    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: object) -> None:
+        raise _Stopped(number)
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     tokens = sys.argv[1:] if tokens is None else tokens
     try:
-        answer = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        with _signals():
+            answer = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
     except CycloptsError as error:
@@ -284,7 +339,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
     except (BadInput, WorkFailed) as error:
         return _end(str(error), error.exit_code)
     except KeyboardInterrupt as stop:
-        return _end(str(stop) or "stopped; finished work is kept, and the same command continues", 130)
+        return _end(str(stop) or f"stopped; {_CONTINUES}", stop.code if isinstance(stop, _Stopped) else 130)
     except BrokenPipeError:
         # The reader of the output has closed it, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

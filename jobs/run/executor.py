@@ -9,12 +9,10 @@ A task that measures time runs in a process of its own (`jobs.run.alone`) while 
 
 from __future__ import annotations
 
-import logging
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from multiprocessing import resource_tracker
+import uuid
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,10 +20,11 @@ from rich.console import Console
 
 from jobs.plan.task import STAGES, Stage, Task, urgencies
 from jobs.run.alone import run_alone
-from jobs.run.child import ONE_THREAD, interrupts_held
+from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import KILLED, Outcome, one_line, work
 from jobs.run.progress import KERNELS, LOOK, TOPIC, Board, Compiling
+from jobs.run.receipt import measure
 from weaves.errors import BadInput, WorkFailed
 
 _SECONDS_BETWEEN_SIGNS = 0.2
@@ -63,7 +62,7 @@ def execute(
     out: Path,
     *,
     stages: Sequence[Stage] = STAGES,
-    scheduler: str = "",
+    scheduler: Scheduler = HERE,
     workers: int = 0,
     prepare: Callable[[Sequence[Task]], Sequence[Preparation]] = lambda todo: (),
     recorded: Callable[[Task], None] = lambda task: None,
@@ -79,8 +78,8 @@ def execute(
         Output folder; every worker must see it under this name.
     stages : sequence of str
         Stages to work on; what they need of others must be done.
-    scheduler : str
-        Address of a running dask scheduler; empty: a cluster on this machine, which ends with this process.
+    scheduler : Scheduler
+        A running dask scheduler; by default a cluster on this machine, which ends with this process.
     workers : int
         Worker processes of the local cluster, one thread each; 0: one a core.
     prepare : callable
@@ -92,9 +91,13 @@ def execute(
 
     Raises
     ------
+    BadInput
+        If the number of workers or the scheduler cannot be used.
     WorkFailed
-        If a needed task of another stage is not done, or the scheduler is lost.
+        If a needed task of another stage is not done, the workers cannot start, or the scheduler is lost.
     """
+    if not 0 <= workers <= MOST_WORKERS:
+        raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")
     out = out.resolve()
     ledger = Ledger(out)
     before = []
@@ -114,7 +117,8 @@ def execute(
 
     console = console or Console(stderr=True)
     urgency = urgencies(list(todo.values()))
-    with _client(scheduler, min(workers or os.cpu_count() or 1, len(todo))) as client:
+    run = uuid.uuid4().hex  # another run of the same task, with another folder, must not share its result
+    with connected(scheduler, min(workers or os.cpu_count() or 1, len(todo)), console) as client:
         if preparations := prepare(list(todo.values())):
             _prepare(client, preparations, console)
         with Board(list(todo.values()), console) as board:
@@ -126,10 +130,10 @@ def execute(
                 ended: list[tuple[Task, Outcome]] = []
                 for task in _admitted(ready, list(running.values()), slots=sum(client.nthreads().values())):
                     board.begin(todo.pop(task.id))
-                    if task.alone and not scheduler:
+                    if task.alone and not scheduler.address:
                         ended.append((task, run_alone(task, out, board)))
                     else:
-                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}")] = task
+                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}-{run}")] = task
                 if not running and not ended:
                     break  # what is left waits for tasks that failed
                 if not ended:
@@ -137,6 +141,7 @@ def execute(
                         board.waiting_for(running.values(), workers=len(client.nthreads()))
                     ended = [(running.pop(future), _outcome(future)) for future in futures]
                 for task, outcome in ended:
+                    outcome = _verified(task, outcome, out)
                     if outcome.reason:
                         ledger.fail(task, outcome.reason, outcome.traceback)
                         summary.failed.append(task)
@@ -211,6 +216,21 @@ def _work(task: Task, out: str) -> Outcome:
     return work(task, Path(out), progress)
 
 
+def _verified(task: Task, outcome: Outcome, out: Path) -> Outcome:
+    """Return the outcome, a failure if this process does not find the products that the worker measured."""
+    if outcome.reason:
+        return outcome
+    for path in task.products:
+        try:
+            found = measure(out / path)
+        except OSError:
+            reason = f"{path} was written where this process does not see it: every worker must see --out, {out}"
+            return outcome._replace(reason=reason)
+        if found != outcome.files[Path(path).name]:
+            return outcome._replace(reason=f"{path} is not the file that its worker wrote: every worker must see {out}")
+    return outcome
+
+
 def _outcome(future: Any) -> Outcome:
     """Return the outcome of a task, also if its worker could not report it."""
     from distributed import KilledWorker
@@ -236,48 +256,3 @@ def _ended(running: Iterable[Any]) -> list[Any]:
         raise WorkFailed(
             "the dask scheduler is gone; what was finished is kept, run the same command to go on"
         ) from error
-
-
-@contextmanager
-def _client(scheduler: str, workers: int) -> Iterator[Any]:
-    """Connect to a scheduler, or start a cluster that listens on the loopback alone and ends with this process."""
-    os.environ.setdefault(
-        "DASK_LOGGING__DISTRIBUTED", "critical"
-    )  # inherited by workers; dask reports every shutdown as a warning
-    import dask.config
-    from distributed import Client, LocalCluster
-
-    if scheduler:
-        try:
-            client = Client(scheduler, timeout="10s")  # type: ignore[no-untyped-call]
-        except (OSError, ValueError) as error:
-            raise BadInput("--scheduler", "", scheduler, "no dask scheduler answers at this address") from error
-        with client:
-            yield client
-        return
-    resource_tracker.ensure_running()  # when it is started later, it lets Ctrl-C through again
-    settings = {
-        # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
-        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
-        # A worker that is replaced slowly, or dies again, is not given up: its supervisor always starts another.
-        "distributed.deploy.lost-worker-timeout": "1000 days",
-    }
-    with dask.config.set(settings):
-        with interrupts_held():
-            cluster = LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address=None,
-                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
-                silence_logs=logging.CRITICAL,
-            )
-            client = Client(cluster)  # type: ignore[no-untyped-call]
-        try:
-            yield client
-        finally:
-            with interrupts_held():
-                client.close()  # type: ignore[no-untyped-call]
-                cluster.close()

@@ -11,23 +11,17 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from filelock import FileLock, Timeout
 
 from jobs.plan.task import Task
+from jobs.run.receipt import Product, Receipt, read_receipt
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
 State = Literal["done", "failed", "missing"]
-
-
-class Product(NamedTuple):
-    """A finished file: its hash and its size in bytes."""
-
-    sha256: str
-    bytes: int
 
 
 class Ledger:
@@ -39,18 +33,24 @@ class Ledger:
 
     def state(self, task: Task) -> State:
         """Return the state of a task, from its files."""
-        receipt = self._read(self._receipt(task))
+        receipt = self.receipt(task)
         if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products):
             return "done"
         return "failed" if self._note(task).exists() else "missing"
 
+    def receipt(self, task: Task) -> Receipt | None:
+        """Return a task's receipt; None if there is none, or no valid one."""
+        return read_receipt(self._receipt(task), task.id)
+
     def products(self, task: Task) -> dict[str, Product]:
         """Return the products of a done task by file name, as its receipt lists them."""
-        return {name: Product(**facts) for name, facts in self._read(self._receipt(task)).get("files", {}).items()}
+        receipt = self.receipt(task)
+        return receipt.files if receipt else {}
 
     def seconds(self, task: Task) -> float:
         """Return how long a done task took; 0 when it is not done."""
-        return float(self._read(self._receipt(task)).get("seconds", 0.0))
+        receipt = self.receipt(task)
+        return receipt.seconds if receipt else 0.0
 
     def reason(self, task: Task) -> str:
         """Return why a task failed; empty when it did not."""
@@ -58,8 +58,8 @@ class Ledger:
 
     def finish(self, task: Task, files: Mapping[str, Product], seconds: float) -> None:
         """Write a task's receipt and forget that it ever failed."""
-        listed = {name: product._asdict() for name, product in files.items()}
-        self._write(self._receipt(task), {**_heading(task), "files": listed, "seconds": round(seconds, 3)})
+        receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3))
+        self._write(self._receipt(task), receipt.model_dump())
         self._note(task).unlink(missing_ok=True)
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
@@ -72,8 +72,10 @@ class Ledger:
         Data sets share shards (the same id is the same bytes), yet each folder is whole, so that it can be copied
         away; a hard link costs no space.
         """
-        receipt = self._read(self._receipt(task))
-        for path in map(Path, task.products) if receipt else ():
+        receipt = self.receipt(task)
+        if receipt is None:
+            return False
+        for path in map(Path, task.products):
             if self._is_whole(self.out / path, receipt):
                 continue
             sources = sorted(self.out.glob(f"{path.parent.parent}/*/{path.name}"))
@@ -116,34 +118,29 @@ class Ledger:
         return self.folder / f"{task.id}.failed.json"
 
     @staticmethod
-    def _is_whole(path: Path, receipt: Mapping[str, Any], verify: bool = False) -> bool:
-        expected = receipt.get("files", {}).get(path.name)
+    def _is_whole(path: Path, receipt: Receipt, verify: bool = False) -> bool:
+        expected = receipt.files.get(path.name)
         try:
             return (
                 expected is not None
-                and path.stat().st_size == expected["bytes"]
-                and (not verify or file_sha256(path) == expected["sha256"])
+                and path.stat().st_size == expected.bytes
+                and (not verify or file_sha256(path) == expected.sha256)
             )
         except OSError:
             return False
 
     @staticmethod
     def _read(path: Path) -> dict[str, Any]:
-        """Return a file of the ledger; empty if it is missing or not readable."""
+        """Return the note of a failure; empty if it is missing or not readable."""
         try:
             content = json.loads(path.read_bytes())
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return {}
         return content if isinstance(content, dict) else {}
 
     @staticmethod
     def _write(path: Path, content: Mapping[str, Any]) -> None:
         atomic_write(path, json.dumps(content, indent=1).encode() + b"\n")
-
-
-def measure(path: Path) -> Product:
-    """Return the hash and size of a finished file."""
-    return Product(file_sha256(path), path.stat().st_size)
 
 
 def _heading(task: Task) -> dict[str, str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jobs.plan.task import Progress, Task
-from jobs.run.ledger import Product, measure
+from jobs.run.receipt import Product, measure
 from weaves.errors import BadInput, WorkFailed
 
 KILLED = "the process that ran it was killed several times over; is there enough memory?"

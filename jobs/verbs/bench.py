@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from jobs.run.cluster import HERE, Scheduler
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
@@ -37,7 +38,7 @@ def measured_alone(out: Path) -> dict[str, str]:
     return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
 
 
-def bench_alone(name: str, out: Path, scheduler: str = "", workers: int = 0) -> None:
+def bench_alone(name: str, out: Path, scheduler: Scheduler = HERE, workers: int = 0) -> None:
     """Run one of `BENCHES`.
 
     Raises
@@ -47,7 +48,7 @@ def bench_alone(name: str, out: Path, scheduler: str = "", workers: int = 0) -> 
     WorkFailed
         If an expression exceeds its limit.
     """
-    for option, value in (("--scheduler", scheduler), ("--workers", workers)):
+    for option, value in (("--scheduler", scheduler.address), ("--workers", workers)):
         if value:
             raise BadInput(f"bench {name}", option, value, "leave it out: the measurement runs in this process")
     BENCHES[name](out)

@@ -14,6 +14,7 @@ from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
+from jobs.run.cluster import Scheduler
 from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
@@ -23,7 +24,7 @@ from jobs.verbs.console import duration, number, table_of
 from weaves.errors import WorkFailed
 
 
-def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: str, workers: int) -> None:
+def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Scheduler, workers: int) -> None:
     """Run the unfinished tasks of some stages of a recipe and print a summary.
 
     Raises

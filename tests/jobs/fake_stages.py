@@ -23,6 +23,7 @@ class Fake(Task):
     dies: bool = False
     fails: str = ""
     forgets: bool = False
+    hides: bool = False
 
     @property
     def group(self):
@@ -34,7 +35,9 @@ class Fake(Task):
 
     @property
     def products(self):
-        return (f"{self.folder or self.stage}/{self.name}.txt",)
+        # A worker that sees another folder under the same name, as in a container.
+        folder = "elsewhere" if self.hides and os.environ.get("ELSEWHERE") else self.folder or self.stage
+        return (f"{folder}/{self.name}.txt",)
 
     @property
     def needs(self):

@@ -12,8 +12,10 @@ import psutil
 import pytest
 from rich.console import Console
 
+from jobs.run.cluster import Scheduler
 from jobs.run.executor import Preparation, execute
-from jobs.run.ledger import Ledger, measure
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import measure
 from weaves.errors import BadInput, WorkFailed
 
 HERE = Path(__file__).parents[1]
@@ -115,7 +117,7 @@ def test_work_left_out_before_is_named(tmp_path, fake):
 
 def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
     with pytest.raises(BadInput, match="no dask scheduler answers"):
-        execute(fake.chain(), tmp_path, scheduler="nonsense://", console=quiet())
+        execute(fake.chain(), tmp_path, scheduler=Scheduler("nonsense://"), console=quiet())
 
 
 def driver(out, plan="chain"):

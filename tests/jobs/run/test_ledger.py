@@ -1,10 +1,15 @@
 import json
+import tempfile
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from jobs.plan.task import Place, Task
-from jobs.run.ledger import Ledger, measure
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import Product, Receipt, measure, read_receipt
 from weaves.errors import BadInput, WorkFailed
 
 
@@ -64,6 +69,49 @@ def test_a_damaged_product_or_receipt_is_missing(done, damage):
         case "receipt empty":
             receipt.write_bytes(b"")
     assert done.state(TASK) == "missing"
+
+
+ODD = {
+    "no files": {"files": {}},
+    "a list of files": {"files": []},
+    "no size": {"files": {"part-x.parquet": {"sha256": "0" * 64}}},
+    "a negative size": {"files": {"part-x.parquet": {"sha256": "0" * 64, "bytes": -12}}},
+    "a size in words": {"files": {"part-x.parquet": {"sha256": "0" * 64, "bytes": "12"}}},
+    "no hash": {"files": {"part-x.parquet": {"sha256": "", "bytes": 12}}},
+    "time in words": {"seconds": "long"},
+    "no number": {"seconds": float("nan")},
+    "another task": {"task": "0" * 16},
+    "a key too many": {"more": 1},
+}
+
+
+@pytest.mark.parametrize("change", ODD.values(), ids=ODD)
+def test_an_odd_receipt_counts_as_missing(done, change):
+    path = done.folder / f"{TASK.id}.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    assert done.state(TASK) == "missing" and done.products(TASK) == {}
+
+
+@pytest.mark.parametrize("content", [b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)])
+def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
+    (done.folder / f"{TASK.id}.json").write_bytes(content)
+    assert done.state(TASK) == "missing" and not done.adopt(TASK)
+    (done.folder / f"{TASK.id}.failed.json").write_bytes(content)
+    assert done.reason(TASK) == ""
+
+
+@given(st.data())
+def test_no_flipped_byte_of_a_receipt_raises(data):
+    product = Product(sha256="ab" * 32, bytes=12)
+    whole = (
+        Receipt(task="a" * 16, stage="train", title="x", files={"y": product}, seconds=1.5).model_dump_json().encode()
+    )
+    place, mask = data.draw(st.integers(0, len(whole) - 1)), data.draw(st.integers(1, 255))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "receipt.json"
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ mask]) + whole[place + 1 :])
+        found = read_receipt(path, "a" * 16)
+    assert found is None or all(len(product.sha256) == 64 for product in found.files.values())
 
 
 def test_a_failure_keeps_its_reason_until_success(tmp_path, done):

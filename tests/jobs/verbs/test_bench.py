@@ -8,7 +8,8 @@ import pytest
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe, recipe_names
-from jobs.run.ledger import Ledger, measure
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import measure
 from jobs.verbs.bench import BENCHES, RECORDS, STABILITY, TRUTH, measured_alone
 from reports.record import read_records
 from reports.truth import accuracy, bias, effort, stability, throughput

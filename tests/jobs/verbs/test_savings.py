@@ -12,7 +12,8 @@ from jobs.plan.measurements.scene import OnScene
 from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
-from jobs.run.ledger import Ledger, measure
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import measure
 from jobs.verbs.require_recipe import write_recipe
 from jobs.verbs.savings import DIFFERENCE, Saving, Value, conclusion, saved
 from pipeline.scenes.requirement import Requirement

@@ -1,0 +1,161 @@
+"""Cluster: worker processes on this machine, or a dask scheduler that runs already.
+
+The cluster on this machine speaks TLS on the loopback, with a certificate that is made for the run and kept in memory.
+Only processes of the run hold it, so no other user of the machine can hand it work. Its ports answer nobody else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from rich.console import Console
+
+from jobs.run.child import ONE_THREAD, interrupts_held
+from weaves.errors import BadInput, WorkFailed
+
+MOST_WORKERS: Final = 1024
+"""Worker processes of a cluster on this machine, at most."""
+
+_SECONDS: Final = 5  # for a scheduler to answer
+_SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there is work
+
+
+class Scheduler(NamedTuple):
+    """A running scheduler.
+
+    Attributes
+    ----------
+    address : str
+        Its address, or the path of the file that it was started with (``dask scheduler --scheduler-file``); empty: a
+        cluster on this machine.
+    ca, certificate, key : str
+        Files for TLS: certificate of the authority, and this client's own certificate and key; empty: none.
+    """
+
+    address: str = ""
+    ca: str = ""
+    certificate: str = ""
+    key: str = ""
+
+
+HERE: Final = Scheduler()
+"""No scheduler: a cluster on this machine."""
+
+
+@contextmanager
+def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[Any]:
+    """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
+
+    The console is told when a scheduler has no worker yet.
+
+    Raises
+    ------
+    BadInput
+        If no scheduler answers, or it has no worker.
+    WorkFailed
+        If the processes of the cluster on this machine cannot start.
+    """
+    # Inherited by workers: dask reports every shutdown as a warning, and a lost scheduler as a traceback.
+    os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")
+    if scheduler.address:
+        with _external(scheduler, console) as client:
+            yield client
+    else:
+        with _local(workers) as client:
+            yield client
+
+
+@contextmanager
+def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
+    """Connect to a running scheduler that has a worker."""
+    from distributed import Client, Security
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    given = scheduler.address
+    files = {"--tls-ca": scheduler.ca, "--tls-certificate": scheduler.certificate, "--tls-key": scheduler.key}
+    for key, path in files.items():
+        if path and not Path(path).is_file():
+            raise BadInput(key, "", path, "is no file; a file in PEM format is needed")
+    security = None
+    if any(files.values()):
+        security = Security(  # type: ignore[no-untyped-call]
+            tls_ca_file=scheduler.ca or None,
+            tls_client_cert=scheduler.certificate or None,
+            tls_client_key=scheduler.key or None,
+            require_encryption=True,
+        )
+    try:
+        address = str(json.loads(Path(given).read_bytes())["address"]) if Path(given).is_file() else given
+        # A client alone would wait for minutes for a port that listens and never answers.
+        asyncio.run(_answer(address, security))
+        client = Client(address, timeout=_SECONDS, security=security)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
+        raise BadInput("--scheduler", "", given, "no dask scheduler answers at this address") from error
+    with client:
+        if not client.nthreads():  # type: ignore[no-untyped-call]
+            console.print(f"{given}: no worker yet; waiting up to {_SECONDS_FOR_A_WORKER} s for one", soft_wrap=True)
+            needed = client.submit(os.getpid, pure=False)  # so that a cluster that adapts starts one
+            try:
+                client.wait_for_workers(1, timeout=_SECONDS_FOR_A_WORKER)
+            except TimeoutError as error:
+                raise BadInput("--scheduler", "", given, "this scheduler has no worker: start one") from error
+            needed.result()
+        yield client
+
+
+async def _answer(address: str, security: Any) -> None:
+    """Wait until a scheduler answers; TimeoutError if it does not."""
+    from distributed.comm.core import connect
+
+    arguments = security.get_connection_args("client") if security else {}
+    comm = await asyncio.wait_for(connect(address, timeout=_SECONDS, **arguments), _SECONDS)  # type: ignore[no-untyped-call]
+    comm.abort()
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    """Start a cluster on the loopback."""
+    from multiprocessing import resource_tracker
+
+    import dask.config
+    from distributed import Client, LocalCluster, Security
+
+    resource_tracker.ensure_running()  # when it is started later, it lets Ctrl-C through again
+    settings = {
+        # In place of dask's own environment, whose MALLOC_TRIM_THRESHOLD_ makes every tensor a system call.
+        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
+        # A worker that is replaced slowly, or dies again, is not given up: its supervisor always starts another.
+        "distributed.deploy.lost-worker-timeout": "1000 days",
+    }
+    with dask.config.set(settings):
+        try:
+            with interrupts_held():
+                cluster = LocalCluster(  # type: ignore[no-untyped-call]
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    protocol="tls://",
+                    security=Security.temporary(),  # type: ignore[no-untyped-call]
+                    dashboard_address=None,
+                    scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                    memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
+                    silence_logs=logging.CRITICAL,
+                )
+                client = Client(cluster)  # type: ignore[no-untyped-call]
+        except (OSError, RuntimeError) as error:
+            reason = str(error).strip().splitlines()[:1] or [type(error).__name__]
+            raise WorkFailed(f"{workers} worker processes could not start: {reason[0]}") from error
+        try:
+            yield client
+        finally:
+            with interrupts_held():
+                client.close()  # type: ignore[no-untyped-call]
+                cluster.close()

@@ -1,0 +1,51 @@
+"""Receipt of a done task: its products with sizes and hashes. A file that is no valid receipt counts as missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pipeline.fingerprint import file_sha256
+
+_MOST_BYTES: Final = 1 << 20  # of a receipt; a task has a few products
+
+
+class Product(BaseModel):
+    """A finished file: its hash and its size in bytes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    bytes: Annotated[int, Field(ge=0)]
+
+
+class Receipt(BaseModel):
+    """What the ledger keeps of a done task."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    task: str
+    """Id of the task."""
+    stage: str
+    title: str
+    files: dict[str, Product]
+    """Products by file name."""
+    seconds: Annotated[float, Field(ge=0.0)]
+
+
+def read_receipt(path: Path, task: str) -> Receipt | None:
+    """Return the receipt of the task with this id; None if the file is missing, damaged or of another task."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        receipt = Receipt.model_validate_json(content) if len(content) <= _MOST_BYTES else None
+    except (OSError, ValidationError, RecursionError):
+        return None
+    return receipt if receipt and receipt.task == task else None
+
+
+def measure(path: Path) -> Product:
+    """Return the hash and size of a finished file."""
+    return Product(sha256=file_sha256(path), bytes=path.stat().st_size)
