@@ -38,6 +38,7 @@ ORDER = [
     "jobs.run",
     "jobs.verbs",
     "jobs.cli",
+    "jobs.entry",
 ]
 
 HOMES = {
