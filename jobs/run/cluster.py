@@ -53,7 +53,7 @@ HERE: Final = Scheduler()
 def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
 
-    The console is told when a scheduler has no worker yet.
+    A scheduler without a worker is reported on the console.
 
     Raises
     ------

@@ -22,7 +22,7 @@ class Product(BaseModel):
 
 
 class Receipt(BaseModel):
-    """What the ledger keeps of a done task."""
+    """Entry of the ledger for a done task."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
