@@ -265,10 +265,6 @@ MOST_PARAMETERS, MOST_LINES = 12, 100
 
 LARGER = {
     "pipeline.analytic.gauss_nodes.answer._answer",
-    "pipeline.analytic.gauss_nodes.answer._uncover",
-    "pipeline.analytic.horizon_points.horizon_map.locate",
-    "pipeline.analytic.horizon_points.sampler._place_rotated",
-    "pipeline.analytic.horizon_points.shading.shade",
     "pipeline.analytic.soft_nodes.answer.sum_queries",
     "pipeline.analytic.soft_nodes.footprint_nodes.gap_area",
     "pipeline.analytic.soft_nodes.footprint_nodes.place_nodes",

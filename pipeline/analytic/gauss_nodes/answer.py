@@ -17,42 +17,28 @@ from pipeline.analytic.gauss_nodes.footprint_nodes import BANDS, REACH, place_no
 from pipeline.analytic.gauss_nodes.nodes import GaussNodes, gauss_nodes
 from pipeline.analytic.gauss_nodes.weights import even_densities, product_weights
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
-from pipeline.analytic.horizon_points.shading import (
+from pipeline.analytic.horizon_points.rows import (
     AREA,
     BOTH,
-    CURVATURE,
     DIFFUSE,
-    DISTANCE,
     INTEGERS,
     IX,
     IY,
     IZ,
-    LIMIT,
-    NODE,
     OX,
     OY,
     OZ,
     ROWS,
     SEEN,
-    SINE,
     SIZE,
     SPECULAR,
     STEEPNESS,
-    STEP_V,
-    STEP_Y,
     WARPNESS,
     WEFTNESS,
     WEIGHT,
-    X,
-    Y,
-    fill_points,
-    gather,
-    plain_sum,
-    query_rows,
-    shade,
-    shade_all,
-)  # fmt: skip
-from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
+)
+from pipeline.analytic.horizon_points.shading import fill_points, gather, plain_sum, query_rows, shade, shade_all
+from pipeline.analytic.soft_horizons import SoftHorizons, above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel
 from pipeline.truth.cloth import cloth_side
@@ -130,7 +116,6 @@ def _answer(
     result = np.zeros((rows, 4), np.float32)
     ends, picks = table.repeat[0], table.repeat[1]
     nodes = table.grid * table.grid
-    flat = table.pieces.reshape(table.pieces.size)
     wide, own_weight = fixed.points.copy(), np.zeros(count, np.float32)
     values, shared = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     kinds, most = fixed.positions.shape
@@ -141,12 +126,9 @@ def _answer(
     cells = np.zeros(max(ends, picks), np.uint32)
     line = np.zeros((4, most), np.float32)
     line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
-    # Rows of the fixed nodes, taken once: counting references to slices would cost more than few nodes do.
     ix, iy, iz, ox, oy, oz, size = wide[IX], wide[IY], wide[IZ], wide[OX], wide[OY], wide[OZ], wide[SIZE]
-    sine, distance, curvature, limit = wide[SINE], wide[DISTANCE], wide[CURVATURE], wide[LIMIT]
-    warpness, weftness, step_v, step_y = wide[WARPNESS], wide[WEFTNESS], wide[STEP_V], wide[STEP_Y]
     seen, both, areas, diffuse, specular = wide[SEEN], wide[BOTH], wide[AREA], wide[DIFFUSE], wide[SPECULAR]
-    warp, weft, thickness = table.yarn[0], table.yarn[1], table.thickness
+    warpness, weftness = wide[WARPNESS], wide[WEFTNESS]
     positions, weights, pieces, copies = fixed.positions, fixed.weights, fixed.pieces, fixed.copies
     mean, steepness, evenly = fixed.mean, fixed.steepness, fixed.evenly
     azimuths, sharpness = table.azimuths, np.float32(1.0 if soft else 1e9)
@@ -186,16 +168,12 @@ def _answer(
                 i0, i1, turn_i = azimuth_rows(wi[row, 0], wi[row, 1], azimuths)
                 o0, o1, turn_o = azimuth_rows(wo[row, 0], wo[row, 1], azimuths)
                 alike, right, opposite = azimuths_apart(wi[row, 0], wi[row, 1], wo[row, 0], wo[row, 1])
-                _uncover(
-                    mean[i0], mean[i1], np.float32(turn_i), wi[row, 2], mean[o0], mean[o1], np.float32(turn_o),
-                    wo[row, 2], steepness[i0], steepness[o0], sharpness, alike, right, opposite, seen, both,
-                )  # fmt: skip
+                light = SoftHorizons(mean[i0], mean[i1], np.float32(turn_i), wi[row, 2], steepness[i0])
+                viewer = SoftHorizons(mean[o0], mean[o1], np.float32(turn_o), wo[row, 2], steepness[o0])
+                _uncover(light, viewer, sharpness, alike, right, opposite, seen, both)
             else:
                 seen[:], both[:] = _1, _1
-            shade(
-                count, weight, ix, iy, iz, ox, oy, oz, size, sine, distance, curvature, limit, warpness, weftness, seen,
-                both, step_v, step_y, warp, weft, thickness, areas, diffuse, specular,
-            )  # fmt: skip
+            shade(table, count, weight, wide)
             total_weight = plain_sum(weight, count)
             area, a, b, c, d = gather(count, 0, areas, diffuse, specular, warpness, weftness)
         else:
@@ -204,11 +182,7 @@ def _answer(
             points[STEEPNESS, :total] = sharpness_of_points(s) if soft else np.float32(1e9)
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, 0)
             fill_points(points, places, values, shared, 1, total)
-            locate(
-                total, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
-                flat, table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
-                points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
-            )  # fmt: skip
+            locate(table, total, points, places)
             shade_all(table, total, points, places, shadows)
             total_weight = plain_sum(points[WEIGHT], total)
             area, a, b, c, d = gather(
@@ -246,16 +220,8 @@ def _densities(
 
 @fast_kernel
 def _uncover(
-    low_i: Float32,
-    high_i: Float32,
-    turn_i: np.float32,
-    iz: np.float32,
-    low_o: Float32,
-    high_o: Float32,
-    turn_o: np.float32,
-    oz: np.float32,
-    steep_i: Float32,
-    steep_o: Float32,
+    light: SoftHorizons,
+    viewer: SoftHorizons,
     sharpness: np.float32,
     alike: np.float32,
     right: np.float32,
@@ -265,6 +231,6 @@ def _uncover(
 ) -> None:
     """Write which share of each node's box is seen, and which is seen and lit."""
     for k in range(len(seen)):
-        o = ramp(above(oz, low_o[k], high_o[k], turn_o, steep_o[k]) * sharpness)
-        i = ramp(above(iz, low_i[k], high_i[k], turn_i, steep_i[k]) * sharpness)
+        o = ramp(above(viewer.z, viewer.first[k], viewer.second[k], viewer.turn, viewer.steepness[k]) * sharpness)
+        i = ramp(above(light.z, light.first[k], light.second[k], light.turn, light.steepness[k]) * sharpness)
         seen[k], both[k] = o, seen_and_lit(o, i, alike, right, opposite)

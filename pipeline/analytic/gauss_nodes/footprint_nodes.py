@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.analytic.gauss_nodes.nodes import GaussNodes
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
-from pipeline.analytic.horizon_points.shading import STEP_V, STEP_Y, WEIGHT, X, Y
+from pipeline.analytic.horizon_points.rows import STEP_V, STEP_Y, WEIGHT, X, Y
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import kernel
 from pipeline.compiled.float32 import remaining

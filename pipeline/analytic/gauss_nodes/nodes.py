@@ -9,21 +9,14 @@ import numpy as np
 
 from pipeline.analytic.gauss_rules import Rule, gauss_rule, overlap
 from pipeline.analytic.horizon_points.horizon_map import SLOTS, HorizonMap, locate, slot_of
-from pipeline.analytic.horizon_points.shading import (
-    CURVATURE,
-    DISTANCE,
+from pipeline.analytic.horizon_points.rows import (
     INTEGERS,
-    LIMIT,
-    NODE,
     ROWS,
-    SINE,
     STEP_V,
     STEP_Y,
-    WARPNESS,
-    WEFTNESS,
     X,
     Y,
-)  # fmt: skip
+)
 from pipeline.analytic.soft_horizons import over_boxes
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.truth.geometry.heightfield import GAP, WEFT, HeightField
@@ -97,11 +90,7 @@ def gauss_nodes(field: HeightField, table: HorizonMap, across: int, along: int) 
     )
     points, places = np.zeros((ROWS, first), np.float32), np.zeros((INTEGERS, first), np.int32)
     points[X], points[Y] = xs, ys
-    locate(
-        first, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
-        table.pieces.ravel(), table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
-        points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
-    )  # fmt: skip
+    locate(table, first, points, places)
     points[STEP_V], points[STEP_Y] = steps_v, steps_y
     own = [np.polynomial.legendre.leggauss(count) for count in (across, along)]
     most = max(across, along)

@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import grid_middles
+from pipeline.analytic.horizon_points.rows import CURVATURE, DISTANCE, LIMIT, NODE, SINE, WARPNESS, WEFTNESS, X, Y
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import arcsine
-from pipeline.truth.geometry.heightfield import GAP, TOP, WARP, WEFT, HeightField
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
 from pipeline.truth.geometry.symmetry import orbits
@@ -43,10 +44,10 @@ class HorizonMap(NamedTuple):
         Ends and picks.
     top : int32 (picks * ends,)
         Family on top of each cell, row by row.
-    pieces : float32 (picks * ends * SLOTS, 5)
-        What is added to the position along the yarn, from the cell's centre, to measure from the float's; curvature of
-        the float, negative beneath; bound of sin u; where the block begins along the cell, and how many blocks' lengths
-        a yarn spacing is.
+    pieces : float32 (picks * ends * SLOTS * 5,)
+        Piece by piece: what is added to the position along the yarn, from the cell's centre, to measure from the
+        float's; curvature of the float, negative beneath; bound of sin u; where the block begins along the cell, and
+        how many blocks' lengths a yarn spacing is.
     blocks : int32 (picks * ends * SLOTS,)
         Index of the first horizon of each piece.
     horizon : float32 (blocks * azimuths * grid * grid,)
@@ -103,7 +104,7 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     return HorizonMap(
         repeat=np.array([ends, picks], np.int64),
         top=field.top.ravel().astype(np.int32),
-        pieces=pieces.reshape(-1, 5).astype(np.float32),
+        pieces=pieces.ravel().astype(np.float32),
         blocks=blocks.ravel(),
         horizon=np.ascontiguousarray(sines.transpose(1, 0, 2), np.float32).ravel(),
         grid=grid,
@@ -143,29 +144,19 @@ def _nodes(piece: Piece, grid: int) -> tuple[Float64, Float64]:
 
 
 @fast_kernel
-def locate(
-    count: int,
-    x: Float32,
-    y: Float32,
-    ends: np.int32,
-    last_end: np.float32,
-    last_pick: np.float32,
-    top: npt.NDArray[np.int32],
-    pieces: Float32,
-    blocks: npt.NDArray[np.int32],
-    grid: np.int32,
-    warp_radius: np.float32,
-    weft_radius: np.float32,
-    sine: Float32,
-    distance: Float32,
-    curvature: Float32,
-    limit: Float32,
-    warpness: Float32,
-    weftness: Float32,
-    node: npt.NDArray[np.int32],
-) -> None:
-    """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node."""
-    size = np.float32(grid)
+def locate(table: HorizonMap, count: int, points: Float32, places: npt.NDArray[np.int32]) -> None:
+    """Find what is seen from above at points of the repeat: place in the yarn's frame, float and nearest node.
+
+    Reads the rows X and Y of the scratch (`points`); writes SINE to WEFTNESS, and NODE.
+    """
+    x, y, node = points[X], points[Y], places[NODE]
+    sine, distance, curvature, limit = points[SINE], points[DISTANCE], points[CURVATURE], points[LIMIT]
+    warpness, weftness = points[WARPNESS], points[WEFTNESS]
+    ends = np.int32(table.repeat[0])
+    last_end, last_pick = np.float32(table.repeat[0] - 1), np.float32(table.repeat[1] - 1)
+    top, pieces, blocks = table.top, table.pieces, table.blocks
+    warp_radius, weft_radius = table.yarn[0, RADIUS], table.yarn[1, RADIUS]
+    grid, size = np.int32(table.grid), np.float32(table.grid)
     for k in range(count):
         column, line = min(np.floor(x[k]), last_end), min(np.floor(y[k]), last_pick)
         cell = np.int32(line) * ends + np.int32(column)

@@ -10,17 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
-from pipeline.analytic.horizon_points.shading import (
+from pipeline.analytic.horizon_points.rows import (
     AREA,
-    BATCH,
-    CURVATURE,
     DIFFUSE,
-    DISTANCE,
     INTEGERS,
-    LIMIT,
-    NODE,
     ROWS,
-    SINE,
     SPECULAR,
     STEEPNESS,
     WARPNESS,
@@ -28,11 +22,8 @@ from pipeline.analytic.horizon_points.shading import (
     WEIGHT,
     X,
     Y,
-    fill_points,
-    gather,
-    query_rows,
-    shade_all,
-)  # fmt: skip
+)
+from pipeline.analytic.horizon_points.shading import BATCH, fill_points, gather, query_rows, shade_all
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
@@ -101,7 +92,6 @@ def _sample(
     points[WEIGHT], points[STEEPNESS] = _1, _STEP
     ends, picks = table.repeat[0], table.repeat[1]
     nodes = table.grid * table.grid
-    flat = table.pieces.reshape(table.pieces.size)
     values, shared = np.zeros((9, at_once), np.float32), np.zeros((4, at_once), np.int32)
     at_x, at_y, area, diffuse, specular = points[X], points[Y], points[AREA], points[DIFFUSE], points[SPECULAR]
     warpness, weftness, azimuths = points[WARPNESS], points[WEFTNESS], table.azimuths
@@ -114,21 +104,16 @@ def _sample(
             y = np.float32(v[row] - picks * np.floor(np.float64(v[row]) / picks))
             seeds = np.uint32(key & _MASK), np.uint32(key >> np.uint64(32))
             dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
+            here_x, here_y = at_x[first : first + count], at_y[first : first + count]
             if rho == _0:
-                _place(at_x, first, count, x, dx, np.float32(ends), seeds[0], _R2_FIRST, r2)
-                _place(at_y, first, count, y, dy, np.float32(picks), seeds[1], _R2_SECOND, r2)
+                _place(here_x, x, dx, np.float32(ends), seeds[0], _R2_FIRST, r2)
+                _place(here_y, y, dy, np.float32(picks), seeds[1], _R2_SECOND, r2)
             else:
-                _place_rotated(
-                    at_x, at_y, first, count, x, y, dx, dy, rho, np.float32(ends), np.float32(picks), seeds, r2
-                )
+                _place_rotated(here_x, here_y, x, y, dx, dy, rho, np.float32(ends), np.float32(picks), seeds, r2)
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, row - begin)
         fill_points(points, places, values, shared, end - begin, count)
         total = (end - begin) * count
-        locate(
-            total, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top, flat,
-            table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE], points[DISTANCE],
-            points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
-        )  # fmt: skip
+        locate(table, total, points, places)
         shade_all(table, total, points, places, True)
         for row in range(begin, end):
             a, s_warp, s_weft, c_warp, c_weft = gather(
@@ -144,8 +129,6 @@ def _sample(
 @fast_kernel
 def _place(
     out: Float32,
-    first: int,
-    count: int,
     centre: np.float32,
     sigma: np.float32,
     repeat: np.float32,
@@ -153,21 +136,17 @@ def _place(
     step: np.uint32,
     r2: bool,
 ) -> None:
-    """Write `count` positions in [0, repeat] on one axis, from `first` on."""
+    """Write the positions of the points of a query on one axis, in [0, repeat]."""
     even = sigma >= np.float32(EVENLY) * repeat
-    # A slice: an index that might be negative would keep the loop from vector units.
-    here = out[first : first + count]
-    for k in range(len(here)):
+    for k in range(len(out)):
         number = _number(seed, np.uint32(k), step, r2)
-        here[k] = _wrapped(number * repeat if even else centre + sigma * _normal(number), repeat)
+        out[k] = _wrapped(number * repeat if even else centre + sigma * _normal(number), repeat)
 
 
 @fast_kernel
 def _place_rotated(
     out_x: Float32,
     out_y: Float32,
-    first: int,
-    count: int,
     x: np.float32,
     y: np.float32,
     deviation_x: np.float32,
@@ -178,14 +157,13 @@ def _place_rotated(
     seeds: tuple[np.uint32, np.uint32],
     r2: bool,
 ) -> None:
-    """Write `count` positions of a footprint at an angle to the axes, from `first` on."""
+    """Write the positions of the points of a query whose footprint lies at an angle to the axes."""
     own = np.sqrt(_1 - correlation * correlation)
-    here_x, here_y = out_x[first : first + count], out_y[first : first + count]
-    for k in range(len(here_x)):
+    for k in range(len(out_x)):
         a = _normal(_number(seeds[0], np.uint32(k), _R2_FIRST, r2))
         b = _normal(_number(seeds[1], np.uint32(k), _R2_SECOND, r2))
-        here_x[k] = _wrapped(x + deviation_x * a, ends)
-        here_y[k] = _wrapped(y + deviation_y * (correlation * a + own * b), picks)
+        out_x[k] = _wrapped(x + deviation_x * a, ends)
+        out_y[k] = _wrapped(y + deviation_y * (correlation * a + own * b), picks)
 
 
 @inlined_fast_kernel

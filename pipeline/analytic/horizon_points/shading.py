@@ -15,6 +15,37 @@ import numpy.typing as npt
 
 from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap
+from pipeline.analytic.horizon_points.rows import (
+    AREA,
+    BOTH,
+    CURVATURE,
+    DIFFUSE,
+    DISTANCE,
+    I0,
+    I1,
+    IX,
+    IY,
+    IZ,
+    LIMIT,
+    NODE,
+    O0,
+    O1,
+    OX,
+    OY,
+    OZ,
+    SEEN,
+    SINE,
+    SIZE,
+    SPECULAR,
+    STEEPNESS,
+    STEP_V,
+    STEP_Y,
+    TURN_I,
+    TURN_O,
+    WARPNESS,
+    WEFTNESS,
+    WEIGHT,
+)
 from pipeline.analytic.soft_horizons import above, ramp
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
@@ -25,18 +56,6 @@ from pipeline.truth.scattering.slab_float32 import reflection
 
 BATCH: Final = 2048
 """Points shaded at a time: their rows, some 200 kB, stay in the second-level cache."""
-
-ROWS: Final = 26
-"""Rows of the scratch that points are passed in; named below."""
-
-# Inputs: position in the repeat and weight; directions of the query, 1 / |wi + wo|^2, where between two azimuths they
-# lie. Then the results of `locate`, and the shares that `shade` writes.
-(X, Y, WEIGHT, IX, IY, IZ, OX, OY, OZ, SIZE, TURN_I, TURN_O, SINE, DISTANCE, CURVATURE, LIMIT, WARPNESS, WEFTNESS,
- SEEN, BOTH, STEP_V, STEP_Y, STEEPNESS, AREA, DIFFUSE, SPECULAR) = range(ROWS)  # fmt: skip
-
-# Rows of the scratch of integers: the azimuths' rows around wi and wo, and the node.
-I0, I1, O0, O1, NODE = range(5)
-INTEGERS: Final = 5
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _EDGE = np.float32(1e-6)  # least squared cosine across a yarn
@@ -89,23 +108,14 @@ def _repeat(source: npt.NDArray[Any], queries: int, count: int, out: npt.NDArray
 
 
 @kernel
-def uncover(
-    count: int,
-    places: npt.NDArray[np.int32],
-    horizon: Float32,
-    iz: Float32,
-    oz: Float32,
-    turn_i: Float32,
-    turn_o: Float32,
-    steepness: Float32,
-    seen: Float32,
-    both: Float32,
-) -> None:
+def uncover(horizon: Float32, count: int, points: Float32, places: npt.NDArray[np.int32]) -> None:
     """Write the visibility of points to the viewer, and to viewer and light: ramps in the sine of elevation, 0 to 1.
 
     A loop of its own: look-ups at computed places keep a loop from the vector units.
     """
     nodes, low_i, high_i, low_o, high_o = places[NODE], places[I0], places[I1], places[O0], places[O1]
+    iz, oz, turn_i, turn_o = points[IZ], points[OZ], points[TURN_I], points[TURN_O]
+    steepness, seen, both = points[STEEPNESS], points[SEEN], points[BOTH]
     for k in range(count):
         at = np.uint32(nodes[k])
         first, second = horizon[at + np.uint32(low_o[k])], horizon[at + np.uint32(high_o[k])]
@@ -116,34 +126,17 @@ def uncover(
 
 
 @fast_kernel
-def shade(
-    count: int,
-    weight: Float32,
-    ix: Float32,
-    iy: Float32,
-    iz: Float32,
-    ox: Float32,
-    oy: Float32,
-    oz: Float32,
-    size: Float32,
-    sine: Float32,
-    distance: Float32,
-    curvature: Float32,
-    limit: Float32,
-    warpness: Float32,
-    weftness: Float32,
-    seen: Float32,
-    both: Float32,
-    step_v: Float32,
-    step_y: Float32,
-    warp: Float32,
-    weft: Float32,
-    thickness: np.float32,
-    area: Float32,
-    diffuse: Float32,
-    specular: Float32,
-) -> None:
-    """Write each point's shares of area, diffuse and specular sums."""
+def shade(table: HorizonMap, count: int, weight: Float32, points: Float32) -> None:
+    """Write each point's shares of area, diffuse and specular sums: rows AREA to SPECULAR of the scratch (`points`).
+
+    Reads all other rows but X, Y, TURN_I, TURN_O and STEEPNESS; `weight` takes the place of the row WEIGHT.
+    """
+    ix, iy, iz, ox, oy, oz = points[IX], points[IY], points[IZ], points[OX], points[OY], points[OZ]
+    size, step_v, step_y = points[SIZE], points[STEP_V], points[STEP_Y]
+    sine, distance, curvature, limit = points[SINE], points[DISTANCE], points[CURVATURE], points[LIMIT]
+    warpness, weftness, seen, both = points[WARPNESS], points[WEFTNESS], points[SEEN], points[BOTH]
+    area, diffuse, specular = points[AREA], points[DIFFUSE], points[SPECULAR]
+    warp, weft, thickness = table.yarn[0], table.yarn[1], table.thickness
     # Read once: a load under a condition would keep the loop from vector units.
     radius_a, alpha_a, beta_a, blend_a = warp[RADIUS], warp[ALPHA], warp[BETA], warp[BLEND]
     radius_b, alpha_b, beta_b, blend_b = weft[RADIUS], weft[ALPHA], weft[BETA], weft[BLEND]
@@ -193,18 +186,10 @@ def shade(
 def shade_all(table: HorizonMap, count: int, points: Float32, places: npt.NDArray[np.int32], shadows: bool) -> None:
     """Write the shares of `count` located points, without `shadows` all of them visible."""
     if shadows:
-        uncover(
-            count, places, table.horizon, points[IZ], points[OZ], points[TURN_I], points[TURN_O], points[STEEPNESS],
-            points[SEEN], points[BOTH],
-        )  # fmt: skip
+        uncover(table.horizon, count, points, places)
     else:
         points[SEEN, :count], points[BOTH, :count] = _1, _1
-    shade(
-        count, points[WEIGHT], points[IX], points[IY], points[IZ], points[OX], points[OY], points[OZ], points[SIZE],
-        points[SINE], points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS],
-        points[SEEN], points[BOTH], points[STEP_V], points[STEP_Y], table.yarn[0], table.yarn[1], table.thickness,
-        points[AREA], points[DIFFUSE], points[SPECULAR],
-    )  # fmt: skip
+    shade(table, count, points[WEIGHT], points)
 
 
 @fast_kernel

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.analytic.gauss_nodes.answer import GaussNodesTable
 from pipeline.analytic.gauss_nodes.footprint_nodes import place_nodes
-from pipeline.analytic.horizon_points.shading import ROWS, STEP_V, STEP_Y, WEIGHT, X, Y
+from pipeline.analytic.horizon_points.rows import ROWS, STEP_V, STEP_Y, WEIGHT, X, Y
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 

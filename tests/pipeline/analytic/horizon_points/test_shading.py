@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.horizon_points.horizon_map import horizon_map, locate
-from pipeline.analytic.horizon_points.shading import (
+from pipeline.analytic.horizon_points.rows import (
     AREA,
-    CURVATURE,
     DIFFUSE,
-    DISTANCE,
     INTEGERS,
-    LIMIT,
-    NODE,
     ROWS,
     SINE,
     SPECULAR,
@@ -20,10 +16,8 @@ from pipeline.analytic.horizon_points.shading import (
     WEIGHT,
     X,
     Y,
-    fill_points,
-    query_rows,
-    shade_all,
 )
+from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade_all
 from pipeline.truth.geometry.heightfield import height_field
 from weaves.fabric import load_fabric
 
@@ -59,11 +53,7 @@ def test_every_point_is_the_point_model(point_shares, fabric, wi, wo):
     values, rows = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     query_rows(wi, wo, table.azimuths, table.grid**2, values, rows, 0)
     fill_points(points, places, values, rows, 1, COUNT)
-    locate(
-        COUNT, points[X], points[Y], np.int32(ends), np.float32(ends - 1), np.float32(picks - 1), table.top,
-        table.pieces.ravel(), table.blocks, np.int32(table.grid), table.yarn[0, 0], table.yarn[1, 0], points[SINE],
-        points[DISTANCE], points[CURVATURE], points[LIMIT], points[WARPNESS], points[WEFTNESS], places[NODE],
-    )  # fmt: skip
+    locate(table, COUNT, points, places)
     shade_all(table, COUNT, points, places, False)
 
     area, specular, diffuse = point_shares(fabric, points[X], points[Y], wi, wo)
