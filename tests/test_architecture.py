@@ -264,7 +264,6 @@ def test_the_search_for_missing_names_can_fail(text, wrong):
 MOST_PARAMETERS, MOST_LINES = 12, 100
 
 LARGER = {
-    "pipeline.analytic.gauss_nodes.answer._answer",
     "pipeline.analytic.soft_nodes.answer.sum_queries",
     "pipeline.analytic.soft_nodes.footprint_nodes.gap_area",
     "pipeline.analytic.soft_nodes.footprint_nodes.place_nodes",

@@ -23,11 +23,7 @@ from pipeline.analytic.horizon_points.rows import (
     DIFFUSE,
     INTEGERS,
     IX,
-    IY,
-    IZ,
     OX,
-    OY,
-    OZ,
     ROWS,
     SEEN,
     SIZE,
@@ -89,7 +85,7 @@ class GaussNodesTable:
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
         )
         footprints, finest = deviations(queries), np.float32(min(NARROW, 1.0 / self.across))
-        return _answer(self.map, self.nodes, u, v, *footprints, wi, wo, self.along, finest, self.shadows, self.soft)
+        return _answer(self.map, self.nodes, u, v, footprints, wi, wo, self.along, finest, self.shadows, self.soft)
 
     def bytes_stored(self) -> int:
         """Return the bytes of map and nodes."""
@@ -102,9 +98,7 @@ def _answer(
     fixed: GaussNodes,
     u: Float32,
     v: Float32,
-    deviation_x: Float32,
-    deviation_y: Float32,
-    correlation: Float32,
+    footprints: tuple[Float32, Float32, Float32],
     wi: Float32,
     wo: Float32,
     along: int,
@@ -112,6 +106,8 @@ def _answer(
     shadows: bool,
     soft: bool,
 ) -> Float32:
+    """Answer every row; `footprints` has the deviations along x and y, and the correlation of the axes."""
+    deviation_x, deviation_y, correlation = footprints
     rows, count = len(u), len(fixed.evenly)
     result = np.zeros((rows, 4), np.float32)
     ends, picks = table.repeat[0], table.repeat[1]
@@ -126,7 +122,6 @@ def _answer(
     cells = np.zeros(max(ends, picks), np.uint32)
     line = np.zeros((4, most), np.float32)
     line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
-    ix, iy, iz, ox, oy, oz, size = wide[IX], wide[IY], wide[IZ], wide[OX], wide[OY], wide[OZ], wide[SIZE]
     seen, both, areas, diffuse, specular = wide[SEEN], wide[BOTH], wide[AREA], wide[DIFFUSE], wide[SPECULAR]
     warpness, weftness = wide[WARPNESS], wide[WEFTNESS]
     positions, weights, pieces, copies = fixed.positions, fixed.weights, fixed.pieces, fixed.copies
@@ -154,16 +149,10 @@ def _answer(
                     _densities(positions, weights, x + z * line_x, blur_x, even_x, of_x, touched_x, cells)
                     _densities(positions, weights, y + z * line_y, blur_y, even_y, of_y, touched_y, cells)
                     product_weights(pieces, copies, of_x, of_y, touched_x, touched_y, share, weight)
-            ix[:], iy[:], iz[:], ox[:], oy[:], oz[:] = (
-                wi[row, 0],
-                wi[row, 1],
-                wi[row, 2],
-                wo[row, 0],
-                wo[row, 1],
-                wo[row, 2],
-            )
+            for axis in range(3):
+                wide[IX + axis], wide[OX + axis] = wi[row, axis], wo[row, axis]
             dot = wi[row, 0] * wo[row, 0] + wi[row, 1] * wo[row, 1]
-            size[:] = _HALF / max(_1 + dot + wi[row, 2] * wo[row, 2], np.float32(1e-6))
+            wide[SIZE] = _HALF / max(_1 + dot + wi[row, 2] * wo[row, 2], np.float32(1e-6))
             if shadows:
                 i0, i1, turn_i = azimuth_rows(wi[row, 0], wi[row, 1], azimuths)
                 o0, o1, turn_o = azimuth_rows(wo[row, 0], wo[row, 1], azimuths)
@@ -190,12 +179,8 @@ def _answer(
             )
         if area > np.float32(HIDDEN_SHARE) * wo[row, 2] * total_weight:
             inverse = _1 / area
-            result[row, 0], result[row, 1], result[row, 2], result[row, 3] = (
-                a * inverse,
-                b * inverse,
-                c * inverse,
-                d * inverse,
-            )
+            result[row, 0], result[row, 1] = a * inverse, b * inverse
+            result[row, 2], result[row, 3] = c * inverse, d * inverse
     return result
 
 
