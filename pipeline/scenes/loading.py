@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
-from pipeline.scenes.variant import mitsuba
+from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 
@@ -172,10 +172,10 @@ def _scene_of(mi: Any, parts: list[Any]) -> Any:
 
 
 def _world(mi: Any, scene: Scene, where: str) -> Any:
-    """Let Mitsuba load a scene, without merging shapes or BSDFs that look alike to it."""
+    """Return the scene as Mitsuba loads it."""
     try:
         if isinstance(scene.source, Path):
-            world = mi.load_file(str(scene.source), optimize=False)
+            world = instantiate(mi, scene.source, where)
         else:
             world = mi.load_dict(scene.source(mi), optimize=False)
     except (RuntimeError, TypeError, OSError) as error:

@@ -1,5 +1,10 @@
 """What is wrong with a scene is said in one sentence."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +15,7 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
 from weaves.errors import BadInput
 
+ROOT = Path(__file__).parents[3]
 OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, environment_samples=1)
 CAMERA = """<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/>
 </transform><film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film></sensor>
@@ -26,7 +32,9 @@ BROKEN = {
     BALL + SUN + '<sensor type="thinlens"><float name="aperture_radius" value="0.1"/></sensor>': "must be perspective",
     '<shape type="sphere"/>' + SUN + CAMERA: 'an id such as "fabric_denim"',
     BALL.replace("denim", "denin") + SUN + CAMERA: "did you mean 'denim'?",
-    BALL.replace("sphere", "spher") + SUN + CAMERA: '"spher" not found',
+    BALL.replace("sphere", "spher") + SUN + CAMERA: "type = 'spher': must be a plugin of Mitsuba itself",
+    BALL.replace("sphere", "../sphere") + SUN + CAMERA: "type = '../sphere': must be a plugin of Mitsuba itself",
+    BALL.replace("sphere", "$kind") + SUN + CAMERA: "kind",
     BALL + SUN + CAMERA + '<emitter type="spot"/>': "lights must be directional, point, constant or envmap",
     BALL.replace("/></shape>", f">{MAP}</bsdf></shape>") + SUN + CAMERA: "lost.png",
     '<shape type="ply"><string name="filename" value="lost.ply"/></shape>' + BALL + SUN + CAMERA: "lost.ply",
@@ -66,6 +74,41 @@ def test_an_xml_scene_is_worn_and_lit(tmp_path):
     assert gbuffer.mask.shape == (12, 16)
     assert 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
     assert loaded.cloths["denim"][1].name == "denim"
+
+
+@pytest.mark.parametrize("source", ["file", "package"])
+def test_plugins_beside_a_scene_or_in_the_current_folder_are_not_loaded(source, tmp_path, monkeypatch):
+    """A file that is no library: Mitsuba would stop at it if it tried, and would run the code of a real one."""
+    (tmp_path / "plugins").mkdir()
+    for name in (
+        "diffuse",
+        "sphere",
+        "rectangle",
+        "hdrfilm",
+        "perspective",
+        "scene",
+        "directional",
+        "stratified",
+        "aov",
+    ):
+        (tmp_path / "plugins" / f"{name}.so").write_bytes(b"no library")
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, BALL + SUN + CAMERA)
+    code = (
+        "import sys; from pipeline.scenes.catalogue import load_scene; from pipeline.scenes.loading import load;"
+        "from pipeline.scenes.options import SceneOptions; from pathlib import Path;"
+        "from pipeline.scenes.frame import render;"
+        "scene = load_scene(Path('scene.xml')) if sys.argv[1] == 'file' else load_scene('sphere');"
+        "loaded = load(scene, SceneOptions(variant='scalar_rgb', environment_directions=4));"
+        "print(len(render(loaded).gbuffers) if sys.argv[1] == 'file' else len(loaded.cloths))"
+    )
+    # In a fresh process: this one has loaded Mitsuba's own plugins already.
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code, source], capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["1"]
 
 
 def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
