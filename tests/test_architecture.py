@@ -272,7 +272,7 @@ LARGER = {
     "pipeline.analytic.soft_nodes.shade.shade_footprint",
     "pipeline.analytic.soft_nodes.weights.wave_weights",
 }
-"""Kernels that still exceed the limit; bundled arguments cost them no speed (reports/LOG.md)."""
+"""Kernels that still exceed the limit; whether bundled arguments cost them speed is open (reports/LOG.md)."""
 
 
 def test_functions_have_few_parameters_and_lines():
