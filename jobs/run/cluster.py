@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 
 from rich.console import Console
 
-from jobs.run.child import ONE_THREAD, interrupts_held
+from jobs.run.child import ONE_THREAD, ends_deferred, interrupts_held
 from weaves.errors import BadInput, WorkFailed
 
 MOST_WORKERS: Final = 1024
@@ -136,7 +136,7 @@ def _local(workers: int) -> Iterator[Any]:
     }
     with dask.config.set(settings):
         try:
-            with interrupts_held():
+            with ends_deferred(), interrupts_held():  # a cluster that is half there cannot be closed
                 cluster = LocalCluster(  # type: ignore[no-untyped-call]
                     n_workers=workers,
                     threads_per_worker=1,
@@ -156,6 +156,6 @@ def _local(workers: int) -> Iterator[Any]:
         try:
             yield client
         finally:
-            with interrupts_held():
+            with ends_deferred(), interrupts_held():
                 client.close()  # type: ignore[no-untyped-call]
                 cluster.close()
