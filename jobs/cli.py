@@ -1,8 +1,7 @@
 """Command line of twillight: the verbs in the order of work.
 
-Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C, 128 and the
-number of another signal that ends a process. A verb's
-modules are imported when it runs, so that help is fast.
+Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C, 143
+SIGTERM, 129 SIGHUP. A verb's modules are imported when it runs, so that help is fast.
 """
 
 from __future__ import annotations
@@ -59,8 +58,8 @@ class WorkerFlags:
     tls_certificate: Annotated[str, Parameter(help="Own certificate for the scheduler, a PEM file.")] = ""
     tls_key: Annotated[str, Parameter(help="Its key, a PEM file.")] = ""
 
-    def place(self) -> Scheduler:
-        """Return the scheduler as a run takes it."""
+    def connection(self) -> Scheduler:
+        """Return the scheduler to connect to."""
         from jobs.run.cluster import Scheduler
 
         return Scheduler(self.scheduler, self.tls_ca, self.tls_certificate, self.tls_key)
@@ -133,7 +132,7 @@ def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> N
     """Compute the ground truth: the shards of a recipe's data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["generate"], out, on.place(), on.workers)
+    work(recipe, ["generate"], out, on.connection(), on.workers)
 
 
 @app.command(sort_key=5)
@@ -187,7 +186,7 @@ def train(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None
     """Train the models of a recipe on its data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["train"], out, on.place(), on.workers)
+    work(recipe, ["train"], out, on.connection(), on.workers)
 
 
 @app.command(sort_key=8)
@@ -207,11 +206,11 @@ def bench(
     from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
-        bench_alone(recipe, out, on.place(), on.workers)
+        bench_alone(recipe, out, on.connection(), on.workers)
         return
     from jobs.verbs.run import work
 
-    work(recipe, ["bench"], out, on.place(), on.workers)
+    work(recipe, ["bench"], out, on.connection(), on.workers)
 
 
 @app.command(sort_key=9)
@@ -219,7 +218,7 @@ def report(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> Non
     """Write the page: pictures, tables and plots of all measurements."""
     from jobs.verbs.run import work
 
-    work(recipe, ["report"], out, on.place(), on.workers)
+    work(recipe, ["report"], out, on.connection(), on.workers)
 
 
 @app.command(sort_key=10)
@@ -228,7 +227,7 @@ def run(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     from jobs.plan.task import STAGES
     from jobs.verbs.run import work
 
-    work(recipe, STAGES, out, on.place(), on.workers)
+    work(recipe, STAGES, out, on.connection(), on.workers)
 
 
 @app.command(sort_key=11)

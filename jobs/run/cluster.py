@@ -60,16 +60,20 @@ def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[
     BadInput
         If no scheduler answers, or it has no worker.
     WorkFailed
-        If the processes of the cluster on this machine cannot start.
+        If the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
     """
-    # Inherited by workers: dask reports every shutdown as a warning, and a lost scheduler as a traceback.
+    # Before dask is imported, and inherited by workers: it reports every shutdown as a warning.
     os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")
-    if scheduler.address:
-        with _external(scheduler, console) as client:
+    from distributed import CancelledError
+    from distributed.comm.core import CommClosedError
+
+    try:
+        with _external(scheduler, console) if scheduler.address else _local(workers) as client:
             yield client
-    else:
-        with _local(workers) as client:
-            yield client
+    except (CancelledError, CommClosedError) as error:
+        raise WorkFailed(
+            "the dask scheduler is gone; what was finished is kept, run the same command to go on"
+        ) from error
 
 
 @contextmanager
@@ -77,7 +81,8 @@ def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
     """Connect to a running scheduler that has a worker."""
     from distributed import Client, Security
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client", "distributed.utils"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     given = scheduler.address
     files = {"--tls-ca": scheduler.ca, "--tls-certificate": scheduler.certificate, "--tls-key": scheduler.key}
     for key, path in files.items():

@@ -246,13 +246,9 @@ def _outcome(future: Any) -> Outcome:
 
 def _ended(running: Iterable[Any]) -> list[Any]:
     """Wait a while until at least one of these futures has ended, and return those that have."""
-    from distributed import CancelledError, wait
+    from distributed import wait
 
     try:
         return list(wait(list(running), timeout=LOOK, return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
     except TimeoutError:
         return []
-    except (CancelledError, OSError) as error:
-        raise WorkFailed(
-            "the dask scheduler is gone; what was finished is kept, run the same command to go on"
-        ) from error

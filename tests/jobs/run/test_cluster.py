@@ -48,10 +48,23 @@ def scheduler(tmp_path):
     worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
     common["env"] = ENVIRONMENT | {"ELSEWHERE": "1"}
     processes.append(subprocess.Popen([*worker, "--no-dashboard", "--no-nanny"], cwd=elsewhere, **common))
-    yield Scheduler(str(file))
+    yield Scheduler(str(file)), processes[0]
     for process in processes:
         process.kill()
         process.wait()
+
+
+def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp_path, fake, scheduler, capfd):
+    address, process = scheduler
+    tasks = [fake.task("first"), *(fake.task(f"long {index}", seconds=30) for index in range(2))]
+
+    def kill(task):
+        process.kill()
+
+    with pytest.raises(WorkFailed, match="the dask scheduler is gone"):
+        execute(tasks, tmp_path, scheduler=address, console=quiet(), recorded=kill)
+    assert Ledger(tmp_path).state(tasks[0]) == "done"
+    assert capfd.readouterr().err == ""
 
 
 def test_two_runs_with_two_folders_on_one_scheduler_both_get_their_files(tmp_path, fake, scheduler):
@@ -60,7 +73,7 @@ def test_two_runs_with_two_folders_on_one_scheduler_both_get_their_files(tmp_pat
     summaries = {}
 
     def run(out):
-        summaries[out] = execute(tasks, out, scheduler=scheduler, console=quiet())
+        summaries[out] = execute(tasks, out, scheduler=scheduler[0], console=quiet())
 
     for out in outs:
         (out / "ledger").mkdir(parents=True)
@@ -77,7 +90,7 @@ def test_two_runs_with_two_folders_on_one_scheduler_both_get_their_files(tmp_pat
 def test_a_product_that_was_written_elsewhere_is_no_product(tmp_path, fake, scheduler):
     task = fake.task("hidden", hides=True)
     (tmp_path / "out").mkdir()
-    summary = execute([task], tmp_path / "out", scheduler=scheduler, console=quiet())
+    summary = execute([task], tmp_path / "out", scheduler=scheduler[0], console=quiet())
     assert summary.failed == [task]
     assert "every worker must see --out" in Ledger(tmp_path / "out").reason(task)
 
