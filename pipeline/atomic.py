@@ -15,10 +15,18 @@ _UNWRITABLE = {errno.ENOENT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTD
 
 
 @contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on leaving without error it is synced and renamed to `path`.
 
     A process killed in between leaves only a ``.tmp-*`` file, which no reader looks at and the next writer replaces.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    durable : bool
+        False saves the two waits for the disk: the file is whole or missing after a kill, and may be empty after a
+        loss of power.
 
     Raises
     ------
@@ -31,10 +39,12 @@ def atomic_path(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
-        with temporary.open("rb+") as file:
-            os.fsync(file.fileno())
+        if durable:
+            with temporary.open("rb+") as file:
+                os.fsync(file.fileno())
         temporary.replace(path)
-        _sync_folder(path.parent)
+        if durable:
+            _sync_folder(path.parent)
     except OSError as error:
         if error.errno in _UNWRITABLE:
             reason = error.strerror or "not writable"
@@ -45,9 +55,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def atomic_write(path: Path, content: bytes) -> None:
-    """Write `content` to `path` whole or not at all."""
-    with atomic_path(path) as temporary:
+def atomic_write(path: Path, content: bytes, *, durable: bool = True) -> None:
+    """Write `content` to `path` whole or not at all; `durable` as for `atomic_path`."""
+    with atomic_path(path, durable=durable) as temporary:
         temporary.write_bytes(content)
 
 

@@ -8,20 +8,24 @@ state is kept, so nothing has to be repaired after a kill.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import math
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from filelock import FileLock, Timeout
 
 from jobs.plan.task import Task
-from jobs.run.receipt import Product, Receipt, read_receipt
+from jobs.run.receipt import Product, Receipt, leaves, read_receipt
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
 State = Literal["done", "failed", "missing"]
+
+_SECONDS_BETWEEN_SYNCS: Final = 1.0
 
 
 class Ledger:
@@ -30,6 +34,14 @@ class Ledger:
     def __init__(self, out: Path) -> None:
         self.out = out
         self.folder = out / "ledger"
+        self._synced = -math.inf
+
+    def receipts(self, tasks: Iterable[str]) -> Iterator[Receipt]:
+        """Yield every valid receipt of the folder but those of some tasks, given by their ids."""
+        others = {path.stem for path in self.folder.glob("[!.]*.json")} - set(tasks)
+        for name in sorted(name for name in others if "." not in name):
+            if receipt := read_receipt(self.folder / f"{name}.json", name):
+                yield receipt
 
     def state(self, task: Task) -> State:
         """Return the state of a task, from its files."""
@@ -57,9 +69,16 @@ class Ledger:
         return str(self._read(self._note(task)).get("reason", ""))
 
     def finish(self, task: Task, files: Mapping[str, Product], seconds: float) -> None:
-        """Write a task's receipt and forget that it ever failed."""
-        receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3))
-        self._write(self._receipt(task), receipt.model_dump())
+        """Write a task's receipt and forget that it ever failed.
+
+        It waits for the disk once a second at most. After a loss of power some of the last receipts may be missing;
+        their tasks run again.
+        """
+        identity = leaves(task.identity())
+        receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3), identity=identity)
+        durable = (now := time.monotonic()) - self._synced >= _SECONDS_BETWEEN_SYNCS
+        self._synced = now if durable else self._synced
+        self._write(self._receipt(task), receipt.model_dump(), durable)
         self._note(task).unlink(missing_ok=True)
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
@@ -139,8 +158,8 @@ class Ledger:
         return content if isinstance(content, dict) else {}
 
     @staticmethod
-    def _write(path: Path, content: Mapping[str, Any]) -> None:
-        atomic_write(path, json.dumps(content, indent=1).encode() + b"\n")
+    def _write(path: Path, content: Mapping[str, Any], durable: bool = True) -> None:
+        atomic_write(path, json.dumps(content, indent=1).encode() + b"\n", durable=durable)
 
 
 def _heading(task: Task) -> dict[str, str]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from types import NoneType
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.fingerprint import file_sha256
+from pipeline.fingerprint import file_sha256, fingerprint
 
 _MOST_BYTES: Final = 1 << 20  # of a receipt; a task has a few products
+
+_LONGEST_LEAF: Final = 24  # characters of a value that is written as it is
+
+Leaf = str | int | float | bool | None
+"""A value of an identity; a string that begins with # is the hash of a longer one."""
 
 
 class Product(BaseModel):
@@ -33,6 +40,24 @@ class Receipt(BaseModel):
     files: dict[str, Product]
     """Products by file name."""
     seconds: Annotated[float, Field(ge=0.0)]
+    identity: dict[str, Leaf] = {}
+    """What the task depended on, by dotted key (`leaves`); it says later which key has changed."""
+
+
+def leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
+    """Return an identity by dotted keys of at most two parts: short values as they are, others by their hash."""
+    found: dict[str, Leaf] = {}
+    for key, value in identity.items():
+        parts = value.items() if isinstance(value, dict) and value else [("", value)]
+        for name, part in parts:
+            found[f"{key}.{name}" if name else key] = _leaf(part)
+    return found
+
+
+def _leaf(value: Any) -> Leaf:
+    if isinstance(value, int | float | NoneType) or (isinstance(value, str) and len(value) <= _LONGEST_LEAF):
+        return value
+    return f"#{fingerprint(value, 8)}"
 
 
 def read_receipt(path: Path, task: str) -> Receipt | None:

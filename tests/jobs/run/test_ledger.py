@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from jobs.plan.task import Place, Task
 from jobs.run.ledger import Ledger
-from jobs.run.receipt import Product, Receipt, measure, read_receipt
+from jobs.run.receipt import Product, Receipt, leaves, measure, read_receipt
 from weaves.errors import BadInput, WorkFailed
 
 
@@ -98,6 +98,30 @@ def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
     assert done.state(TASK) == "missing" and not done.adopt(TASK)
     (done.folder / f"{TASK.id}.failed.json").write_bytes(content)
     assert done.reason(TASK) == ""
+
+
+def test_a_receipt_says_what_its_task_depended_on(done):
+    assert done.receipt(TASK).identity == leaves(TASK.identity())
+    (done.folder / f"{'0' * 16}.json").write_text("{}")
+    done.fail(TASK, "for the test")
+    assert [receipt.task for receipt in done.receipts([])] == [TASK.id]
+    assert not list(done.receipts([TASK.id]))
+
+
+def test_leaves_are_short():
+    identity = {"version": 5, "optics": {"warp": {"bend": 1.5}, "thick": 2.0}, "about": "x" * 25, "none": {}}
+    found = leaves(identity)
+    assert found.keys() == {"version", "optics.warp", "optics.thick", "about", "none"}
+    assert (found["version"], found["optics.thick"]) == (5, 2.0)
+    assert all(found[key].startswith("#") and len(found[key]) == 9 for key in ("optics.warp", "about", "none"))
+    assert leaves(identity | {"about": "y" * 25})["about"] != found["about"]
+
+
+@pytest.mark.parametrize("value", [[1], {"a": {}}, float("inf")])
+def test_a_receipt_with_an_odd_identity_counts_as_missing(done, value):
+    path = done.folder / f"{TASK.id}.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"identity": {"key": value}}))
+    assert done.state(TASK) == "missing"
 
 
 @given(st.data())
