@@ -1,0 +1,146 @@
+"""Measure the driver: its time for each task and its memory, at 10^3, 10^4 and 10^5 tasks.
+
+Command: ``PYTHONPATH=. python tests/scale/measure_driver.py [--tasks 1000 10000 100000]``
+
+A recipe with so many shards is planned. Tasks with the same fields, which only write a short file, are then finished
+on a scheduler with two workers, all in processes of their own; then everything is resumed. Each number of tasks has a
+fresh process. Printed: milliseconds of the driver a task, wall time and processor time, and its peak memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ClassVar
+
+from rich.console import Console
+
+from jobs.plan.dataset import Shard, shards
+from jobs.plan.plan import plan
+from jobs.plan.task import Progress
+from jobs.recipe.load import load_recipe
+from jobs.run.cluster import Scheduler
+from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile
+
+ROOT = Path(__file__).parents[2]
+
+RECIPE = """
+name = "many"
+[dataset]
+seen = ["denim"]
+shard_rows = 64
+[dataset.rows]
+train = {train}
+validation = 64
+test = 64
+[[models]]
+model = "woven"
+"""
+
+
+class ShortShard(Shard):
+    """A shard that writes a short file in place of its rows."""
+
+    group: ClassVar = "short"
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Write the file."""
+        for path in self.products:
+            (out / path).parent.mkdir(parents=True, exist_ok=True)
+            (out / path).write_text(self.id)
+
+
+@contextmanager
+def scheduler(folder: Path) -> Iterator[Scheduler]:
+    """Start a scheduler and two workers in processes of their own."""
+    file = folder / "scheduler.json"
+    path = os.pathsep.join([str(ROOT), str(Path(__file__).parent)])
+    common = {"env": os.environ | {"PYTHONPATH": path}, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
+    processes = [subprocess.Popen([*dask, "--scheduler-file", str(file), "--no-dashboard"], **common)]
+    try:
+        while not file.exists():
+            time.sleep(0.1)
+        processes += [subprocess.Popen([*worker, "--no-dashboard", "--no-nanny"], **common) for _ in range(2)]
+        yield Scheduler(str(file))
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def timed(count: int, function: Callable[[], object]) -> dict[str, float]:
+    """Return milliseconds a task, and the peak memory of this process so far in MiB."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    function()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"wall": 1000 * wall / count, "cpu": 1000 * cpu / count, "memory": memory}
+
+
+def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
+    """Measure a number of tasks in this process; on a cluster of its own if `here`."""
+    result = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "many.toml").write_text(RECIPE.format(train=(count - 2) * 64))
+        (folder / "out").mkdir()
+        recipe = load_recipe(str(folder / "many.toml"))
+        parts: list[Shard] = []
+        result["plan"] = timed(count, lambda: parts.extend(plan(recipe)))  # type: ignore[arg-type]
+        sys.modules["measure_driver"] = sys.modules["__main__"]
+        ShortShard.__module__ = "measure_driver"
+        tasks = [ShortShard.model_construct(**dict(part)) for part in parts if isinstance(part, Shard)]
+        own = shards(recipe)
+
+        def run() -> None:
+            ledger = Ledger(folder / "out")
+            manifest = ManifestFile(recipe, own, ledger)
+            quiet = Console(file=io.StringIO())
+            summary = execute(tasks, ledger.out, scheduler=connection, workers=2, recorded=manifest.add, console=quiet)
+            assert len(summary.ran) + len(summary.before) == count, summary
+
+        if here:
+            connection = Scheduler()
+            result["run"] = timed(count, run)
+        else:
+            with scheduler(folder) as connection:
+                result["run"] = timed(count, run)
+        result["resume"] = timed(count, run)
+    return result
+
+
+def main() -> None:
+    """Measure each number of tasks and print a table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--tasks", type=int, nargs="+", default=[10**3, 10**4, 10**5])
+    parser.add_argument("--here", action="store_true", help="a cluster of the driver's own, its scheduler included")
+    parser.add_argument("--one", action="store_true", help="measure in this process and print JSON")
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measure(options.tasks[0], options.here)))
+        return
+    print("| tasks | plan | run | resume | peak memory |")
+    print("|---|---|---|---|---|")
+    for count in options.tasks:
+        command = [sys.executable, __file__, "--one", "--tasks", str(count), *(["--here"] if options.here else [])]
+        found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout)
+        cells = [f"{found[name]['wall']:.2f} ({found[name]['cpu']:.2f})" for name in ("plan", "run", "resume")]
+        print(f"| {count:,} | {' | '.join(cells)} | {found['resume']['memory']:.0f} MiB |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
