@@ -11,8 +11,8 @@ from typing import Final
 TRUTH: Final = 5
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
-TRAINING: Final = 2
-"""The training loop."""
+TRAINING: Final = 3
+"""The training loop and the files that it writes."""
 
 MODELS: Final[dict[str, int]] = {
     "curved": 2,

@@ -19,6 +19,9 @@ from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 from pipeline.truth.options import TruthOptions
 
+DATASETS: Final = "datasets"
+"""Folder of all data sets, relative to the output folder."""
+
 SECONDS_A_POINT: Final = 3.5e-7
 """One point of the truth, on one core of a server of 2021."""
 POINTS_A_ROW: Final = 1700
@@ -99,7 +102,7 @@ def shards(recipe: Recipe) -> list[Shard]:
     """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows; extra rows last."""
     rows: list[tuple[str, AnyShardTask]] = [*_own_rows(recipe), *_extra_rows(recipe)]
     parts = [Shard(shard=shard, role=role, folders=()) for role, shard in rows]
-    folder = f"datasets/{recipe.name}-{fingerprint(sorted(part.id for part in parts if not part.is_extra), 8)}"
+    folder = f"{DATASETS}/{recipe.name}-{fingerprint(sorted(part.id for part in parts if not part.is_extra), 8)}"
     return [part.model_copy(update={"folders": (folder,)}) for part in parts]
 
 

@@ -3,12 +3,15 @@
 A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
 only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry). At most one task
 a core is handed out at a time: dask, which cannot know how long a task takes, would park short ones behind a training.
+The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again, and a
+task that fails is tried once more if an input turns out to be damaged.
 A task that measures time runs in a process of its own (`jobs.run.alone`) while the workers have nothing to do; with
 `--scheduler` it runs in a worker, because the driver's machine may not be the one to measure.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import uuid
@@ -21,6 +24,7 @@ from rich.console import Console
 from jobs.plan.task import STAGES, Stage, Task, urgencies
 from jobs.run.alone import run_alone
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
+from jobs.run.inputs import Inputs
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import KILLED, Outcome, one_line, work
 from jobs.run.progress import KERNELS, LOOK, TOPIC, Board, Compiling
@@ -100,14 +104,7 @@ def execute(
         raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")
     out = out.resolve()
     ledger = Ledger(out)
-    before = []
-    for task in tasks:
-        done = ledger.state(task) == "done"
-        if not done and ledger.adopt(task):
-            recorded(task)  # to whom it was not there a moment ago
-            done = True
-        if done:
-            before.append(task)
+    before = _done(tasks, ledger, recorded)
     finished = {task.id for task in before}
     todo = {task.id: task for task in tasks if task.id not in finished and task.stage in stages}
     _refuse_gaps(list(todo.values()), tasks, finished)
@@ -116,24 +113,29 @@ def execute(
         return summary
 
     console = console or Console(stderr=True)
-    urgency = urgencies(list(todo.values()))
-    run = uuid.uuid4().hex  # another run of the same task, with another folder, must not share its result
+    inputs = Inputs(tasks, ledger)
     with connected(scheduler, min(workers or os.cpu_count() or 1, len(todo)), console) as client:
         if preparations := prepare(list(todo.values())):
             _prepare(client, preparations, console)
         with Board(list(todo.values()), console) as board:
             client.subscribe_topic(TOPIC, board.hear)
+            book = _Book(todo, finished, summary, stages, board, console)
             running: dict[Any, Task] = {}
             while todo or running:
-                ready = [task for task in todo.values() if finished.issuperset(task.needs)]
-                ready.sort(key=lambda task: (task.alone, -urgency[task.id]))
                 ended: list[tuple[Task, Outcome]] = []
-                for task in _admitted(ready, list(running.values()), slots=sum(client.nthreads().values())):
+                damaged: list[Task] = []
+                for task in _admitted(book.ready(), list(running.values()), slots=sum(client.nthreads().values())):
+                    if found := inputs.damaged(task):
+                        book.again(found)
+                        damaged += found
+                        continue
                     board.begin(todo.pop(task.id))
                     if task.alone and not scheduler.address:
                         ended.append((task, run_alone(task, out, board)))
                     else:
-                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}-{run}")] = task
+                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}-{book.run}")] = task
+                if not ended and damaged:
+                    continue
                 if not running and not ended:
                     break  # what is left waits for tasks that failed
                 if not ended:
@@ -142,17 +144,91 @@ def execute(
                     ended = [(running.pop(future), _outcome(future)) for future in futures]
                 for task, outcome in ended:
                     outcome = _verified(task, outcome, out)
+                    if outcome.reason and book.once_more(task) and (found := inputs.damaged(task, anew=True)):
+                        book.again([*found, task])
+                        continue
                     if outcome.reason:
                         ledger.fail(task, outcome.reason, outcome.traceback)
                         summary.failed.append(task)
                     else:
                         ledger.finish(task, outcome.files, outcome.seconds)
                         finished.add(task.id)
+                        inputs.made(task)
                         recorded(task)
                         summary.ran.append(task)
                     board.end(task)
+    book.refuse_lost()
     summary.waiting.extend(todo.values())
     return summary
+
+
+class _Book:
+    """Tasks of a run that are left to do and that are done, shared with its loop; tasks that are done once more."""
+
+    def __init__(
+        self,
+        todo: dict[str, Task],
+        finished: set[str],
+        summary: Summary,
+        stages: Sequence[Stage],
+        board: Board,
+        console: Console,
+    ) -> None:
+        self._todo, self._finished, self._summary = todo, finished, summary
+        self._stages, self._board, self._console = stages, board, console
+        self._urgency = urgencies(list(todo.values()))
+        self._failed_once: set[str] = set()
+        self._lost: list[Task] = []  # damaged products of stages that do not run
+        self.run = uuid.uuid4().hex
+        """Part of dask's keys: a task of another run, or one that is done once more, must not get an old result."""
+
+    def ready(self) -> list[Task]:
+        """Return the tasks whose needs are done, most urgent first."""
+        ready = [task for task in self._todo.values() if self._finished.issuperset(task.needs)]
+        ready.sort(key=lambda task: (task.alone, -self._urgency[task.id]))
+        return ready
+
+    def once_more(self, task: Task) -> bool:
+        """Note that a task has failed; return whether it is the first time."""
+        first = task.id not in self._failed_once
+        self._failed_once.add(task.id)
+        return first
+
+    def again(self, tasks: Sequence[Task]) -> None:
+        """Do tasks again whose products were damaged, or that failed on such products."""
+        self.run = uuid.uuid4().hex
+        for task in tasks:
+            self._finished.discard(task.id)
+            self._urgency[task.id] = math.inf
+            for done in (self._summary.before, self._summary.ran):
+                done[:] = [one for one in done if one.id != task.id]
+            if task.stage not in self._stages:
+                self._lost.append(task)
+                continue
+            self._todo[task.id] = task
+            if task.id not in self._failed_once:
+                self._console.print(f"{task.stage} {task.title}: damaged, made again", style="yellow")
+                self._board.add(task)
+
+    def refuse_lost(self) -> None:
+        """End the run if damaged products are of a stage that does not run."""
+        if self._lost:
+            first = self._lost[0]
+            allowed = f"run `twillight {first.stage}` first"
+            raise WorkFailed(f"{first.title}: its products were damaged and are removed; {allowed}")
+
+
+def _done(tasks: Sequence[Task], ledger: Ledger, recorded: Callable[[Task], None]) -> list[Task]:
+    """Return the tasks that are done, some by the products of another data set."""
+    before = []
+    for task in tasks:
+        done = ledger.state(task) == "done"
+        if not done and ledger.adopt(task):
+            recorded(task)  # to whom it was not there a moment ago
+            done = True
+        if done:
+            before.append(task)
+    return before
 
 
 def _prepare(client: Any, preparations: Sequence[Preparation], console: Console) -> None:

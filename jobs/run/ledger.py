@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 
 from filelock import FileLock, Timeout
 
+from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
 from jobs.run.receipt import Product, Receipt, leaves, read_receipt
 from pipeline.atomic import atomic_write, link
@@ -97,12 +98,24 @@ class Ledger:
         for path in map(Path, task.products):
             if self._is_whole(self.out / path, receipt):
                 continue
-            sources = sorted(self.out.glob(f"{path.parent.parent}/*/{path.name}"))
-            source = next((file for file in sources if self._is_whole(file, receipt, verify=True)), None)
+            source = next((file for file in self._copies(path) if self._is_whole(file, receipt, verify=True)), None)
             if source is None:
                 return False
             link(source, self.out / path)
         return self.state(task) == "done"
+
+    def discard(self, task: Task) -> list[str]:
+        """Remove the products of a done task that are not those of its receipt; return their paths.
+
+        The task then counts as missing. Damaged copies in other data sets go too: they may be links to the same bytes.
+        """
+        receipt, removed = self.receipt(task), []
+        for path in map(Path, task.products if receipt else ()):
+            for file in {self.out / path, *self._copies(path)}:
+                if file.exists() and receipt and not self._is_whole(file, receipt, verify=True):
+                    file.unlink()
+                    removed.append(str(file.relative_to(self.out)))
+        return sorted(removed)
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -129,6 +142,10 @@ class Ledger:
             yield
         finally:
             lock.release()
+
+    def _copies(self, path: Path) -> list[Path]:
+        """Return the files of a shard's name in all data sets; none for the products of other tasks."""
+        return sorted(self.out.glob(f"{DATASETS}/*/{path.name}")) if path.parts[0] == DATASETS else []
 
     def _receipt(self, task: Task) -> Path:
         return self.folder / f"{task.id}.json"

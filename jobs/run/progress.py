@@ -102,6 +102,15 @@ class Board:
     ) -> None:
         self._bars.stop()
 
+    def add(self, task: Task) -> None:
+        """Add a task that was done before and is made again."""
+        self._tasks[task.id], self._fractions[task.id] = task, 0.0
+        self._planned[task.stage] += 1
+        if task.stage not in self._rows:
+            self._rows[task.stage] = self._bars.add_task(task.stage, total=0.0, start=False, count="")
+        row = self._rows[task.stage]
+        self._bars.update(row, total=(self._bars.tasks[row].total or 0.0) + task.cost, count=self._count(task.stage))
+
     def begin(self, task: Task) -> None:
         """Start the clock of a task's stage."""
         if not self._bars.tasks[self._rows[task.stage]].started:
@@ -134,7 +143,7 @@ class Board:
         self._reported()
         self._ended[task.stage] += 1
         self._advance(task, 1.0)
-        del self._tasks[task.id]
+        self._tasks.pop(task.id, None)
 
     def _reported(self) -> None:
         self._heard, self._silence = time.monotonic(), _SILENCE

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -29,6 +28,7 @@ from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.require_recipe import alone
+from pipeline.models.card import read_card
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def _costs(
         raise BadInput("savings", "recipe", recipe.name, allowed)
     shards = [task for task in tasks if task.stage == "generate"]
     trainings = [task for task in tasks if isinstance(task, Training)]
-    cards = [json.loads((ledger.out / task.products[1]).read_bytes()) for task in trainings]
+    cards = [read_card(ledger.out / task.folder) for task in trainings]
     needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
     weights = sum(ledger.products(task)[Path(task.products[0]).name].bytes for task in needed)
     return {

@@ -7,7 +7,6 @@ list for each set that ``options.extra_rows`` declares: the columns of its rows,
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +18,7 @@ from pydantic import BaseModel
 from safetensors import SafetensorError
 from torch import Tensor
 
+from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.method import Method
 from weaves.errors import BadInput, nearest
@@ -29,9 +29,6 @@ class _Card(BaseModel):
     """The part of a model card that names the model."""
 
     options: ModelOptions
-
-
-WEIGHTS, CARD = "model.safetensors", "card.json"
 
 
 def module_of(model: str) -> ModuleType:
@@ -69,7 +66,7 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     Raises
     ------
     BadInput
-        If a folder holds no model, a broken one, or one of another design or version.
+        If a folder holds no model, a damaged one, or one of another design or version.
     """
     trained = [_read(folder, options) for folder in folders]
     try:
@@ -86,12 +83,12 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
 
 def load_model(folder: Path) -> list[Method]:
     """Return the methods of one trained folder, options read from its card."""
-    card = _read_card(folder)
+    card = read_card(folder)
     return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])
 
 
 def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    card = _read_card(folder)
+    card = read_card(folder)
     if card.get("options") != options.model_dump(mode="json"):
         raise BadInput(str(folder / CARD), "options", card.get("options"), "trained with other options; train it again")
     version = card.get("version", {}).get("model")
@@ -99,16 +96,6 @@ def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]
         allowed = f"this is version {options.version} of {options.model}: train it again"
         raise BadInput(str(folder / CARD), "version", version, allowed)
     try:
-        return card, safetensors.torch.load_file(folder / WEIGHTS)
-    except (FileNotFoundError, SafetensorError) as error:
-        raise BadInput(str(folder / WEIGHTS), "", "missing or damaged", "train the model again") from error
-
-
-def _read_card(folder: Path) -> dict[str, Any]:
-    try:
-        card = json.loads((folder / CARD).read_bytes())
-    except (FileNotFoundError, ValueError) as error:
-        raise BadInput(str(folder / CARD), "", "missing or damaged", "train the model first") from error
-    if not isinstance(card, dict):
-        raise BadInput(str(folder / CARD), "", "not a model card", "train the model first")
-    return card
+        return card, safetensors.torch.load(read_weights(folder, card))
+    except SafetensorError as error:
+        raise BadInput(str(folder / WEIGHTS), "", "not a file of weights", "train the model again") from error

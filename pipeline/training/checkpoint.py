@@ -1,8 +1,10 @@
-"""Checkpoints of a training, written atomically: tensors and JSON, never executable content."""
+"""Checkpoints of a training, written atomically: tensors and JSON, with a hash over both, never executable content."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -92,6 +94,7 @@ class State:
         about = {"identity": self.identity, "step": step, "curve": self.curve, "since": self._since}
         with atomic_path(self.path) as temporary:
             copies = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+            about["sha256"] = _sha256(about, copies)
             safetensors.torch.save_file(copies, temporary, metadata={_KEY: json.dumps(about)})
 
     def restore(self, device: torch.device) -> int:
@@ -121,7 +124,17 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]] | No
     """Return what a checkpoint says of itself and its tensors; None if there is none or it is damaged."""
     try:
         with safetensors.safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {}).get(_KEY, "{}"))
-            return about, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (OSError, ValueError, SafetensorError):
+            about = json.loads((file.metadata() or {})[_KEY])
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        return (about, tensors) if about.pop("sha256") == _sha256(about, tensors) else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RuntimeError, SafetensorError):
         return None
+
+
+def _sha256(about: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
+    """Return the hash of a checkpoint: of what it says of itself, and of each tensor's name, type, shape and bytes."""
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, tensor in sorted(tensors.items()):
+        digest.update(f"\n{name} {tensor.dtype} {list(tensor.shape)}\n".encode())
+        digest.update(tensor.reshape(-1).view(torch.uint8).numpy().data)
+    return digest.hexdigest()

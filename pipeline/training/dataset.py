@@ -49,7 +49,7 @@ class Rows:
 
 
 def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> Rows:
-    """Return the training rows of fabrics, mapped from `cache`, which is written first if it is not there.
+    """Return the training rows of fabrics, mapped from `cache`, which is written anew: an older one may be damaged.
 
     Parameters
     ----------
@@ -61,15 +61,14 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
         A ``.npy`` file; the caller names it after what it holds and deletes it in the end.
     """
     counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
-    if not cache.exists():
-        with atomic_path(cache) as temporary:
-            shape = (sum(counts), COLUMNS)
-            table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-            start = 0
-            for name, count in zip(fabrics, counts, strict=True):
-                table[start : start + count] = as_table(*manifest.read(folder, name, "train"))
-                start += count
-            table.flush()
+    with atomic_path(cache) as temporary:
+        shape = (sum(counts), COLUMNS)
+        table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
+        start = 0
+        for name, count in zip(fabrics, counts, strict=True):
+            table[start : start + count] = as_table(*manifest.read(folder, name, "train"))
+            start += count
+        table.flush()
     return Rows(np.load(cache, mmap_mode="r"), counts)
 
 

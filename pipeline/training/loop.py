@@ -21,11 +21,11 @@ import torch
 from torch import nn
 
 from pipeline import versions
-from pipeline.atomic import atomic_write
 from pipeline.fingerprint import fingerprint
+from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
-from pipeline.models.registry import CARD, WEIGHTS, module_of
+from pipeline.models.registry import module_of
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows
@@ -154,8 +154,7 @@ def _write(folder: Path, weights: dict[str, torch.Tensor], card: dict[str, Any],
     """Write weights and card."""
     # One key of metadata: safetensors writes several in no fixed order.
     metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
-    atomic_write(folder / WEIGHTS, safetensors.torch.save(weights, metadata=metadata))
-    atomic_write(folder / CARD, json.dumps(card, indent=1, sort_keys=True).encode() + b"\n")
+    write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
 
 
 def rate_factor(step: int, training: TrainingOptions) -> float:

@@ -24,6 +24,8 @@ class Fake(Task):
     fails: str = ""
     forgets: bool = False
     hides: bool = False
+    damages: str = ""
+    always: bool = False
 
     @property
     def group(self):
@@ -54,6 +56,10 @@ class Fake(Task):
         if self.dies and not (out / f"{self.name}.died").exists():
             (out / f"{self.name}.died").touch()
             os.kill(os.getpid(), signal.SIGKILL)
+        if self.damages and (self.always or not (out / f"{self.name}.damaged").exists()):
+            (out / f"{self.name}.damaged").touch()
+            Path(self.damages).write_text("damaged\n" * 100)
+            raise ValueError("a file that cannot be read")
         if self.fails:
             raise eval(self.fails)
         if not self.forgets:

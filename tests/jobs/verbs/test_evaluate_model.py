@@ -10,6 +10,7 @@ import safetensors.torch
 import torch
 
 from jobs.cli import main
+from pipeline.models.card import read_card, read_weights, write_model
 from pipeline.models.domain import Domain
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.models.woven.options import WovenOptions
@@ -35,9 +36,7 @@ def folder(network, tmp_path):
         "options": SMALL.model_dump(mode="json"),
         "domain": domain.model_dump(mode="json"),
     }
-    (tmp_path / "model").mkdir()
-    (tmp_path / "model" / "card.json").write_text(json.dumps(card))
-    (tmp_path / "model" / "model.safetensors").write_bytes(safetensors.torch.save(network.state_dict()))
+    write_model(tmp_path / "model", safetensors.torch.save(network.state_dict()), card)
     return tmp_path / "model"
 
 
@@ -99,15 +98,15 @@ def test_rows_it_was_not_taught_are_named_before_anything_is_computed_and_can_be
 
 
 def test_a_model_of_another_version_is_refused(folder, tmp_path, capsys):
-    card = json.loads((folder / "card.json").read_text())
-    (folder / "card.json").write_text(json.dumps(card | {"version": {"model": 99}}))
+    card = read_card(folder)
+    write_model(folder, read_weights(folder, card), card | {"version": {"model": 99}})
     path = file_of(asked(), tmp_path / "queries.parquet")
     assert main(["evaluate", "denim", path, "--out", str(tmp_path / "r.parquet"), "--model", str(folder)]) == 2
     assert "version = 99: this is version 1 of woven" in " ".join(capsys.readouterr().err.split())
 
 
 def test_weights_that_do_not_fit_the_card_are_refused(folder, tmp_path, capsys):
-    (folder / "model.safetensors").write_bytes(safetensors.torch.save({"a": torch.zeros(2)}))
+    write_model(folder, safetensors.torch.save({"a": torch.zeros(2)}), read_card(folder))
     path = file_of(asked(), tmp_path / "queries.parquet")
     assert main(["evaluate", "denim", path, "--out", str(tmp_path / "r.parquet"), "--model", str(folder)]) == 2
     assert "do not fit together" in " ".join(capsys.readouterr().err.split())

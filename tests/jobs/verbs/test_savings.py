@@ -16,6 +16,7 @@ from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from jobs.verbs.require_recipe import write_recipe
 from jobs.verbs.savings import DIFFERENCE, Saving, Value, conclusion, saved
+from pipeline.models.card import write_model
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.measure.pictures import write_picture
@@ -75,8 +76,9 @@ class Runs:
             for path in task.products:
                 file = self.out / path
                 file.parent.mkdir(parents=True, exist_ok=True)
-                steps = task.training.steps if task.stage == "train" else None
-                file.write_text(json.dumps({"steps_taken": steps}) if path.endswith("card.json") else "1234567")
+                file.write_text("1234567")
+            if task.stage == "train":
+                write_model(self.out / task.folder, b"1234567", {"steps_taken": task.training.steps})
             files = {(self.out / path).name: measure(self.out / path) for path in task.products}
             ledger.finish(task, files, seconds)
         return self

@@ -1,13 +1,18 @@
-import json
-
 import pytest
+import safetensors.torch
+import torch
 
+from pipeline.models.card import write_model
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.models.woven.options import WovenOptions
 from weaves.errors import BadInput
+
+
+def card_of(options, version=1):
+    return {"options": options.model_dump(mode="json"), "version": {"model": version}}
 
 
 def test_every_model_is_the_folder_of_its_name():
@@ -29,30 +34,29 @@ def test_point_sampled_gives_one_method_for_each_count():
 
 
 def test_a_folder_without_a_model_is_bad_input(tmp_path):
-    with pytest.raises(BadInput, match=r"card\.json"):
+    with pytest.raises(BadInput, match=r"card\.json: does not exist"):
         load_model(tmp_path)
     (tmp_path / "card.json").write_text("{")
     with pytest.raises(BadInput, match="damaged"):
         load_model(tmp_path)
-    (tmp_path / "card.json").write_text('{"options": {"model": "wovenn"}}')
+    write_model(tmp_path, b"", {"options": {"model": "wovenn"}})
     with pytest.raises(BadInput, match="options"):
         load_model(tmp_path)
 
 
-def test_missing_or_broken_weights_are_bad_input(tmp_path):
-    options = WovenOptions()
-    (tmp_path / "card.json").write_text(
-        json.dumps({"options": options.model_dump(mode="json"), "version": {"model": 1}})
-    )
+def test_files_of_weights_that_are_none_are_bad_input(tmp_path):
+    write_model(tmp_path, b"\0" * 16, card_of(WovenOptions()))
     with pytest.raises(BadInput, match=r"model\.safetensors"):
         load_model(tmp_path)
-    (tmp_path / "model.safetensors").write_bytes(b"\0" * 16)
-    with pytest.raises(BadInput, match=r"model\.safetensors"):
+    write_model(tmp_path, safetensors.torch.save({"a": torch.zeros(2)}), card_of(WovenOptions()))
+    with pytest.raises(BadInput, match="do not fit together"):
         load_model(tmp_path)
 
 
-def test_other_options_than_the_trained_ones_are_bad_input(tmp_path):
-    card = {"options": NeumipOptions(hidden=16).model_dump(mode="json")}
-    (tmp_path / "card.json").write_text(json.dumps(card))
+def test_other_options_or_versions_than_the_trained_ones_are_bad_input(tmp_path):
+    write_model(tmp_path, b"", card_of(NeumipOptions(hidden=16)))
     with pytest.raises(BadInput, match="other options"):
+        load_methods(NeumipOptions(), [tmp_path])
+    write_model(tmp_path, b"", card_of(NeumipOptions(), version=99))
+    with pytest.raises(BadInput, match="version = 99"):
         load_methods(NeumipOptions(), [tmp_path])

@@ -1,0 +1,79 @@
+"""Files of a trained model: its weights, and its card, which holds the SHA-256 of the weights and of itself.
+
+Both are compared with these hashes whenever a model is loaded, so that no damaged file is used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from pipeline.atomic import atomic_write
+from weaves.errors import BadInput
+
+WEIGHTS, CARD = "model.safetensors", "card.json"
+
+HASHES: Final = "sha256"
+"""Key of a card: the hash of the weights' file, and that of the card without this second hash."""
+
+_MOST_BYTES: Final = 1 << 26  # of a card; those of a hundred fabrics have 100 kB
+
+
+def write_model(folder: Path, weights: bytes, card: Mapping[str, Any]) -> None:
+    """Write weights and card; the card receives its hashes. The same input gives the same bytes."""
+    atomic_write(folder / WEIGHTS, weights)
+    atomic_write(folder / CARD, _with_hashes(card, _sha256(weights)))
+
+
+def read_card(folder: Path) -> dict[str, Any]:
+    """Return the card of a trained model; BadInput if it is missing, damaged, or written before cards had hashes."""
+    path = folder / CARD
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES)
+        card = json.loads(content)
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "does not exist", "train the model first") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise _damaged(path) from error
+    if not isinstance(card, dict):
+        raise _damaged(path)
+    hashes = card.get(HASHES)
+    if hashes is None:
+        raise BadInput(str(path), "", "has no hashes: it is of an earlier version, or damaged", "train it again")
+    if not isinstance(hashes, dict) or content != _with_hashes(card, hashes.get("weights")):
+        raise _damaged(path)
+    return card
+
+
+def read_weights(folder: Path, card: Mapping[str, Any]) -> bytes:
+    """Return the weights' file that a card from `read_card` belongs to; BadInput if it is missing or another one."""
+    path = folder / WEIGHTS
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadInput(str(path), "", error.strerror or "not readable", "train it again") from error
+    if _sha256(content) != card[HASHES]["weights"]:
+        raise BadInput(str(path), "", "damaged, its SHA-256 is not the one on the card", "train it again")
+    return content
+
+
+def _with_hashes(card: Mapping[str, Any], weights: Any) -> bytes:
+    """Return the bytes of a card with the hash of its weights and its own."""
+    own = _encoded({**card, HASHES: {"weights": weights}})
+    return _encoded({**card, HASHES: {"weights": weights, "card": _sha256(own)}})
+
+
+def _encoded(card: Mapping[str, Any]) -> bytes:
+    return json.dumps(card, indent=1, sort_keys=True).encode() + b"\n"
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _damaged(path: Path) -> BadInput:
+    return BadInput(str(path), "", "damaged, its bytes are not those that were written", "train it again")

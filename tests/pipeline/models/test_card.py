@@ -1,0 +1,70 @@
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights, write_model
+from weaves.errors import BadInput
+
+CONTENT = {"model": "woven", "options": {"hidden": 16, "rate": 1e-3}, "curve": [{"step": 1, "loss": 0.5}], "ü": None}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("model")
+    write_model(folder, bytes(range(256)), CONTENT)
+    return folder
+
+
+def test_what_is_written_is_read(folder):
+    card = read_card(folder)
+    assert read_weights(folder, card) == bytes(range(256))
+    assert {key: value for key, value in card.items() if key != "sha256"} == CONTENT
+
+
+def test_a_card_that_is_written_again_has_the_same_bytes(folder, tmp_path):
+    write_model(tmp_path, bytes(range(256)), read_card(folder))
+    assert (tmp_path / CARD).read_bytes() == (folder / CARD).read_bytes()
+
+
+@given(st.data())
+def test_every_flip_of_a_card_is_refused(folder, tmp_path_factory, data):
+    """Each byte by each mask: also those that change nothing that JSON means, such as a space into a tab."""
+    whole = (folder / CARD).read_bytes()
+    place, mask = data.draw(st.integers(0, len(whole) - 1)), data.draw(st.integers(1, 255))
+    damaged = tmp_path_factory.getbasetemp() / "damaged"
+    damaged.mkdir(exist_ok=True)
+    (damaged / CARD).write_bytes(whole[:place] + bytes([whole[place] ^ mask]) + whole[place + 1 :])
+    with pytest.raises(BadInput, match=r"card\.json: (damaged|has no hashes).*train it again"):
+        read_card(damaged)
+
+
+@pytest.mark.parametrize("place", range(0, 256, 15))
+def test_every_flip_of_weights_is_refused(folder, tmp_path, place):
+    write_model(tmp_path, bytes(range(256)), CONTENT)
+    content = bytearray(range(256))
+    content[place] ^= 1 << place % 8
+    (tmp_path / WEIGHTS).write_bytes(content)
+    with pytest.raises(BadInput, match=r"model\.safetensors: damaged, its SHA-256.*train it again"):
+        read_weights(tmp_path, read_card(tmp_path))
+
+
+def test_a_card_of_an_earlier_version_is_refused(tmp_path):
+    (tmp_path / CARD).write_text(json.dumps(CONTENT, indent=1, sort_keys=True) + "\n")
+    with pytest.raises(BadInput, match="has no hashes: it is of an earlier version"):
+        read_card(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"7", b"\xff", b"[" * 100_000, b'{"sha256": 3}', b'{"sha256": {}}'])
+def test_what_is_no_card_is_refused(tmp_path, content):
+    (tmp_path / CARD).write_bytes(content)
+    with pytest.raises(BadInput, match="damaged"):
+        read_card(tmp_path)
+
+
+def test_missing_files_are_named(folder, tmp_path):
+    with pytest.raises(BadInput, match=r"card\.json: does not exist: train the model first"):
+        read_card(tmp_path)
+    with pytest.raises(BadInput, match=r"model\.safetensors: No such file"):
+        read_weights(tmp_path, read_card(folder))
