@@ -79,12 +79,13 @@ class Ledger:
         receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3), identity=identity)
         durable = (now := time.monotonic()) - self._synced >= _SECONDS_BETWEEN_SYNCS
         self._synced = now if durable else self._synced
-        self._write(self._receipt(task), receipt.model_dump(), durable)
+        atomic_write(self._receipt(task), receipt.with_checksum().encoded(), durable=durable)
         self._note(task).unlink(missing_ok=True)
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
         """Note why a task failed."""
-        self._write(self._note(task), {**_heading(task), "reason": reason, "traceback": traceback})
+        note = {**_heading(task), "reason": reason, "traceback": traceback}
+        atomic_write(self._note(task), json.dumps(note, indent=1).encode() + b"\n")
 
     def adopt(self, task: Task) -> bool:
         """Take a task's products from another data set; return whether the task is then done.
@@ -173,10 +174,6 @@ class Ledger:
         except (OSError, ValueError, RecursionError):
             return {}
         return content if isinstance(content, dict) else {}
-
-    @staticmethod
-    def _write(path: Path, content: Mapping[str, Any], durable: bool = True) -> None:
-        atomic_write(path, json.dumps(content, indent=1).encode() + b"\n", durable=durable)
 
 
 def _heading(task: Task) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
@@ -12,6 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pipeline.fingerprint import file_sha256, fingerprint
 
 _MOST_BYTES: Final = 1 << 20  # of a receipt; a task has a few products
+
+_CHECKSUM_DIGITS: Final = 16
 
 _LONGEST_LEAF: Final = 24  # characters of a value that is written as it is
 
@@ -42,6 +46,24 @@ class Receipt(BaseModel):
     seconds: Annotated[float, Field(ge=0.0)]
     identity: dict[str, Leaf] = {}
     """What the task depended on, by dotted key (`leaves`); it says later which key has changed."""
+    checksum: str = ""
+    """Hash of the rest; receipts of earlier versions have none."""
+
+    def encoded(self) -> bytes:
+        """Return the bytes of its file."""
+        return _encoded(self.model_dump(exclude_unset=True))
+
+    def with_checksum(self) -> Receipt:
+        """Return it with the hash of the rest."""
+        return self.model_copy(update={"checksum": self._hash()})
+
+    def is_whole(self) -> bool:
+        """Return whether its hash, if it has one, is that of the rest."""
+        return "checksum" not in self.model_fields_set or self.checksum == self._hash()
+
+    def _hash(self) -> str:
+        content = self.model_dump(exclude_unset=True, exclude={"checksum"})
+        return hashlib.sha256(_encoded(content)).hexdigest()[:_CHECKSUM_DIGITS]
 
 
 def leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
@@ -68,7 +90,13 @@ def read_receipt(path: Path, task: str) -> Receipt | None:
         receipt = Receipt.model_validate_json(content) if len(content) <= _MOST_BYTES else None
     except (OSError, ValidationError, RecursionError):
         return None
-    return receipt if receipt and receipt.task == task else None
+    if receipt is None or receipt.task != task or content != receipt.encoded() or not receipt.is_whole():
+        return None
+    return receipt
+
+
+def _encoded(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, indent=1).encode() + b"\n"
 
 
 def measure(path: Path) -> Product:
