@@ -60,8 +60,13 @@ class Page(Task):
 
     @property
     def products(self) -> tuple[str, ...]:
-        """The page."""
-        return (f"report/{self.recipe}/index.html",)
+        """The page, and the list of the other files in its folder with their hashes."""
+        return (f"{self.folder}/index.html", f"{self.folder}/files.json")
+
+    @property
+    def folder(self) -> str:
+        """Folder of the page."""
+        return f"report/{self.recipe}"
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -106,7 +111,7 @@ class Page(Task):
             machine=read_machine(out / self.timing),
             pictures=[PictureFile(p.fabric, p.scene, p.method, p.setting, out / p.path) for p in self.pictures],
         )
-        write_page((out / self.products[0]).parent, content, progress)
+        write_page(out / self.folder, content, progress)
 
 
 def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[str, str]) -> Page:

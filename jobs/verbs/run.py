@@ -40,6 +40,8 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Schedu
     ledger = Ledger(out)
     with ledger.held():
         manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]
+        for manifest in manifests:
+            manifest.save()  # whatever its file holds now
 
         def recorded(task: Task) -> None:
             for manifest in manifests:

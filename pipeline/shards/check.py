@@ -26,10 +26,26 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
     faults = []
     if file_sha256(path) != entry.sha256:
         faults.append(f"{path}: its bytes are not those that were written (SHA-256 differs); delete it and generate")
+    return faults + check_values(path, entry, manifest.fabrics[entry.fabric].weave.repeat)
+
+
+def check_values(path: Path, entry: ShardEntry, repeat: tuple[int, int]) -> list[str]:
+    """Return every fault of a shard's rows as a sentence: schema, number, ranges.
+
+    Parameters
+    ----------
+    path : Path
+        The shard.
+    entry : ShardEntry
+        Its entry in the manifest.
+    repeat : (int, int)
+        Ends and picks of its fabric's repeat.
+    """
+    faults = []
     try:
         table = read_table(path, entry.kind)
     except BadInput as error:
-        return [*faults, str(error)]
+        return [str(error)]
     if table.num_rows != entry.rows:
         faults.append(f"{path}: holds {table.num_rows} rows, the manifest says {entry.rows}")
     if pc.unique(table.column("fabric")).to_pylist() != [entry.fabric]:
@@ -37,7 +53,7 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
 
     # Values: finite, within their ranges, directions of unit length.
     column = {name: table.column(name).to_numpy() for name in SCHEMAS[entry.kind].names[1:]}
-    ends, picks = manifest.fabrics[entry.fabric].weave.repeat
+    ends, picks = repeat
     ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (-1.0, 1.0), "count": (1, np.inf)}
     ranges |= {"angle": (-np.inf, np.inf), "curvature": (0.0, STEEPEST_CURVATURE)}
     ranges |= {TRANSPARENCY: (0.0, 1.0), f"{TRANSPARENCY}_standard_error": (0.0, np.inf)}

@@ -8,6 +8,7 @@ rows).
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Literal
 
@@ -84,10 +85,17 @@ class Manifest(BaseModel):
             raise BadInput(str(path), "", f"not a manifest ({key} {first['msg']})", "generate the data set") from error
 
     def save(self, folder: Path) -> None:
-        """Write the manifest whole or not at all; the same contents give the same bytes."""
+        """Write the manifest whole or not at all."""
+        atomic_write(folder / FILE, self.encoded())
+
+    def encoded(self) -> bytes:
+        """Return the bytes of its file; the same contents give the same bytes."""
         ordered = self.model_copy(update={"shards": sorted(self.shards, key=lambda s: (s.fabric, s.split, s.start))})
-        text = json.dumps(ordered.model_dump(mode="json"), indent=1, sort_keys=True)
-        atomic_write(folder / FILE, text.encode() + b"\n")
+        return json.dumps(ordered.model_dump(mode="json"), indent=1, sort_keys=True).encode() + b"\n"
+
+    def without(self, files: Collection[str]) -> Manifest:
+        """Return the manifest without the shards in some files."""
+        return self.model_copy(update={"shards": [shard for shard in self.shards if shard.file not in files]})
 
     def names(self, *roles: Role) -> list[str]:
         """Return the fabrics in any of the roles, in the recipe's order."""

@@ -1,6 +1,7 @@
 """Folder of a page: ``index.html``, its figures, tables and Records; it needs nothing outside of it.
 
-The same input gives the same bytes. Figures are written first and the page last: a page that exists is whole.
+The same input gives the same bytes. Figures are written first, then ``files.json`` with the hashes of all files, and
+the page last: a page that exists is whole.
 """
 
 from __future__ import annotations
@@ -22,11 +23,12 @@ from reports.measure.extremes import extremes_table
 from reports.measure.silhouette import silhouette_table
 from reports.page import figures, front_figures
 from reports.page.content import PageInput
+from reports.page.files import write_files
 from reports.page.filmstrip import filmstrip, liveliest
 from reports.page.html import page_html, schemes, truth_measurements
 from reports.page.picture_strips import films
 from reports.page.plot_style import render
-from reports.record import OF_A_PAGE, TRUTH, Record, to_table, write_records
+from reports.record import OF_A_PAGE, TRUTH, Record, machine_path, to_table, write_records
 from reports.tables import summary
 from reports.tables.equal_time import equal_time_table, size_table
 from reports.tables.tradeoff import tradeoff_table
@@ -51,17 +53,22 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         If a picture is missing, or the folder cannot be written.
     """
     tables = page_tables(page.records)
+    written = [OF_A_PAGE, machine_path(Path(OF_A_PAGE)).name]
     for name, table in tables.items():
         write_table(folder / "tables" / name, table)
+        written += [f"tables/{name}.csv", f"tables/{name}.parquet"]
     progress(0.1)
     images = dict(_plots(tables, page))
     for name, content in images.items():
         atomic_write(folder / "figures" / name, content)
+        written.append(f"figures/{name}")
     progress(0.4)
     for done, (name, content) in enumerate(_tiles(page)):
         atomic_write(folder / "figures" / name, content)
+        written.append(f"figures/{name}")
         progress(0.4 + 0.6 * min(1.0, (done + 1) / (3 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
     write_records(folder / OF_A_PAGE, page.records, page.machine)
+    write_files(folder, written)
     index = folder / "index.html"
     atomic_write(index, page_html(page, tables, {name.removesuffix("-light.png") for name in images}).encode())
     return index

@@ -109,6 +109,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
         def run() -> None:
             ledger = Ledger(folder / "out")
             manifest = ManifestFile(recipe, own, ledger)
+            manifest.save()
             quiet = Console(file=io.StringIO())
             summary = execute(tasks, ledger.out, scheduler=connection, workers=2, recorded=manifest.add, console=quiet)
             assert len(summary.ran) + len(summary.before) == count, summary

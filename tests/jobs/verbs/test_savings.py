@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from pipeline.models.card import write_model
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.measure.pictures import write_picture
+from reports.page.files import write_files
 from reports.record import OF_A_PAGE, Record, this_machine, write_records
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -110,7 +112,8 @@ class Runs:
         """Write the receipt of the page of the scene's recipe."""
         page = plan(load_recipe(self.own))[-1]
         (self.out / page.products[0]).write_text("<html>")
-        Ledger(self.out).finish(page, {"index.html": measure(self.out / page.products[0])}, 1.0)
+        write_files(self.out / page.folder, [])
+        Ledger(self.out).finish(page, {Path(path).name: measure(self.out / path) for path in page.products}, 1.0)
 
 
 @pytest.fixture

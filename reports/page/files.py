@@ -1,0 +1,49 @@
+"""Files of a page's folder with their hashes: ``files.json``, so that a damaged one is found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+from pydantic import TypeAdapter, ValidationError
+
+from pipeline.atomic import atomic_write
+from pipeline.fingerprint import file_sha256
+from weaves.errors import BadInput
+
+FILES: Final = "files.json"
+"""It lists neither itself nor ``index.html``, which is written last."""
+
+_LIST: Final = TypeAdapter(dict[str, str])
+
+
+def write_files(folder: Path, names: Iterable[str]) -> None:
+    """List files of a page, given by their paths in its folder, and remove those that only the list before had."""
+    hashes = {name: file_sha256(folder / name) for name in sorted(names)}
+    for name in _found(folder).keys() - hashes:
+        (folder / name).unlink(missing_ok=True)
+    atomic_write(folder / FILES, json.dumps(hashes, indent=1).encode() + b"\n")
+
+
+def read_files(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file of a page by its path in the folder; BadInput if there is no valid list."""
+    path = folder / FILES
+    try:
+        found = _LIST.validate_json(path.read_bytes(), strict=True)
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "does not exist", "write the page again with `twillight report`") from error
+    except (OSError, ValidationError) as error:
+        raise BadInput(str(path), "", "damaged", "write the page again with `twillight report`") from error
+    if any(Path(name).is_absolute() or ".." in Path(name).parts for name in found):
+        raise BadInput(str(path), "", "names files outside of its folder", "write the page again")
+    return found
+
+
+def _found(folder: Path) -> dict[str, str]:
+    """Return the list of an earlier page; empty if there is none."""
+    try:
+        return read_files(folder)
+    except BadInput:
+        return {}
