@@ -1,4 +1,7 @@
-"""Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators."""
+"""Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators.
+
+Of a population the first 32 members are kept.
+"""
 
 import tomllib
 
@@ -11,6 +14,7 @@ from pipeline.training.options import TrainingOptions
 from reports.options import BenchOptions
 
 SCALE = 100
+MOST_MEMBERS = 32
 
 
 def write_small(name, folder):
@@ -19,6 +23,8 @@ def write_small(name, folder):
     dataset = content["dataset"]
     least = {"train": 128, "population": 64, "validation": 64, "test": 128}
     dataset["rows"] = _scaled(Rows(**dataset["rows"]).model_dump(), least)
+    if "population" in dataset:
+        dataset["population"]["count"] = min(dataset["population"]["count"], MOST_MEMBERS)
     dataset["shard_rows"] = 4096  # each shard is a task
     content["models"] = [_model(entry, folder) for entry in content["models"]]
     content["bench"] = _bench(content.get("bench", {}))

@@ -122,6 +122,7 @@ def test_eight_bits_cost_a_percent_and_save_three_bytes_of_four():
     assert saved == pytest.approx(3 * weights, rel=0.1)
 
 
+@pytest.mark.slow
 def test_torch_compiles_a_module_and_any_thread_may_call_it():
     if reason := RUNTIMES["compile"].missing():
         pytest.skip(reason)

@@ -13,7 +13,7 @@ from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 LEVEL = 0.01
-ROWS, COLUMNS, NODES = 16, 32, 24  # cells in cosine and azimuth; quadrature nodes along each side of a cell
+ROWS, COLUMNS, NODES = 16, 32, 16  # cells in cosine and azimuth; quadrature nodes along each side of a cell
 COUNT = 100_000
 FABRICS = [load_fabric(name) for name in ("polyester_lining", "silk_charmeuse", "voile")]
 CONFIGURATIONS = list(itertools.product(FABRICS, (0.02, 1.5), ((30.0, 20.0), (75.0, 130.0))))
