@@ -6,8 +6,9 @@ SIGTERM, 129 SIGHUP. A verb's modules are imported when it runs, so that help is
 
 from __future__ import annotations
 
-import hashlib
+import io
 import os
+import shlex
 import signal
 import sys
 import tempfile
@@ -22,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from weaves.errors import BadInput, WorkFailed
+from weaves.errors import BadInput, WorkFailed, one_line
 
 if TYPE_CHECKING:
     from jobs.run.cluster import Scheduler
@@ -110,13 +111,12 @@ def export(
     repeats: Annotated[int, Parameter(help="Copies of the repeat in each direction.")] = 1,
 ) -> None:
     """Write a fabric's surface as a coloured triangle mesh, for any 3D program."""
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from jobs.verbs.export import write_mesh
     from weaves.fabric import load_fabric
 
     triangles = write_mesh(load_fabric(fabric), mesh, vertices, repeats)
-    Console().print(f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up", soft_wrap=True, highlight=False)
+    Terminal().print(f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up", soft_wrap=True)
 
 
 @app.command(sort_key=3)
@@ -328,13 +328,16 @@ def _signals() -> Iterator[None]:
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     tokens = sys.argv[1:] if tokens is None else tokens
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
     try:
         with _signals():
             answer = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
     except CycloptsError as error:
-        return _end(f"twillight: {' '.join(str(error).split())}", 2)
+        return _end(f"twillight: {error}", 2)
     except (BadInput, WorkFailed) as error:
         return _end(str(error), error.exit_code)
     except KeyboardInterrupt as stop:
@@ -344,8 +347,8 @@ def main(tokens: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
-        path = _save_crash(tokens, traceback.format_exc())
-        return _end(f"{type(error).__name__}: this is a bug in twillight; please report it with {path}", 1)
+        saved = _save_crash(tokens, traceback.format_exc())
+        return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
 
 
 def _end(sentence: str, code: int) -> int:
@@ -354,22 +357,25 @@ def _end(sentence: str, code: int) -> int:
 
 
 def _print_error(sentence: str) -> None:
-    print(sentence, file=sys.stderr, flush=True)
+    print(one_line(sentence), file=sys.stderr, flush=True)
 
 
-def _save_crash(tokens: Sequence[str], trace: str) -> Path:
-    """Save a traceback in the output folder, or, when that cannot be written, in the system's temporary folder."""
-    options = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
-    options += [value for option, value in pairwise(tokens) if option == "--out"]
-    name = f"crash-{hashlib.sha256(trace.encode()).hexdigest()[:8]}.txt"
-    for folder in (Path(options[0]) if options else OUT, Path(tempfile.gettempdir())):
+def _save_crash(tokens: Sequence[str], trace: str) -> str:
+    """Save a traceback in the output folder, if there is one, else in the system's temporary folder; say where.
+
+    No folder is created: what follows `--out` may name a file that a verb was to write.
+    """
+    given = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
+    given += [value for option, value in pairwise(tokens) if option == "--out"]
+    for folder in (Path(given[0]) if given else OUT, Path(tempfile.gettempdir())):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(f"twillight {' '.join(tokens)}\n\n{trace}", encoding="utf-8")
+            handle, name = tempfile.mkstemp(".txt", "crash-", folder)
+            with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:  # noqa: PTH123, a handle
+                file.write(f"twillight {shlex.join(tokens)}\n\n{trace}")
         except OSError:
             continue
-        return folder / name
-    return Path(name)
+        return f"please report it with {name}"
+    return "no report of it could be written"
 
 
 if __name__ == "__main__":

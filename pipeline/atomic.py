@@ -12,6 +12,7 @@ from pathlib import Path
 from weaves.errors import BadInput, WorkFailed
 
 _UNWRITABLE = {errno.ENOENT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR}
+_UNWRITABLE |= {errno.ENAMETOOLONG, errno.ELOOP}
 
 
 @contextmanager

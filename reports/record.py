@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import pandas as pd
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, TypeAdapter, ValidationError
 
 from pipeline import versions
 from pipeline.atomic import atomic_write
@@ -25,6 +25,7 @@ from reports.catalogue import METRICS
 from reports.error import Error
 from reports.options import Role
 from weaves.errors import BadInput
+from weaves.reading import MIB, read_json
 
 PACKAGES: Final = (
     "numpy",
@@ -106,11 +107,11 @@ class Record(BaseModel):
     """Queries, pixels, frames or repeats behind it."""
     unit: str = "1"
     """Unit of `value`."""
-    curve: tuple[tuple[float, float], ...] = ()
+    curve: Annotated[tuple[tuple[float, float], ...], FailFast()] = ()
     """Points of a curve, where one number does not say it all."""
     threads: int = 0
     """Threads that worked at the same time; 0 where it does not matter."""
-    samples: tuple[float, ...] = ()
+    samples: Annotated[tuple[float, ...], FailFast()] = ()
     """Every reading behind a time, in `unit`, in the order they were taken."""
     note: str = ""
     """Further information on `value`, such as the input that gave it."""
@@ -145,7 +146,10 @@ class Record(BaseModel):
         ]
 
 
-_RECORDS: Final = TypeAdapter(list[Record])
+_MOST_BYTES: Final = 16 * MIB  # of a file of records; the page of `standard` has 2.5
+_MOST_RECORDS: Final = 100_000
+
+_RECORDS: Final = TypeAdapter(Annotated[list[Record], Field(max_length=_MOST_RECORDS), FailFast()])
 
 
 class Machine(BaseModel):
@@ -204,7 +208,7 @@ def read_records(paths: Iterable[Path]) -> list[Record]:
     records: list[Record] = []
     for path in paths:
         try:
-            records += _RECORDS.validate_json(path.read_bytes())
+            records += _RECORDS.validate_python(read_json(path, _MOST_BYTES, "a file of records"))
         except FileNotFoundError as error:
             raise BadInput(str(path), "", "does not exist", "records are needed; run the benchmark first") from error
         except ValidationError as error:
@@ -220,7 +224,7 @@ def read_machine(path: Path) -> Machine:
     """Read the machine of the records in `path`; BadInput if it is missing or broken."""
     beside = machine_path(path)
     try:
-        return Machine.model_validate_json(beside.read_bytes())
+        return Machine.model_validate(read_json(beside, MIB, "a file of one machine"))
     except (FileNotFoundError, ValidationError) as error:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
 

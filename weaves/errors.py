@@ -1,14 +1,23 @@
 """Errors for the user: bad input, and work that failed.
 
-Each carries one sentence. The command line prints it without a traceback and exits with `exit_code`.
+Each carries one sentence. The command line prints it without a traceback and exits with `exit_code`. Files, keys and
+values in it come from outside: they are shortened, and characters that a terminal would obey are replaced.
 """
 
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+from typing import Final
 
 from weaves.renamed import replacement
+
+MOST_LETTERS: Final = 300
+"""Most letters of a sentence."""
+
+_PART = 80  # letters of a file, a key or a value in it
+_WORD = 60  # letters of a name that is compared with known ones
 
 
 class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
@@ -30,8 +39,9 @@ class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
 
     def __init__(self, where: str, key: str, value: object, allowed: str) -> None:
         self.where, self.key, self.value, self.allowed = where, key, value, allowed
-        subject = f"{where}: {key} = {value!r}" if key else f"{where}: {value}"
-        super().__init__(f"{subject}: {allowed}")
+        place = one_line(where, _PART, keep="end")
+        subject = f"{one_line(key, _PART)} = {brief(value)}" if key else one_line(value, 2 * _PART)
+        super().__init__(one_line(f"{place}: {subject}: {allowed}"))
 
     def __reduce__(self) -> tuple[type[BadInput], tuple[str, str, object, str]]:
         # Exceptions cross process borders; the default would rebuild this one from its sentence alone.
@@ -42,6 +52,52 @@ class WorkFailed(RuntimeError):  # noqa: N818 - the name reads as the sentence d
     """Work that failed on valid input; exit code 1."""
 
     exit_code = 1
+
+
+def one_line(text: object, most: int = MOST_LETTERS, keep: str = "start") -> str:
+    """Return a text as one line that a terminal shows as it is.
+
+    Parameters
+    ----------
+    text : object
+        The text; of anything else its `str`.
+    most : int
+        Most letters; a longer text is cut.
+    keep : str
+        ``start`` or ``end``: the part that is left of a longer text. The end of a path has the file's name.
+    """
+    words = str(text)
+    cut = words[: 4 * most] if keep == "start" else words[-4 * most :]  # whatever its length, in little time
+    line = " ".join(printable(cut).split())
+    if len(line) <= most and len(cut) == len(words):
+        return line
+    return f"{line[: most - 1]}…" if keep == "start" else f"…{line[1 - most :]}"
+
+
+def brief(value: object) -> str:
+    """Return the `repr` of a value, shortened to 80 letters."""
+    return one_line(_BRIEF.repr(value), _PART)
+
+
+class _Brief(reprlib.Repr):
+    """Short forms of values, however deep, long or large."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxlist, self.maxtuple, self.maxdict = 3, 8, 8, 4
+        self.maxstring = self.maxother = self.maxlong = 60
+
+    def repr_int(self, value: int, level: int) -> str:
+        """Python refuses to write integers of thousands of digits."""
+        return super().repr_int(value, level) if value.bit_length() < 1000 else f"<{value.bit_length()} bits>"
+
+
+_BRIEF = _Brief()
+
+
+def printable(text: str) -> str:
+    """Return a text without characters that a terminal would obey: a dot stands for each of them."""
+    return text if text.isprintable() else "".join(one if one.isprintable() or one in "\n\t" else "·" for one in text)
 
 
 def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
@@ -65,6 +121,6 @@ def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
     names = sorted(known)
     if new := replacement(kind, word):
         return new
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(word[:_WORD], names, n=1, cutoff=0.5)
     suggestion = f"did you mean {close[0]!r}? " if close else ""
     return f"{suggestion}known: {', '.join(names)}"

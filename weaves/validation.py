@@ -6,18 +6,27 @@ names file, dotted key, value and what is allowed.
 
 from __future__ import annotations
 
-import reprlib
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from weaves.errors import BadInput, nearest
+from weaves.errors import BadInput, brief, nearest, one_line
+from weaves.reading import MOST_TEXT, read_text
 from weaves.renamed import KEY, replacement
 
 Model = TypeVar("Model", bound=BaseModel)
+
+MOST_DEPTH: Final = 16
+"""Most tables and lists inside one another; recipes have five."""
+
+# A key of more parts, joined by dots: tomllib takes their number squared in time and memory. Bounded repetitions, and
+# none that goes back, keep the search itself linear.
+_PART = r"""(?:(?<![\w-])[\w-]++|"(?:\\.|[^"\\\n]){0,99}+"|'[^'\n]{0,99}+')"""
+_LONG_KEY = re.compile(rf"(?:{_PART}[ \t]{{0,99}}+\.[ \t]{{0,99}}+){{{MOST_DEPTH}}}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -26,21 +35,35 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     BadInput
-        If the file is missing, unreadable, not UTF-8, or not TOML (naming the line).
+        If the file is missing, no regular file, larger than `MOST_TEXT`, not UTF-8, not TOML (naming the line), or
+        nested more deeply than `MOST_DEPTH`.
     """
-    where = _clean(str(path))
+    where = str(path)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = read_text(path, MOST_TEXT, "a TOML file")
+        if _LONG_KEY.search(text):
+            raise BadInput(where, "", "nested too deeply", f"a key has at most {MOST_DEPTH} parts")
+        content = tomllib.loads(text)
+    except BadInput:
+        raise
     except FileNotFoundError as error:
         raise BadInput(where, "", "no such file", "the path of a TOML file is needed") from error
-    except OSError as error:
-        raise BadInput(where, "", error.strerror or "not readable", "a TOML file that can be read is needed") from error
-    except UnicodeDecodeError as error:
-        raise BadInput(where, "", f"byte {error.start} is not UTF-8", "TOML files are UTF-8 text") from error
     except RecursionError as error:
-        raise BadInput(where, "", "nested too deeply", "a fabric or recipe needs three levels") from error
-    except ValueError as error:  # TOMLDecodeError, numbers of absurd length, zero bytes in the path
-        raise BadInput(where, "", "broken TOML", _clean(str(error))) from error
+        raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed") from error
+    except ValueError as error:  # TOMLDecodeError, numbers of absurd length
+        raise BadInput(where, "", "broken TOML", one_line(error)) from error
+    if _depth(content) > MOST_DEPTH:
+        raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed")
+    return content
+
+
+def _depth(content: object) -> int:
+    """Return how many tables and lists are inside one another; counting stops beyond `MOST_DEPTH`."""
+    level, depth = [content], 0
+    while level and depth <= MOST_DEPTH:
+        inside = [one.values() if isinstance(one, dict) else one for one in level if isinstance(one, dict | list)]
+        level, depth = [item for items in inside for item in items], depth + bool(inside)
+    return depth
 
 
 def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
@@ -72,23 +95,23 @@ def bad_input(error: ValidationError, model: type[BaseModel], data: object, wher
     errors = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
     first = errors[0]
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    location, value = first["loc"], _brief(first["input"])
+    location, value = first["loc"], first["input"]
     key = ".".join(_path(location, data, keep_last=first["type"] in {"missing", "extra_forbidden"}))
     match first["type"]:
         case "missing":
-            return BadInput(where, "", f"{_clean(key)} is missing", f"it is required{more}")
+            return BadInput(where, "", f"{key} is missing", f"it is required{more}")
         case "extra_forbidden":
             allowed = "unknown key; " + nearest(str(location[-1]), _fields_at(model, location[:-1]), KEY)
         case "union_tag_invalid":
             context = first["ctx"]
             discriminator = context["discriminator"].strip("'")
-            key, value = f"{key}.{discriminator}", _brief(context["tag"])
+            key, value = f"{key}.{discriminator}", context["tag"]
             allowed = nearest(
                 context["tag"], [name.strip(" '") for name in context["expected_tags"].split(",")], discriminator
             )
         case "union_tag_not_found":
             discriminator = first["ctx"]["discriminator"].strip("'")
-            return BadInput(where, "", f"{_clean(key)}.{discriminator} is missing", f"it is required{more}")
+            return BadInput(where, "", f"{key}.{discriminator} is missing", f"it is required{more}")
         case "literal_error" if new := replacement(str(location[-1]), first["input"]):
             allowed = new
         case "model_type" | "model_attributes_type" | "dict_type":
@@ -100,8 +123,8 @@ def bad_input(error: ValidationError, model: type[BaseModel], data: object, wher
                 # A rule of the weave (such as the moves of a satin) names its own key below this one.
                 key, value, allowed = ".".join(filter(None, (key, cause.key))), cause.value, cause.allowed
     if not key:
-        return BadInput(where, "", f"found {value!r}", allowed + more)
-    return BadInput(where, _clean(key), value, allowed + more)
+        return BadInput(where, "", f"found {brief(value)}", allowed + more)
+    return BadInput(where, key, value, allowed + more)
 
 
 def _path(location: Sequence[int | str], data: object, *, keep_last: bool) -> list[str]:
@@ -139,15 +162,3 @@ def _models(field: Any) -> list[type[BaseModel]]:
 
 def _tagged(model: type[BaseModel], tag: int | str) -> bool:
     return any(tag in get_args(field.annotation) for field in model.model_fields.values())
-
-
-def _brief(value: object) -> object:
-    """Shorten a value whose repr would fill the terminal."""
-    shown = reprlib.repr(value)
-    return value if shown == repr(value) and len(shown) <= 80 else _clean(str(value))
-
-
-def _clean(text: str) -> str:
-    """Return a text as one line of at most 200 characters."""
-    line = "".join(letter if letter.isprintable() else "·" for letter in text)
-    return line if len(line) <= 200 else f"{line[:200]}…"

@@ -29,6 +29,7 @@ from jobs.run.ledger import Ledger
 from jobs.run.outcome import KILLED, Outcome, one_line, work
 from jobs.run.progress import KERNELS, LOOK, TOPIC, Board, Compiling
 from jobs.run.receipt import measure
+from jobs.terminal import Terminal
 from weaves.errors import BadInput, WorkFailed
 
 _SECONDS_BETWEEN_SIGNS = 0.2
@@ -112,7 +113,7 @@ def execute(
     if not todo:
         return summary
 
-    console = console or Console(stderr=True)
+    console = console or Terminal(stderr=True)
     inputs = Inputs(tasks, ledger)
     with connected(scheduler, min(workers or os.cpu_count() or 1, len(todo)), console) as client:
         if preparations := prepare(list(todo.values())):

@@ -23,6 +23,7 @@ from jobs.run.receipt import Product, Receipt, leaves, read_receipt
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
+from weaves.reading import MIB, read_json
 
 State = Literal["done", "failed", "missing"]
 
@@ -170,8 +171,8 @@ class Ledger:
     def _read(path: Path) -> dict[str, Any]:
         """Return the note of a failure; empty if it is missing or not readable."""
         try:
-            content = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError):
+            content = read_json(path, MIB, "a note of a failure")
+        except (OSError, BadInput):
             return {}
         return content if isinstance(content, dict) else {}
 

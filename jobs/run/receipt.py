@@ -12,6 +12,8 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.fingerprint import file_sha256, fingerprint
+from weaves.errors import BadInput
+from weaves.reading import read_bytes
 
 _MOST_BYTES: Final = 1 << 20  # of a receipt; a task has a few products
 
@@ -85,10 +87,9 @@ def _leaf(value: Any) -> Leaf:
 def read_receipt(path: Path, task: str) -> Receipt | None:
     """Return the receipt of the task with this id; None if the file is missing, damaged or of another task."""
     try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
-        receipt = Receipt.model_validate_json(content) if len(content) <= _MOST_BYTES else None
-    except (OSError, ValidationError, RecursionError):
+        content = read_bytes(path, _MOST_BYTES, "a receipt")
+        receipt = Receipt.model_validate_json(content)
+    except (OSError, BadInput, ValidationError, RecursionError):
         return None
     if receipt is None or receipt.task != task or content != receipt.encoded() or not receipt.is_whole():
         return None

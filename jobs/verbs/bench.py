@@ -62,19 +62,18 @@ def stability(out: Path) -> None:
     WorkFailed
         If an expression does not hold.
     """
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.truth.finding import RECORDS, failures
     from reports.truth.stability import stability as findings_of
 
-    console = Console()
+    console = Terminal()
     with console.status("stability") as status:
         findings = findings_of(lambda about: status.update(f"stability: {about}"))
     path = out / STABILITY
     write_records(path, RECORDS.to_records(findings), this_machine(1))
     console.print(_table(findings))
-    console.print(f"\n{path}: {len(findings)} expressions", soft_wrap=True, highlight=False)
+    console.print(f"\n{path}: {len(findings)} expressions", soft_wrap=True)
     if wrong := failures(findings):
         first, more = wrong[0], f"; {len(wrong) - 1} more do not hold" if len(wrong) > 1 else ""
         raise WorkFailed(
@@ -84,13 +83,12 @@ def stability(out: Path) -> None:
 
 def truth(out: Path) -> None:
     """Measure speed, accuracy, bias and effort; print the tables and write the Records."""
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.tables import truth_rows
     from reports.truth import accuracy, bias, effort, throughput
 
-    console = Console()
+    console = Terminal()
     with console.status("the truth") as status:
 
         def all_of(about: str, found: Iterable[Measurement]) -> list[Measurement]:
@@ -114,18 +112,17 @@ def truth(out: Path) -> None:
         console.print(_columns((fabric, *truth_rows.ACCURACY), rows))
     console.print(_columns(("fabric", *truth_rows.BIAS), truth_rows.bias_rows(biases)))
     console.print(_columns(("fabric", *truth_rows.EFFORT), truth_rows.effort_rows(efforts)))
-    console.print(f"\n{path}: {len(records)} records", soft_wrap=True, highlight=False)
+    console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
 
 
 def sampler(out: Path) -> None:
     """Measure the variance that importance sampling by lobes saves; print the table and write the Records."""
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.tables import truth_rows
     from reports.truth import sampling
 
-    console = Console()
+    console = Terminal()
     with console.status("the sampler") as status:
         found = []
         for one in sampling.measure():
@@ -134,7 +131,7 @@ def sampler(out: Path) -> None:
     path = out / SAMPLER
     write_records(path, sampling.RECORDS.to_records(found), this_machine(1))
     console.print(_columns(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(found)))
-    console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True, highlight=False)
+    console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True)
 
 
 def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
@@ -162,7 +159,7 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
         table.add_column(name, justify="left" if name in ("expression", "corner", "") else "right")
     for arithmetic, rows in stability_rows(findings).items():
         table.add_section()
-        table.add_row(f"[bold]{arithmetic}")
+        table.add_row(arithmetic, style="bold")
         for row in rows:
             where = "" if row["holds"] else f"\nat {row['at']}"
             table.add_row(row["expression"], f"{row['corner']}{where}", *row["cells"], row["result"])

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from jobs.plan.dataset import folder_of, shards
 from jobs.recipe.load import load_recipe, recipe_names
+from jobs.terminal import Terminal
 from jobs.verbs.console import table_of
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
@@ -68,13 +68,13 @@ def check_dataset(folder: Path) -> list[str]:
         If the folder has no manifest.
     """
     manifest = Manifest.load(folder)
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     faults = []
     for entry in track(manifest.shards, "checking", console=console, disable=not console.is_terminal):
         faults += check_shard(folder, entry, manifest)
     rows = sum(entry.rows for entry in manifest.shards)
     if not faults:
-        Console().print(f"{folder}: {len(manifest.shards)} shards with {rows:,} rows are sound")
+        Terminal().print(f"{folder}: {len(manifest.shards)} shards with {rows:,} rows are sound")
     return faults
 
 
@@ -88,11 +88,11 @@ def check_fabric(fabric: Fabric) -> None:
     """
     from pipeline.truth.checks.invariants import INVARIANTS
 
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     found = []
     for invariant in track(INVARIANTS, "checking", console=console, disable=not console.is_terminal, transient=True):
         found += invariant(fabric)
-    Console().print(invariants_table(fabric.name, found))
+    Terminal().print(invariants_table(fabric.name, found))
     if broken := [item.name for item in found if item.status == "broken"]:
         raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(found)} invariants do not hold: {', '.join(broken)}")
 

@@ -26,8 +26,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     BadInput
         If one has no Records or no machine, the machines differ without `other_machine`, or no measurement is shared.
     """
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from reports.record import read_machine, read_records
     from reports.tables.compare import LEVEL, refuse_other_machine
     from reports.tables.compare import compare as differences
@@ -38,12 +37,12 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     machine_a, machine_b = (read_machine(file) for file in files)
     unlike = refuse_other_machine(machine_a, machine_b, other_machine)
     found = differences(first, second)
-    console = Console()
+    console = Terminal()
     for title, rows in (("time", found.times), ("MSE, 95 % interval", found.errors)):
         if rows:
             console.print(_table(title, rows), "")
     for sentence in [*unlike, *found.unlike, *busy(first, second)]:
-        console.print(f"{sentence}.", soft_wrap=True, highlight=False)
+        console.print(f"{sentence}.", soft_wrap=True)
     left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
     marked = sum(one.result not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
     summary = (
@@ -51,7 +50,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     )
     level = f"if nothing changed, any is marked at most once in {1 / LEVEL:.0f} comparisons (Holm)"
     load = "Load on the machine is not part of this test: first compare two runs of A, on a quiet machine."
-    console.print(f"{summary}; {level}.", *([load] if found.times else []), soft_wrap=True, highlight=False)
+    console.print(f"{summary}; {level}.", *([load] if found.times else []), soft_wrap=True)
 
 
 def records_file(path: Path, recipe: str = "") -> Path:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from jobs.terminal import Terminal
 from jobs.verbs.console import number, table_of
 from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
@@ -63,7 +63,7 @@ def evaluate(
         raise BadInput(WHERE, "--workers", workers, "must be 0 (one per core) or more")
     if not 0 <= seed < 2**64:
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     columns = TextColumn("evaluating"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bars:
         bar = bars.add_task("evaluating", total=1.0)
@@ -81,12 +81,12 @@ def evaluate(
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None
-    Console().print(evaluation_table(summary))
-    Console().print(str(out), soft_wrap=True, highlight=False)
+    Terminal().print(evaluation_table(summary))
+    Terminal().print(str(out), soft_wrap=True)
     if summary.bad:
         rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
         note = f"{rows} no answer; see {bad_list(out)}"
-        Console().print(note, soft_wrap=True, highlight=False)
+        Terminal().print(note, soft_wrap=True)
 
 
 def evaluation_table(summary: Summary) -> Table:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.table import Table
 
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.recipe.recipe import Recipe
+from jobs.terminal import Terminal
 from jobs.verbs.console import table_of
 from weaves.fabric import Fabric, load_fabric, preset_names
 
 
 def print_lists() -> None:
     """Print a table of fabrics and a table of recipes."""
-    console = Console()
+    console = Terminal()
     console.print(fabrics_table([load_fabric(name) for name in preset_names()]))
     console.print()
     console.print(recipes_table([load_recipe(name) for name in recipe_names()]))

@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.table import Table
 
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Task, urgencies
 from jobs.recipe.load import load_recipe
+from jobs.terminal import Terminal
 from jobs.verbs.console import duration, size, table_of
 
 
 def print_plan(recipe: str) -> None:
     """Print the plan of a recipe; nothing is computed."""
-    Console().print(plan_table(plan(load_recipe(recipe))))
+    Terminal().print(plan_table(plan(load_recipe(recipe))))
 
 
 def plan_table(tasks: Sequence[Task]) -> Table:

@@ -74,8 +74,7 @@ def require(
         If the scene cannot be used, the page has no errors by size, its best method is none of the recipe's, or no
         method meets the limits. Then the sentence names the nearest points of the front.
     """
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from reports.record import read_records
     from reports.tables.equal_time import size_table
     from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
@@ -109,7 +108,7 @@ def require(
     shares = {name: share for name, share in found.items() if share is not None}
     table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
     table = with_measured(table, scene_table(records), requirement.scene)
-    console = Console()
+    console = Terminal()
     console.print(_requirement_table(requirement), "")
     console.print(_choice_table(rows(table)), "")
     if method and (table := of_method(table, method)).empty:
@@ -132,7 +131,7 @@ def require(
     name = f"{chosen.method} {chosen.setting}".strip()
     cost = f"{100 * chosen.error:.2g} % in {chosen.ms:.3g} ms per frame ({chosen.known})"
     summary = f"{name}: {cost}. {savings(path, general)}"
-    console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True, highlight=False)
+    console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True)
 
 
 def _queries_of(

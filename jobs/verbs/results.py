@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
-
 from jobs.recipe.load import load_recipe
+from jobs.terminal import Terminal
 from jobs.verbs.compare import records_file
 from pipeline.atomic import atomic_write
 from weaves.errors import BadInput
+from weaves.reading import MIB, read_text
 
 
 def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> None:
@@ -31,14 +31,14 @@ def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> N
     if readme is not None:
         if not readme.is_file():
             raise BadInput(str(readme), "", "does not exist", "a Markdown file with a generated block is needed")
-        text = readme.read_text(encoding="utf-8")
+        text = read_text(readme, MIB, "a Markdown file")
         old = block(text, BLOCK, str(readme))
         fresh = with_block(text, BLOCK, readme_block(records, machine, old, str(source)), str(readme))
         said = "unchanged" if fresh == text else "written"
         if fresh != text:
             atomic_write(readme, fresh.encode())
-        Console().print(f"{readme}: table of {name} {said}", soft_wrap=True, highlight=False)
+        Terminal().print(f"{readme}: table of {name} {said}", soft_wrap=True)
     if readme is None or file is not None:
         file = file or source.with_name("results.md")
         atomic_write(file, results_page(records, machine, str(source)).encode())
-        Console().print(f"{file}: written", soft_wrap=True, highlight=False)
+        Terminal().print(f"{file}: written", soft_wrap=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from jobs.plan.dataset import shards
@@ -19,6 +18,7 @@ from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
+from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.console import duration, number, table_of
 from weaves.errors import WorkFailed
@@ -36,7 +36,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Schedu
     """
     recipe = load_recipe(recipe_name)
     tasks = plan(recipe, measured_alone(out))
-    console = Console()
+    console = Terminal()
     ledger = Ledger(out)
     with ledger.held():
         manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]

@@ -92,8 +92,7 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     BadInput
         If a recipe is not there, has not run, or did not measure the scene.
     """
-    from rich.console import Console
-
+    from jobs.terminal import Terminal
     from pipeline.atomic import atomic_write
     from pipeline.scenes.catalogue import load_scene
 
@@ -101,15 +100,15 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     found = {
         name: saved(name, out, general, recipe) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
     }
-    console = Console()
+    console = Terminal()
     console.width = max(console.width, _WIDTH)
     for rows in found.values():
         console.print(_table(rows), "")
     for rows in found.values():
-        console.print(conclusion(rows), soft_wrap=True, highlight=False)
+        console.print(conclusion(rows), soft_wrap=True)
     path = out / "report" / "savings.csv"
     atomic_write(path, _csv([row for rows in found.values() for row in rows]).encode())
-    console.print(f"the numbers: {path}", soft_wrap=True, highlight=False)
+    console.print(f"the numbers: {path}", soft_wrap=True)
 
 
 def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]:

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.text import Text
 
+from jobs.terminal import Terminal
 from jobs.verbs.console import table_of
 from pipeline.atomic import atomic_write
 from reports.images import tiles
@@ -27,7 +28,7 @@ _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"
 
 def show(name: str, out: Path | None) -> None:
     """Print a fabric, and write its pictures if a folder is given."""
-    fabric, console = load_fabric(name), Console()
+    fabric, console = load_fabric(name), Terminal()
     console.print(fabric_page(fabric))
     if out is not None:
         console.print(*write_pictures(fabric, out), sep="\n", soft_wrap=True)

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
+from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.console import table_of
 
 
 def print_status(recipe: str, out: Path) -> None:
     """Print the states of a recipe's tasks."""
-    Console().print(status_table(plan(load_recipe(recipe), measured_alone(out)), Ledger(out)))
+    Terminal().print(status_table(plan(load_recipe(recipe), measured_alone(out)), Ledger(out)))
 
 
 def status_table(tasks: Sequence[Task], ledger: Ledger) -> Table:

@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, FailFast, ValidationError
 
 from pipeline.atomic import atomic_write
 from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
@@ -23,11 +23,15 @@ from pipeline.shards.store import read_columns, rows_of
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+from weaves.reading import MIB, read_json
 
 Role = Literal["seen", "population", "unseen"]
 Split = Literal["train", "validation", "test"]
 
 FILE = "manifest.json"
+
+_MOST_BYTES: Final = 64 * MIB
+_MOST_FABRICS: Final = 110_000  # a population has at most 100,000
 
 
 class ShardEntry(BaseModel):
@@ -62,25 +66,25 @@ class Manifest(BaseModel):
     """Fingerprint of everything that shaped its own rows; extra rows are part of the models that learn from them."""
     schema_version: int = SCHEMA_VERSION
     """Version of the columns."""
-    roles: dict[Role, list[str]]
+    roles: dict[Role, Annotated[list[str], FailFast()]]
     """Names of the fabrics in each role."""
     fabrics: dict[str, Fabric]
     """Every fabric in full."""
     about: dict[str, Any]
     """The recipe's data set section."""
-    shards: list[ShardEntry]
+    shards: Annotated[list[ShardEntry], FailFast()]
     """The finished shards, in the order of fabric, split or set, and row."""
 
     @classmethod
     def load(cls, folder: Path) -> Manifest:
-        """Read a data set's manifest; BadInput if it is missing or not one."""
+        """Read a data set's manifest; BadInput if it is missing, too large or not one."""
         path = folder / FILE
         try:
-            return cls.model_validate_json(path.read_bytes())
+            return cls.model_validate(read_json(path, _MOST_BYTES, "a manifest", wide={"fabrics": _MOST_FABRICS}))
         except FileNotFoundError as error:
             raise BadInput(str(path), "", "does not exist", "generate the data set first") from error
-        except (ValidationError, json.JSONDecodeError) as error:
-            first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": str(error)}
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_input=False)[0]
             key = ".".join(map(str, first["loc"]))
             raise BadInput(str(path), "", f"not a manifest ({key} {first['msg']})", "generate the data set") from error
 

@@ -17,6 +17,7 @@ from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
 from pipeline.shards.store import queries_of
 from pipeline.truth.query import Queries, faults
 from weaves.errors import BadInput
+from weaves.reading import refuse_irregular
 
 ROW_GROUP: Final = 16_384
 """Rows read, held and written at a time."""
@@ -60,6 +61,7 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
     BadInput
         If it is missing, cut short, or no such file.
     """
+    refuse_irregular(path, "a Parquet file")
     with _whole(path):
         file = pq.ParquetFile(path, page_checksum_verification=True, buffer_size=_BUFFER)
     with file:

@@ -18,6 +18,7 @@ from pipeline.shards.schema import SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
+from weaves.reading import refuse_irregular
 
 _KEY = b"twillight"
 _ROW_GROUP = 16_384
@@ -74,6 +75,7 @@ def read_table(path: Path, kind: Kind = "components") -> pa.Table:
         If the file is missing, cut short, damaged, or not a shard of this kind and schema.
     """
     schema = SCHEMAS[kind]
+    refuse_irregular(path, "a shard")
     try:
         table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
     except FileNotFoundError as error:

@@ -124,6 +124,7 @@ def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code
         raise error
 
     monkeypatch.setattr(jobs.verbs.run, "work", burst)
+    (tmp_path / "products").mkdir()
     assert words in complaint(twillight("run", "quick", "--out", "products"), code)
     crashes = list((tmp_path / "products").glob("crash-*.txt"))
     assert len(crashes) == isinstance(error, ZeroDivisionError)

@@ -1,0 +1,137 @@
+"""Reading of small files from outside: recipes, fabrics, scenes, cards, manifests, Records.
+
+Whoever wrote them may have meant harm. So only regular files are opened (no pipe, device or folder, which could be read
+for ever), and no more than a stated number of bytes is read.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from weaves.errors import BadInput, brief, one_line
+
+MIB: Final = 1 << 20
+"""Bytes."""
+
+MOST_TEXT: Final = MIB // 4
+"""Most bytes of a TOML file. The largest fabric, a repeat of 128 x 128 as a loom plan, has some 100 KB."""
+
+MOST_VALUES: Final = 2_000_000
+"""Most values of a JSON file: each takes up to 250 bytes in memory, even one of two letters."""
+
+MOST_KEYS: Final = 256
+"""Most keys of a JSON object: a validation reports every key that it does not know, at a kilobyte each."""
+
+
+def read_bytes(path: Path, most: int, needed: str) -> bytes:
+    """Return the content of a regular file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; links are followed.
+    most : int
+        Most bytes that are read.
+    needed : str
+        Kind of file, with its article, for messages: ``"a TOML file"``.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none, so that the caller can say what would make it.
+    BadInput
+        If it is no regular file, larger, or cannot be read.
+    """
+    where = str(path)
+    try:
+        # Without O_NONBLOCK, opening a pipe waits until somebody writes.
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with open(handle, "rb") as file:  # noqa: PTH123, there is a handle only
+            found = os.fstat(handle)
+            if not stat.S_ISREG(found.st_mode):
+                raise BadInput(where, "", f"is {kind(found.st_mode)}", f"{needed} is needed")
+            content = file.read(most + 1) if found.st_size <= most else b""
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise BadInput(where, "", error.strerror or "not readable", f"{needed} that can be read is needed") from error
+    except ValueError as error:  # a zero byte in the path
+        raise BadInput(where, "", one_line(error), f"the path of {needed} is needed") from error
+    if found.st_size > most or len(content) > most:
+        raise BadInput(where, "", f"has {max(found.st_size, len(content)):,} bytes", f"at most {most:,} are allowed")
+    return content
+
+
+def read_text(path: Path, most: int, needed: str) -> str:
+    """Return the content of a file of UTF-8 text; otherwise as `read_bytes`."""
+    try:
+        return read_bytes(path, most, needed).decode()
+    except UnicodeDecodeError as error:
+        raise BadInput(str(path), "", f"byte {error.start} is not UTF-8", f"{needed} is needed") from error
+
+
+def read_json(path: Path, most: int, needed: str, wide: Mapping[str, int] = MappingProxyType({})) -> Any:
+    """Return the content of a JSON file, parsed.
+
+    Parameters
+    ----------
+    path, most, needed
+        As for `read_bytes`.
+    wide : mapping
+        Most keys of the objects at some keys, in place of `MOST_KEYS`.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none.
+    BadInput
+        As `read_bytes`, and if it is no JSON, has more than `MOST_VALUES` values or an object with too many keys.
+    """
+    where, content = str(path), read_bytes(path, most, needed)
+    if (commas := content.count(b",")) > MOST_VALUES:
+        raise BadInput(where, "", f"has {commas:,} values", f"{needed} has at most {MOST_VALUES:,}")
+    try:
+        found = json.loads(content)
+    except (ValueError, RecursionError) as error:  # JSONDecodeError, no UTF-8, numbers of absurd length
+        reason = "nested too deeply" if isinstance(error, RecursionError) else one_line(error)
+        raise BadInput(where, "", f"broken JSON ({reason})", f"{needed} is needed") from error
+    left: list[tuple[str, Any]] = [("", found)] if isinstance(found, dict | list) else []
+    while left:
+        key, value = left.pop()
+        inside = value.items() if isinstance(value, dict) else (("", item) for item in value)
+        left += [one for one in inside if isinstance(one[1], dict | list)]
+        if isinstance(value, dict) and len(value) > (allowed := wide.get(key, MOST_KEYS)):
+            found = f"an object {brief(key)} with {len(value):,} keys" if key else f"an object with {len(value):,} keys"
+            raise BadInput(where, "", found, f"at most {allowed:,} are allowed")
+    return found
+
+
+def refuse_irregular(path: Path, needed: str) -> None:
+    """Refuse a path that is there and no regular file; for files that a library opens by their name.
+
+    Raises
+    ------
+    BadInput
+        If it is a folder, a pipe, a socket or a device.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return  # the library reports what is not there
+    if not stat.S_ISREG(mode):
+        raise BadInput(str(path), "", f"is {kind(mode)}", f"{needed} is needed")
+
+
+def kind(mode: int) -> str:
+    """Return the kind of a file that is not regular, with its article."""
+    if stat.S_ISDIR(mode):
+        return "a folder"
+    if stat.S_ISFIFO(mode):
+        return "a pipe"
+    return "a socket" if stat.S_ISSOCK(mode) else "a device"
