@@ -82,7 +82,7 @@ class ImageOptions(_Options):
     """Noise of the noised copy of the truth in the channels of a pixel. Their noise is that of the same points in a few
     colours: drawn independently it would be coloured, and the noise floor of colour differences several times that of
     a perfect method."""
-    block: int = Field(default=16, ge=1)
+    block: int = Field(default=16, ge=1, le=4096)
     """Side of the blocks of pixels that intervals draw anew; at most a quarter of the picture's shorter side. It
     should exceed the distance over which errors resemble each other."""
     resamples: int = Field(default=500, ge=100, le=100_000)
@@ -94,7 +94,7 @@ class ImageOptions(_Options):
 class DisplayOptions(_Options):
     """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.fovvideovdp`)."""
 
-    resolution: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = (3840, 2160)
+    resolution: tuple[Annotated[int, Field(ge=1, le=2**16)], Annotated[int, Field(ge=1, le=2**16)]] = (3840, 2160)
     """Width and height in pixels."""
     diagonal: float = Field(default=30.0, gt=0)
     """In inches."""
@@ -161,7 +161,7 @@ class _ViewedOptions(_SeededOptions):
 class ErrorOptions(_SeededOptions):
     """Errors on held-out queries."""
 
-    rows: int = Field(default=16_384, ge=64)
+    rows: int = Field(default=16_384, ge=64, le=2**24)
     """Most held-out queries of a fabric that errors are measured on."""
 
 
@@ -206,10 +206,10 @@ class RepeatOptions(_Options):
 class TimingOptions(RepeatOptions, ErrorOptions):
     """Times of methods on held-out queries."""
 
-    timing_rows: int = Field(default=4096, ge=64)
+    timing_rows: int = Field(default=4096, ge=64, le=2**24)
     """Queries a fabric in one timed call; fewer of the same for a method that would take longer than
     `reports.measure.timing.LONGEST`."""
-    threads: Annotated[tuple[Annotated[int, Field(ge=0, le=1024)], ...], Field(min_length=1)] = (1, 0)
+    threads: Annotated[tuple[Annotated[int, Field(ge=0, le=1024)], ...], Field(min_length=1, max_length=16)] = (1, 0)
     """Numbers of threads that methods are timed with; 0: one a core of the machine. The fewest are what is compared."""
 
 
@@ -229,7 +229,7 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
 
     latents: bool = True
     """Measure models that blend latents between pairs of presets, and the time of edits."""
-    picture_counts: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (2, 16)
+    picture_counts: Annotated[tuple[Annotated[int, Field(ge=1, le=4096)], ...], Field(max_length=16)] = (2, 16)
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
     scenes: SceneBenchOptions = SceneBenchOptions()
     """Scenes with cameras, lights and cloths of their own."""

@@ -146,8 +146,10 @@ class Draft:
         picks, ends = matrix.shape
         images = (matrix, matrix[::-1], matrix[:, ::-1], matrix[::-1, ::-1])
         shifted = (np.lib.stride_tricks.sliding_window_view(np.tile(image, (2, 2)), (picks, ends)) for image in images)
-        every = np.concatenate([windows[:picks, :ends].reshape(picks * ends, -1) for windows in shifted])
-        return (ends, picks), bytes(min(np.packbits(every, axis=1).tolist()))
+        # One window at a time: all those of the largest repeat have a gigabyte.
+        return (ends, picks), min(
+            np.packbits(windows[pick, end]).tobytes() for windows in shifted for pick, end in np.ndindex(picks, ends)
+        )
 
 
 class Cells(NamedTuple):

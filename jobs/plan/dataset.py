@@ -118,44 +118,26 @@ def folder_of(parts: Sequence[Shard]) -> str:
 
 def _own_rows(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
     """Cut every fabric's splits into shards, each with the role of its fabric."""
-    rows = recipe.dataset.rows
-    named = {"train": rows.train, "validation": rows.validation, "test": rows.test}
-    learners = [model for model in recipe.own_models if model.learns]  # those of other recipes read rows of their own
-    idle = bool(recipe.models) and not learners
-    if idle:
-        named = {"test": rows.test}
-    # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
-    unseen = named if any(model.of_one_material for model in learners) else {"test": rows.test}
-    for role, fabrics, splits in (
-        ("seen", recipe.seen, named),
-        ("population", recipe.population, {} if idle else {"train": rows.population}),
-        ("unseen", recipe.unseen, unseen),
-    ):
-        for fabric in fabrics:
-            for split, total in splits.items():
-                for start, count in _cut(total, recipe.dataset.shard_rows):
-                    yield (
-                        role,
-                        ShardTask(
-                            fabric=fabric,
-                            split=split,
-                            start=start,
-                            rows=count,
-                            seed=recipe.dataset.seed,
-                            queries=recipe.dataset.queries,
-                            truth=recipe.dataset.truth_of(split),
-                        ),
-                    )
+    dataset = recipe.dataset
+    for role, fabric, split, total in recipe.own_rows():
+        for start, count in _cut(total, dataset.shard_rows):
+            shard = ShardTask(
+                fabric=fabric,
+                split=split,
+                start=start,
+                rows=count,
+                seed=dataset.seed,
+                queries=dataset.queries,
+                truth=dataset.truth_of(split),
+            )
+            yield role, shard
 
 
 def _extra_rows(recipe: Recipe) -> Iterator[tuple[str, ExtraShardTask]]:
-    """Cut the extra rows of the fabrics that each model is trained on into shards; equal sets of two models once."""
-    for role, fabrics in (("seen", recipe.seen), ("population", recipe.population), ("unseen", recipe.unseen)):
-        readers = [model for model in recipe.own_models if role in model.trained_roles]
-        for extra in dict.fromkeys(extra for model in readers for extra in model.options.extra_rows):
-            for fabric in fabrics:
-                for start, count in _cut(extra.count(fabric), recipe.dataset.shard_rows):
-                    yield role, ExtraShardTask(fabric=fabric, extra=extra, start=start, rows=count)
+    """Cut every fabric's extra rows into shards, each with the role of its fabric."""
+    for role, fabric, extra, total in recipe.extra_rows():
+        for start, count in _cut(total, recipe.dataset.shard_rows):
+            yield role, ExtraShardTask(fabric=fabric, extra=extra, start=start, rows=count)
 
 
 def _cut(total: int, most: int) -> Iterator[tuple[int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 from jobs.recipe.recipe import Recipe, RecipeFile
 from jobs.recipe.trained_by import check_trained_by, with_trained_by
@@ -18,6 +19,9 @@ from weaves.renamed import SCENE
 from weaves.validation import read_toml, validated
 
 RECIPES = Path(__file__).parents[1] / "recipes"
+
+MOST_RECIPES: Final = 32
+"""Most recipes that one recipe names, directly or through others."""
 
 
 def recipe_names() -> list[str]:
@@ -44,23 +48,25 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
             allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
             raise BadInput("recipe", "name", str(name_or_path), allowed)
         path = RECIPES / f"{name_or_path}.toml"
-    return _load(path, ())
+    return _load(path, (), {})
 
 
-def _load(path: Path, chain: tuple[Path, ...]) -> Recipe:
-    """Read a recipe; `chain` has the recipes that led to it, each named in the one before."""
-    where, read = str(path), dict[Path, Recipe]()
+def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe]) -> Recipe:
+    """Read a recipe; `chain` has the recipes that led to it, each named in the one before, `read` those loaded."""
+    where = str(path)
 
     def load(name: object, key: str) -> Recipe:
         found = _beside(path, name, key)
-        if found in read:
-            return read[found]
+        if (real := found.resolve()) in read:
+            return read[real]
         named = (*chain, path, found)
-        if found.resolve() in [one.resolve() for one in named[:-1]]:
+        if real in [one.resolve() for one in named[:-1]]:
             circle = " → ".join(one.stem for one in named)
             raise BadInput(where, key, name, f"recipes must not wait for one another: {circle}")
-        read[found] = _load(found, named[:-1])
-        return read[found]
+        if len(chain) + len(read) >= MOST_RECIPES:
+            raise BadInput(where, key, name, f"at most {MOST_RECIPES} recipes may be named, directly or through others")
+        read[real] = _load(found, named[:-1], read)
+        return read[real]
 
     content, trained_by = with_trained_by(read_toml(path), where, load)
     file = validated(RecipeFile, content, where)

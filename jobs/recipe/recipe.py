@@ -7,9 +7,9 @@ material (`neumip`) is in the recipe, and no other model ever reads them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
@@ -20,6 +20,10 @@ from pipeline.truth.options import TruthOptions
 from reports.options import BenchOptions, RuntimeName
 from weaves.fabric import Fabric
 from weaves.population import Population
+
+if TYPE_CHECKING:
+    from pipeline.shards.extra_rows import ExtraRows
+    from pipeline.shards.manifest import Role, Split
 
 
 class _Section(BaseModel):
@@ -173,6 +177,39 @@ class Recipe:
     def together(self) -> list[Recipe]:
         """The recipes whose rows are read: itself and those that train models of it, each once."""
         return list({id(recipe): recipe for recipe in (self, *self.trained_by.values())}.values())
+
+    def own_rows(self) -> Iterator[tuple[Role, Fabric, Split, int]]:
+        """Yield the rows of the data set: role and fabric, split, and number."""
+        rows = self.dataset.rows
+        named: dict[Split, int] = {"train": rows.train, "validation": rows.validation, "test": rows.test}
+        population: dict[Split, int] = {"train": rows.population}
+        learners = [model for model in self.own_models if model.learns]  # those of other recipes read rows of their own
+        if self.models and not learners:
+            named, population = {"test": rows.test}, {}
+        # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
+        unseen: dict[Split, int] = named if any(model.of_one_material for model in learners) else {"test": rows.test}
+        parts: tuple[tuple[Role, tuple[Fabric, ...], dict[Split, int]], ...] = (
+            ("seen", self.seen, named),
+            ("population", self.population, population),
+            ("unseen", self.unseen, unseen),
+        )
+        for role, fabrics, splits in parts:
+            for fabric in fabrics:
+                for split, total in splits.items():
+                    yield role, fabric, split, total
+
+    def extra_rows(self) -> Iterator[tuple[Role, Fabric, ExtraRows, int]]:
+        """Yield the extra rows of the fabrics that each model is trained on; equal sets of two models once."""
+        parts: tuple[tuple[Role, tuple[Fabric, ...]], ...] = (
+            ("seen", self.seen),
+            ("population", self.population),
+            ("unseen", self.unseen),
+        )
+        for role, fabrics in parts:
+            readers = [model for model in self.own_models if role in model.trained_roles]
+            for extra in dict.fromkeys(extra for model in readers for extra in model.options.extra_rows):
+                for fabric in fabrics:
+                    yield role, fabric, extra, extra.count(fabric)
 
     def trainer_of(self, model: ModelRecipe) -> Recipe:
         """Return the recipe that trains a model: this one, unless the model names another."""

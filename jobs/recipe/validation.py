@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from jobs.recipe.recipe import Recipe
 from pipeline.models.domain import PHYSICS
@@ -15,6 +16,9 @@ from weaves.fabric import Fabric
 _TAKEN = ("truth", "bench", "fallback")
 """Names that stand beside those of models, in Records and among the versions in a task's identity."""
 
+MOST_SHARDS: Final = 250_000
+"""Most shards of a data set, each a task: 2 * 10^9 rows by default. The manifest then has 60 MB."""
+
 _PLAIN = TruthOptions()
 _LEARNT = ("frame", "normaliser", "shadows", "variation")  # physics that not every model can learn
 
@@ -25,10 +29,11 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     Raises
     ------
     BadInput
-        For names given twice, an unseen draft in the population, different physics in two tables of truth options,
-        models that do not know the queries or the physics of the data set, and the estimator `node_table` for cloth or
-        queries that it does not know.
+        For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population, different physics in
+        two tables of truth options, models that do not know the queries or the physics of the data set, and the
+        estimator `node_table` for cloth or queries that it does not know.
     """
+    _check_number(recipe, where)
     _check_names(recipe, where)
     _check_population(recipe, where)
     _check_models(recipe, where)
@@ -53,6 +58,16 @@ def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[
         if ends * picks > TABLE_CELLS and (cells := fabric.weave.different_cells()) > TABLE_CELLS:
             return f"it knows at most {TABLE_CELLS} different cells, {fabric.name} has {cells}"
     return ""
+
+
+def _check_number(recipe: Recipe, where: str) -> None:
+    most, shards = recipe.dataset.shard_rows, 0
+    for _, fabric, part, rows in (*recipe.own_rows(), *recipe.extra_rows()):
+        shards += -(-rows // most)
+        if shards > MOST_SHARDS:
+            name = part if isinstance(part, str) else part.kind
+            allowed = f"at most {MOST_SHARDS:,} shards are allowed, passed with {rows:,} rows ({name}) of {fabric.name}"
+            raise BadInput(where, "dataset.shard_rows", most, f"{allowed}: raise it, or lower the rows")
 
 
 def _check_names(recipe: Recipe, where: str) -> None:

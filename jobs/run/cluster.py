@@ -7,7 +7,6 @@ Only processes of the run hold it, so no other user of the machine can hand it w
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import os
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from rich.console import Console
 
 from jobs.run.child import ONE_THREAD, ends_deferred, interrupts_held
 from weaves.errors import BadInput, WorkFailed
+from weaves.reading import MIB, read_json
 
 MOST_WORKERS: Final = 1024
 """Worker processes of a cluster on this machine, at most."""
@@ -97,7 +97,7 @@ def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
             require_encryption=True,
         )
     try:
-        address = str(json.loads(Path(given).read_bytes())["address"]) if Path(given).is_file() else given
+        address = str(read_json(Path(given), MIB, "a scheduler file")["address"]) if Path(given).is_file() else given
         # A client alone would wait for minutes for a port that listens and never answers.
         asyncio.run(_answer(address, security))
         client = Client(address, timeout=_SECONDS, security=security)  # type: ignore[no-untyped-call]

@@ -13,6 +13,7 @@ from pipeline.shards.evaluate import Answerer
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
+from weaves.reading import MIB, read_text
 
 
 def refuse_truth_options(chosen: Mapping[str, object]) -> None:
@@ -58,7 +59,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         shares = through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
         return method.predict(fabric, queries), shares
 
-    about = {"model": method.name, "card": (folder / "card.json").read_text(encoding="utf-8")}
+    about = {"model": method.name, "card": read_text(folder / "card.json", 8 * MIB, "a model card")}
     if domain is None:
         return Answerer(answer, about)
     return Answerer(answer, about, lambda queries: domain.faults(queries, method.name))

@@ -13,13 +13,15 @@ from typing import Any, Final
 
 from pipeline.atomic import atomic_write
 from weaves.errors import BadInput
+from weaves.reading import MIB, read_bytes
 
 WEIGHTS, CARD = "model.safetensors", "card.json"
 
 HASHES: Final = "sha256"
 """Key of a card: the hash of the weights' file, and that of the card without this second hash."""
 
-_MOST_BYTES: Final = 1 << 26  # of a card; those of a hundred fabrics have 100 kB
+_MOST_BYTES: Final = 8 * MIB  # of a card; those of a hundred fabrics have 100 kB
+_MOST_WEIGHTS: Final = 256 * MIB  # the largest networks of the recipes have a tenth
 
 
 def write_model(folder: Path, weights: bytes, card: Mapping[str, Any]) -> None:
@@ -32,12 +34,13 @@ def read_card(folder: Path) -> dict[str, Any]:
     """Return the card of a trained model; BadInput if it is missing, damaged, or written before cards had hashes."""
     path = folder / CARD
     try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES)
+        content = read_bytes(path, _MOST_BYTES, "a model card")
         card = json.loads(content)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "train the model first") from error
-    except (OSError, ValueError, RecursionError) as error:
+    except BadInput:
+        raise
+    except (ValueError, RecursionError) as error:
         raise _damaged(path) from error
     if not isinstance(card, dict):
         raise _damaged(path)
@@ -53,9 +56,9 @@ def read_weights(folder: Path, card: Mapping[str, Any]) -> bytes:
     """Return the weights' file that a card from `read_card` belongs to; BadInput if it is missing or another one."""
     path = folder / WEIGHTS
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BadInput(str(path), "", error.strerror or "not readable", "train it again") from error
+        content = read_bytes(path, _MOST_WEIGHTS, "a file of weights")
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "does not exist", "train it again") from error
     if _sha256(content) != card[HASHES]["weights"]:
         raise BadInput(str(path), "", "damaged, its SHA-256 is not the one on the card", "train it again")
     return content

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 
 from pipeline.atomic import atomic_path
 from weaves.errors import WorkFailed
+from weaves.reading import refuse_irregular
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 
@@ -123,6 +124,7 @@ class State:
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]] | None:
     """Return what a checkpoint says of itself and its tensors; None if there is none or it is damaged."""
     try:
+        refuse_irregular(path, "a checkpoint")
         with safetensors.safe_open(path, framework="pt") as file:
             about = json.loads((file.metadata() or {})[_KEY])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118

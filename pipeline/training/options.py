@@ -44,11 +44,11 @@ class TrainingOptions(BaseModel):
     """Threads torch may use; sums are split among them, so the last bits depend on it."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the training runs; `auto` takes a GPU when there is one. Only the CPU promises the same bits."""
-    checkpoint_every: int = Field(default=500, ge=1)
+    checkpoint_every: int = Field(default=500, ge=1, le=10_000_000)
     """Steps between checkpoints, from which an interrupted training goes on."""
     curve_points: int = Field(default=40, ge=1, le=10_000)
     """Points of the loss curve on the model card."""
     held_out_points: int = Field(default=8, ge=1, le=10_000)
     """Looks at held-out queries along the curve."""
-    validation_rows: int = Field(default=16_384, ge=1)
+    validation_rows: int = Field(default=16_384, ge=1, le=2**24)
     """Most held-out queries used for the figures on the model card."""

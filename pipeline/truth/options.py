@@ -41,9 +41,9 @@ class TruthOptions(BaseModel):
     """Stop when the norm of the four standard errors falls below this share of the norm of the four means."""
     absolute_error: float = Field(default=1e-5, ge=0, le=1)
     """Also stop when that norm falls below this, 1/sr: dark patches need no more."""
-    min_count: int = Field(default=256, ge=32)
+    min_count: int = Field(default=256, ge=32, le=2**24)
     """Points before the error is first estimated; a power of two."""
-    max_count: int = Field(default=4096, ge=32)
+    max_count: int = Field(default=4096, ge=32, le=2**24)
     """Most points of a query, whatever its error; a power of two. Patches that are almost hidden may take 16 times as
     many."""
     frame: Literal["ply", "macro"] = "ply"

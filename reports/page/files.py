@@ -12,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
+from weaves.reading import MIB, read_bytes
 
 FILES: Final = "files.json"
 """It lists neither itself nor ``index.html``, which is written last."""
@@ -31,7 +32,7 @@ def read_files(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file of a page by its path in the folder; BadInput if there is no valid list."""
     path = folder / FILES
     try:
-        found = _LIST.validate_json(path.read_bytes(), strict=True)
+        found = _LIST.validate_json(read_bytes(path, 16 * MIB, "a list of files"), strict=True)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "write the page again with `twillight report`") from error
     except (OSError, ValidationError) as error:

@@ -22,7 +22,7 @@ class BtfOptions(Options):
     samples: int = Field(default=128, ge=1, le=65_536)
     """Angular samples of every texel; shards hold those of trained fabrics, any other fabric's are computed when it is
     added."""
-    fewest_samples: int = Field(default=50, ge=1)
+    fewest_samples: int = Field(default=50, ge=1, le=65_536)
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
     directions: Literal["projected_disc", "hemisphere"] = "projected_disc"
     """Density of the samples' directions, as in the queries."""
