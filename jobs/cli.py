@@ -165,13 +165,25 @@ def evaluate(
 
 @app.command(sort_key=6)
 def check(
-    subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")], *, out: Out = OUT
+    subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")],
+    *,
+    repair: Annotated[bool, Parameter(help="Make the damaged and missing files of a recipe again.")] = False,
+    out: Out = OUT,
+    on: On = WorkerFlags(),
 ) -> int:
-    """Check the finished shards of a data set, or the ground truth of a fabric against physical invariants."""
+    """Check all files of a recipe, the shards of a data set, or the ground truth of a fabric."""
+    from jobs.recipe.recipe import Recipe
     from jobs.verbs.check import check_dataset, check_fabric, resolve
     from weaves.fabric import Fabric
 
-    found = resolve(subject, out)
+    found = resolve(subject)
+    if isinstance(found, Recipe):
+        from jobs.verbs.check_recipe import check_recipe
+        from jobs.verbs.check_recipe import repair as repaired
+
+        return repaired(subject, out, on.connection(), on.workers) if repair else check_recipe(subject, out)
+    if repair:
+        raise BadInput("check", "--repair", subject, "only the files of a recipe can be made again; name a recipe")
     if isinstance(found, Fabric):
         check_fabric(found)
         return 0
@@ -239,6 +251,32 @@ def status(recipe: RecipeName, *, out: Out = OUT) -> None:
 
 
 @app.command(sort_key=12)
+def prune(
+    recipes: Annotated[list[str], Parameter(help="Recipes whose products are kept, by name or path.")],
+    *,
+    delete: Annotated[bool, Parameter(help="Remove what is listed.")] = False,
+    out: Out = OUT,
+) -> None:
+    """List, or remove, the products that none of some recipes needs."""
+    from jobs.verbs.prune import prune as pruned
+
+    pruned(recipes, out, delete)
+
+
+@app.command(sort_key=13)
+def merge(
+    a: Annotated[Path, Parameter(help="Folder of products.")],
+    b: Annotated[Path, Parameter(help="Another one, for example of another machine.")],
+    *,
+    out: Annotated[Path, Parameter(help="Folder of all products; created if need be.")],
+) -> int:
+    """Join two folders of products, such as parts of a data set made on two machines."""
+    from jobs.verbs.merge import merge as merged
+
+    return merged([a, b], out)
+
+
+@app.command(sort_key=14)
 def compare(
     a: Annotated[Path, Parameter(help="Folder of products, folder of a page, or file of Records.")],
     b: Annotated[Path, Parameter(help="Another one; the table shows B relative to A.")],
@@ -252,7 +290,7 @@ def compare(
     compared(a, b, recipe, other_machine)
 
 
-@app.command(sort_key=13)
+@app.command(sort_key=15)
 def require(
     scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
     *,
@@ -272,7 +310,7 @@ def require(
     required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
 
 
-@app.command(sort_key=14)
+@app.command(sort_key=16)
 def savings(
     recipe: RecipeName,
     scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, are finished.")],
@@ -285,7 +323,7 @@ def savings(
     saved(scenes, out, recipe)
 
 
-@app.command(sort_key=15)
+@app.command(sort_key=17)
 def results(
     recipe: RecipeName,
     *,

@@ -7,6 +7,7 @@ state is kept, so nothing has to be repaired after a kill.
 
 from __future__ import annotations
 
+import glob
 import json
 import math
 import time
@@ -55,6 +56,26 @@ class Ledger:
     def receipt(self, task: Task) -> Receipt | None:
         """Return a task's receipt; None if there is none, or no valid one."""
         return read_receipt(self._receipt(task), task.id)
+
+    def places(self, receipt: Receipt) -> Iterator[str]:
+        """Yield the paths of the existing files that a receipt is about, relative to the output folder."""
+        folders = {
+            "generate": f"{DATASETS}/*",
+            "train": f"models/*-{receipt.task[:8]}",
+            "bench": "records",
+            "report": f"report/{glob.escape(receipt.title.removeprefix('page of '))}",
+        }
+        for name in receipt.files:
+            for path in sorted(self.out.glob(f"{folders.get(receipt.stage, 'none')}/{glob.escape(name)}")):
+                yield str(path.relative_to(self.out))
+
+    def take(self, receipt: Receipt) -> None:
+        """Write a receipt of another folder, after its products."""
+        atomic_write(self.folder / f"{receipt.task}.json", receipt.encoded())
+
+    def receipt_path(self, task: Task) -> str:
+        """Return the path of a task's receipt, relative to the output folder."""
+        return str(self._receipt(task).relative_to(self.out))
 
     def products(self, task: Task) -> dict[str, Product]:
         """Return the products of a done task by file name, as its receipt lists them."""

@@ -43,8 +43,8 @@ class Receipt(BaseModel):
     """Id of the task."""
     stage: str
     title: str
-    files: dict[str, Product]
-    """Products by file name."""
+    files: dict[Annotated[str, Field(pattern=r"^[^/\\.][^/\\]*$")], Product]
+    """Products by file name, which is never a path: a folder of products may come from a stranger."""
     seconds: Annotated[float, Field(ge=0.0)]
     identity: dict[str, Leaf] = {}
     """What the task depended on, by dotted key (`leaves`); it says later which key has changed."""

@@ -1,4 +1,7 @@
-"""`twillight check`: the shards of a data set's manifest, or physical invariants of a fabric's ground truth."""
+"""`twillight check`: a folder of shards by its manifest, or physical invariants of a fabric's ground truth.
+
+A recipe is checked by `jobs.verbs.check_recipe`.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ from typing import Any
 from rich.progress import track
 from rich.table import Table
 
-from jobs.plan.dataset import folder_of, shards
 from jobs.recipe.load import load_recipe, recipe_names
+from jobs.recipe.recipe import Recipe
 from jobs.terminal import Terminal
 from jobs.verbs.console import table_of
 from pipeline.shards.check import check_shard
@@ -22,8 +25,8 @@ from weaves.validation import read_toml
 WHERE = "check"
 
 
-def resolve(subject: str, out: Path) -> Path | Fabric:
-    """Return the subject of a name: the folder of a data set, that of a recipe in the output folder, or a fabric.
+def resolve(subject: str) -> Path | Recipe | Fabric:
+    """Return the subject of a name: the folder of a data set, a recipe, or a fabric.
 
     A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is.
 
@@ -44,7 +47,7 @@ def resolve(subject: str, out: Path) -> Path | Fabric:
         case ["preset"]:
             return load_fabric(subject)
         case ["recipe"]:
-            return _dataset_folder(subject, out)
+            return load_recipe(subject)
     if not subject.endswith(".toml"):
         allowed = "a recipe, a folder of a data set or a fabric is needed"
         raise BadInput(WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
@@ -52,11 +55,7 @@ def resolve(subject: str, out: Path) -> Path | Fabric:
     if len(tables) != 1:
         found = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"
         raise BadInput(subject, "", found, "a recipe has the one, a fabric the other")
-    return load_fabric(subject) if "draft" in tables else _dataset_folder(subject, out)
-
-
-def _dataset_folder(recipe: str, out: Path) -> Path:
-    return out / folder_of(shards(load_recipe(recipe)))
+    return load_fabric(subject) if "draft" in tables else load_recipe(subject)
 
 
 def check_dataset(folder: Path) -> list[str]:

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from rich.table import Table
+
+from jobs.terminal import Terminal
+
+MOST_SENTENCES: Final = 20
+"""Most sentences of one kind that a verb prints; it counts the others."""
 
 
 def table_of(*columns: str, right: Sequence[str] = ()) -> Table:
@@ -13,6 +19,11 @@ def table_of(*columns: str, right: Sequence[str] = ()) -> Table:
     for column in columns:
         table.add_column(column, justify="right" if column in right else "left")
     return table
+
+
+def print_line(sentence: str) -> None:
+    """Print a sentence to stderr as it is, in one line."""
+    Terminal(stderr=True).print(sentence, soft_wrap=True)
 
 
 def duration(seconds: float) -> str:

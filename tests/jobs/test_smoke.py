@@ -35,6 +35,7 @@ def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):
     whole = shard.read_bytes()
     shard.write_bytes(whole[: len(whole) // 2])
     assert main(["check", "smoke", "--out", str(out)]) == 2
+    assert f"{shard}: cut: it has" in " ".join(capsys.readouterr().err.split())
     assert main(["generate", "smoke", "--out", str(out)]) == 0
     assert shard.read_bytes() == whole
     assert main(["check", "smoke", "--out", str(out)]) == 0

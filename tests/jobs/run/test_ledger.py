@@ -90,6 +90,7 @@ ODD = {
     "no number": {"seconds": float("nan")},
     "another task": {"task": "0" * 16},
     "a key too many": {"more": 1},
+    "a path in place of a name": {"files": {"../part-x.parquet": {"sha256": "0" * 64, "bytes": 12}}},
 }
 
 

@@ -1,0 +1,211 @@
+"""Faults of a recipe's files: what its plan needs, compared with receipts, manifests and lists of files."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Final, Literal, NamedTuple
+
+from jobs.plan.dataset import Shard, shards
+from jobs.plan.page import Page
+from jobs.plan.task import Stage, Task
+from jobs.recipe.recipe import Recipe
+from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile, entry_of
+from jobs.run.receipt import Product
+from pipeline.fingerprint import file_sha256
+from weaves.errors import BadInput
+
+Kind = Literal["missing", "outdated", "cut", "damaged", "odd", "foreign"]
+"""`odd`: its bytes are those that were written, but its values are not allowed. `foreign`: no task made it."""
+
+RESULTS: Final = "results.md"
+"""File in a page's folder that `twillight results` writes."""
+
+
+class Fault(NamedTuple):
+    """A file that is not as it should be."""
+
+    kind: Kind
+    path: str
+    """Relative to the output folder."""
+    why: str
+    """What is wrong, a sentence about the file."""
+    task: Task | None = None
+    """The task that makes it."""
+    never_run: bool = False
+    """True if neither receipt nor product of the task exists."""
+    tasks: int = 1
+    """Number of tasks that it stands for."""
+
+
+def faults(
+    recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, seen: Callable[[float], None] = lambda share: None
+) -> list[Fault]:
+    """Return all faults of a recipe: of its tasks in the order of the plan, then of manifests, then foreign files.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        The recipe.
+    tasks : sequence of Task
+        Its plan.
+    ledger : Ledger
+        Ledger of the output folder.
+    seen : callable
+        Called with the share of the tasks whose products were read.
+    """
+    found: list[Fault] = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
+            found += of_task
+            seen((index + 1) / len(tasks))
+    bad = {Path(fault.path).name for fault in found}
+    for one in recipe.together:
+        found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
+    return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger)
+
+
+def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
+    """Return the faults of one task's receipt and products."""
+    receipt = ledger.receipt(task)
+    name = f"{task.stage} {task.title}"
+    if receipt is None:
+        note = ledger.receipt_path(task)
+        if (ledger.out / note).exists():
+            return [Fault("damaged", note, f"it is no valid receipt of {name}", task)]
+        if not any((ledger.out / path).exists() for path in task.products):
+            return [Fault("missing", task.products[0], f"it does not exist: {name} was not run", task, never_run=True)]
+        if isinstance(task, Page):
+            return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
+        return [Fault("missing", note, f"it does not exist, but products of {name} do", task)]
+    found = [_product_fault(ledger.out, path, receipt.files.get(Path(path).name), task) for path in task.products]
+    if wrong := [fault for fault in found if fault]:
+        return wrong
+    if isinstance(task, Page):
+        return list(_page_faults(task, ledger.out))
+    if isinstance(task, Shard):
+        return [
+            Fault("odd", path, fault.removeprefix(f"{ledger.out / path}: "), task)
+            for path in task.products[:1]
+            for fault in _value_faults(task, ledger.out / path, receipt.files[Path(path).name].sha256)
+        ]
+    return []
+
+
+def _product_fault(out: Path, path: str, expected: Product | None, task: Task) -> Fault | None:
+    """Return the fault of one product, or None."""
+    if expected is None:
+        return Fault("outdated", path, "it is not on the receipt of its task", task)
+    try:
+        bytes_ = (out / path).stat().st_size
+        if bytes_ < expected.bytes:
+            return Fault("cut", path, f"it has {bytes_:,} of {expected.bytes:,} bytes", task)
+        if bytes_ > expected.bytes:
+            return Fault("damaged", path, f"it has {bytes_:,} bytes in place of {expected.bytes:,}", task)
+        if file_sha256(out / path) != expected.sha256:
+            return Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", task)
+    except FileNotFoundError:
+        return Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
+    except OSError as error:
+        return Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
+    return None
+
+
+def _page_faults(page: Page, out: Path) -> Iterator[Fault]:
+    """Yield the faults of the files in a page's folder."""
+    from reports.page.files import read_files
+
+    try:
+        listed = read_files(out / page.folder)
+    except BadInput as error:
+        yield Fault("damaged", page.products[1], f"it is {error.value}", page)
+        return
+    for name, sha256 in listed.items():
+        path = f"{page.folder}/{name}"
+        if not (out / path).is_file():
+            yield Fault("missing", path, "it does not exist, although the page was written", page)
+        elif file_sha256(out / path) != sha256:
+            yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
+
+
+def _value_faults(part: Shard, path: Path, sha256: str) -> list[str]:
+    from pipeline.shards.check import check_values
+
+    return check_values(path, entry_of(part, sha256), part.shard.fabric.weave.repeat)
+
+
+def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[Fault]:
+    """Yield the fault of a manifest; shards in the files `bad`, which have faults of their own, are not compared."""
+    from pipeline.shards.manifest import FILE, Manifest
+
+    expected, path = file.content(), file.folder / FILE
+    where = str(path.relative_to(out))
+    if not path.exists():
+        if expected.shards:
+            yield Fault("missing", where, "it does not exist, although shards of its data set do")
+        return
+    try:
+        found = Manifest.load(file.folder)
+        whole = path.read_bytes() == found.encoded()
+    except BadInput:
+        yield Fault("damaged", where, "it is no manifest")
+        return
+    if not whole or found.without(bad).encoded() != expected.without(bad).encoded():
+        yield Fault("damaged", where, "it does not say what the plan and the receipts say")
+
+
+def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
+    """Replace the faults of a stage none of whose tasks was run by one fault."""
+    planned = Counter(task.stage for task in tasks)
+    never = Counter(fault.task.stage for fault in found if fault.task and fault.never_run)
+    whole = {stage for stage, count in never.items() if count == planned[stage] > 1}
+    result: list[Fault] = []
+    told: set[Stage] = set()
+    for fault in found:
+        stage = fault.task.stage if fault.task else None
+        if stage not in whole:
+            result.append(fault)
+        elif stage is not None and stage not in told:
+            told.add(stage)
+            why = f"it does not exist, nor does any product of the {never[stage]:,} tasks of {stage}"
+            result.append(fault._replace(why=why, tasks=never[stage]))
+    return result
+
+
+def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger) -> list[Fault]:
+    """Return the files in the recipe's own folders that no task made: data sets, models, page."""
+    known = set(own_files(recipe, tasks, ledger.out))
+    folders = {Path(path).parent for task in tasks if task.stage != "bench" for path in task.products}
+    files = [path for folder in folders for path in (ledger.out / folder).rglob("*") if path.is_file()]
+    named = {str(path.relative_to(ledger.out)) for path in files if not is_leftover(path.name)}
+    foreign = sorted(named - known)
+    return [Fault("foreign", path, "no task of this recipe made it") for path in foreign]
+
+
+def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]:
+    """Yield the files of a recipe's data sets, models, measurements and page, whether they exist or not."""
+    from pipeline.shards.manifest import FILE
+    from reports.page.files import read_files
+
+    for one in recipe.together:
+        parts = shards(one)
+        yield from (path for part in parts for path in part.products)
+        yield from {f"{folder}/{FILE}" for part in parts for folder in part.folders}
+    for task in tasks:
+        yield from task.products
+        if isinstance(task, Page):
+            yield f"{task.folder}/{RESULTS}"
+            try:
+                yield from (f"{task.folder}/{name}" for name in read_files(out / task.folder))
+            except BadInput:
+                continue
+
+
+def is_leftover(name: str) -> bool:
+    """Return whether a file is what a stopped task leaves: no reader looks at it, and the next run replaces it."""
+    return name.startswith(".tmp-") or name == "checkpoint.safetensors" or name.endswith("-rows.npy")

@@ -1,0 +1,136 @@
+"""`twillight check` of a recipe: its shards, models, Records, pages, receipts and manifests; with `--repair`, again.
+
+Exit codes: 0 all is there and sound, 1 something is missing or outdated, 2 something is cut, damaged, odd or foreign.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from rich.progress import Progress
+
+from jobs.plan.dataset import Shard
+from jobs.plan.page import Page
+from jobs.plan.plan import plan
+from jobs.plan.task import STAGES, Task
+from jobs.recipe.load import load_recipe
+from jobs.run.cluster import Scheduler
+from jobs.run.faults import Fault, faults
+from jobs.run.ledger import Ledger
+from jobs.terminal import Terminal
+from jobs.verbs.bench import measured_alone
+from jobs.verbs.console import MOST_SENTENCES, print_line
+from jobs.verbs.run import work
+from weaves.errors import BadInput, WorkFailed
+
+_HARMLESS: Final = ("missing", "outdated")
+
+
+def check_recipe(name: str, out: Path) -> int:
+    """Compare the files of a recipe with what its plan needs, print a sentence a fault, and return the exit code."""
+    tasks, found = _found(name, out)
+    _print(found, out)
+    if not found:
+        _print_sound(name, tasks)
+    elif any(fault.kind in ("cut", "damaged") for fault in found):
+        print_line(f"`twillight check {name} --repair` makes exactly these files again")
+    elif any(fault.kind in _HARMLESS for fault in found):
+        print_line(f"`twillight run {name}` makes what is missing")
+    return exit_code(found)
+
+
+def repair(name: str, out: Path, scheduler: Scheduler, workers: int) -> int:
+    """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
+
+    Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
+    measured again, and the page that shows them is written again.
+
+    Raises
+    ------
+    BadInput
+        If the recipe, the folder or the scheduler cannot be used.
+    WorkFailed
+        If a task failed, or another run is at work in the folder.
+    """
+    ledger = Ledger(out)
+    if not ledger.folder.is_dir():
+        raise BadInput(str(out), "", "holds no products", f"`twillight run {name}` makes them")
+    with ledger.held():
+        tasks, found = _found(name, out)
+        _print(found, out)
+        for fault in found:
+            _remove(fault, ledger)
+        again = {fault.task.id for fault in found if fault.task}
+        if any(task.alone and task.id in again for task in tasks):
+            for page in (task for task in tasks if isinstance(task, Page)):
+                (out / page.products[0]).unlink(missing_ok=True)
+    planned = Counter(task.stage for task in tasks)
+    never = {fault.task.stage for fault in found if fault.task and fault.never_run}
+    never = {stage for stage in never if _never(stage, found) == planned[stage]}
+    if any(fault.kind != "foreign" for fault in found):
+        if stages := [stage for stage in STAGES if stage not in never]:
+            work(name, stages, out, scheduler, workers)
+        found = _found(name, out)[1]
+        if found:
+            print_line("what is left:")
+            _print(found, out)
+    if not found:
+        _print_sound(name, tasks)
+    return exit_code(found)
+
+
+def exit_code(found: Sequence[Fault]) -> int:
+    """Return the exit code of faults."""
+    if any(fault.kind not in _HARMLESS for fault in found):
+        return BadInput.exit_code
+    return WorkFailed.exit_code if found else 0
+
+
+def _found(name: str, out: Path) -> tuple[list[Task], list[Fault]]:
+    """Return the plan of a recipe and the faults of its files."""
+    recipe = load_recipe(name)
+    tasks = plan(recipe, measured_alone(out))
+    console = Terminal(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("checking", total=1.0)
+        return tasks, faults(recipe, tasks, Ledger(out), lambda share: progress.update(bar, completed=share))
+
+
+def _never(stage: str, found: Sequence[Fault]) -> int:
+    """Return the number of tasks of a stage that were never run."""
+    return sum(fault.tasks for fault in found if fault.never_run and fault.task and fault.task.stage == stage)
+
+
+def _remove(fault: Fault, ledger: Ledger) -> None:
+    """Remove what a fault is about, so that its task counts as missing; manifests are written again by each run."""
+    if fault.task is None or fault.kind not in ("cut", "damaged", "missing"):
+        return
+    if fault.path == ledger.receipt_path(fault.task):
+        (ledger.out / fault.path).unlink(missing_ok=True)
+    ledger.discard(fault.task)
+    if isinstance(fault.task, Page):  # its other files are not on the receipt
+        (ledger.out / fault.task.products[0]).unlink(missing_ok=True)
+
+
+def _print(found: Sequence[Fault], out: Path) -> None:
+    """Print a sentence a fault, those of damage first, and count the others beyond a number."""
+    order = ["damaged", "cut", "odd", "foreign", "outdated", "missing"]
+    found = sorted(found, key=lambda fault: order.index(fault.kind))
+    for fault in found[:MOST_SENTENCES]:
+        print_line(f"{out / fault.path}: {fault.kind}: {fault.why}")
+    if more := Counter(fault.kind for fault in found[MOST_SENTENCES:]):
+        print_line(f"and {', '.join(f'{count:,} {kind}' for kind, count in more.items())} more")
+
+
+def _print_sound(name: str, tasks: Sequence[Task]) -> None:
+    """Print what was found sound."""
+    parts = [task for task in tasks if isinstance(task, Shard)]
+    count = Counter(task.stage for task in tasks)
+    rows = sum(part.rows for part in parts)
+    models = f"{count['train']:,} models, {count['bench']:,} measurements"
+    Terminal().print(
+        f"{name}: {len(parts):,} shards with {rows:,} rows, {models} and the page are sound", soft_wrap=True
+    )

@@ -1,0 +1,83 @@
+"""Products of real plans without their work: each task writes bytes that depend on its id alone, times excepted."""
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from jobs.plan.dataset import Shard, shards
+from jobs.plan.page import Page
+from jobs.plan.plan import plan
+from jobs.plan.task import STAGES
+from jobs.plan.training import Training
+from jobs.recipe.load import load_recipe
+from jobs.run.executor import Summary
+from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile
+from jobs.run.receipt import measure
+from pipeline.atomic import link
+from pipeline.models.card import write_model
+from pipeline.shards.generate import ShardTask
+from pipeline.shards.queries import draw_queries
+from pipeline.shards.store import write_shard
+from pipeline.truth.query import Answers
+from reports.page.files import write_files
+
+
+def make(task, out):
+    """Write the products of a task."""
+    paths = [out / path for path in task.products]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(task, Shard):
+        assert isinstance(task.shard, ShardTask)
+        shard = task.shard
+        queries = draw_queries(shard.queries, shard.fabric.weave.repeat, int(task.id, 16), shard.start, shard.rows)
+        mean = np.full((shard.rows, 4), 0.1, np.float32)
+        answers = Answers.opaque(mean, mean, np.full(shard.rows, 8, np.int32))
+        write_shard(paths[0], shard.fabric.name, queries, answers, {})
+        for path in paths[1:]:
+            link(paths[0], path)
+    elif isinstance(task, Training):
+        write_model(out / task.folder, task.id.encode() * 20, {"steps_taken": 1, "of": task.id})
+    elif isinstance(task, Page):
+        (out / task.folder / "figures").mkdir(exist_ok=True)
+        for name in ("records.json", "figures/a.png"):
+            (out / task.folder / name).write_text(name * 20)
+        write_files(out / task.folder, ["records.json", "figures/a.png"])
+        paths[0].write_text("".join((out / path).read_text() for path in task.records))
+    else:
+        for path in paths:
+            now = time.time_ns() if task.alone or path.name.endswith(".machine.json") else 0
+            path.write_text(json.dumps({"file": path.name, "date": now, "values": [0.5] * 20}))
+
+
+def execute(tasks, out, *, stages=STAGES, recorded=lambda task: None, **rest):
+    """Do the unfinished tasks one after the other in this process, as `jobs.run.executor.execute` would."""
+    ledger, summary = Ledger(out), Summary([], [], [], [])
+    for task in tasks:
+        if ledger.state(task) == "done" or ledger.adopt(task):
+            summary.before.append(task)
+        elif task.stage in stages:
+            make(task, out)
+            ledger.finish(task, {Path(path).name: measure(out / path) for path in task.products}, 1.5)
+            recorded(task)
+            summary.ran.append(task)
+    return summary
+
+
+def finished(recipe, out, stages=STAGES):
+    """Write all products of a recipe, and return its plan."""
+    loaded = load_recipe(recipe)
+    tasks = plan(loaded)
+    execute(tasks, out, stages=stages)
+    for one in loaded.together:
+        ManifestFile(one, shards(one), Ledger(out)).save()
+    return tasks
+
+
+def contents(out):
+    """Return the bytes of all files but the lock."""
+    files = [path for path in out.rglob("*") if path.is_file() and path.name != "lock"]
+    return {str(path.relative_to(out)): path.read_bytes() for path in files}

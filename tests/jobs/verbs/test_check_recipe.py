@@ -1,0 +1,204 @@
+"""Check and repair of a recipe, on made-up products: what is not as it was is found, named and made again."""
+
+import random
+import shutil
+
+import pytest
+
+from jobs.cli import main
+from jobs.plan.dataset import Shard
+from jobs.plan.page import Page
+from jobs.plan.training import Training
+from jobs.run.ledger import Ledger
+from pipeline.shards.store import read_table, write_columns
+from tests.jobs import made_up
+
+RECIPE = """
+name = "tiny"
+[dataset]
+seen = ["denim"]
+shard_rows = 64
+[dataset.rows]
+train = 128
+validation = 32
+test = 64
+[[models]]
+model = "woven"
+[[models]]
+model = "neumip"
+[bench]
+views = ["plane"]
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Return a folder in which a recipe is finished, the recipe beside it."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "tiny.toml").write_text(RECIPE)
+    made_up.finished(folder / "tiny.toml", folder / "out")
+    return folder
+
+
+@pytest.fixture
+def run(whole, tmp_path, monkeypatch, capsys):
+    """Return a copy of that folder, and the command line on it: code and both outputs."""
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr("jobs.verbs.run.execute", made_up.execute)
+    monkeypatch.setattr("jobs.verbs.run.summary_of", lambda records: None)
+    monkeypatch.setattr("jobs.verbs.run.methods_table", lambda frame: "")
+
+    def run(*more):
+        code = main(["check", str(tmp_path / "tiny.toml"), "--out", str(tmp_path / "out"), *more])
+        told = capsys.readouterr()
+        return code, told.out.replace("\n", " "), told.err
+
+    run.out = tmp_path / "out"
+    run.tasks = made_up.plan(made_up.load_recipe(tmp_path / "tiny.toml"))
+    run.of = lambda kind: next(task for task in run.tasks if isinstance(task, kind))
+    return run
+
+
+def flip(path, chance=None):
+    chance = chance or random.Random(0)
+    content = bytearray(path.read_bytes())
+    content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
+    path.write_bytes(content)
+
+
+def same(found, expected, but=()):
+    """Assert that files are the same but for the dates beside Records, and for some others."""
+    assert found.keys() == expected.keys()
+    changed = {path for path in found if found[path] != expected[path] and not path.endswith(".machine.json")}
+    assert changed <= set(but), changed
+
+
+def test_a_finished_recipe_is_sound(run):
+    code, said, told = run()
+    assert code == 0 and told == ""
+    assert "4 shards with 224 rows, 2 models" in said and "are sound" in said
+
+
+def test_an_empty_folder_is_not_sound(run):
+    shutil.rmtree(run.out)
+    code, said, told = run()
+    assert code == 1 and "sound" not in said
+    assert len(told.splitlines()) == 5  # a sentence a stage, and what to run
+    assert "nor does any product of the 4 tasks of generate" in told
+
+
+def test_what_is_left_to_do_is_missing(run):
+    shutil.rmtree(run.out)
+    made_up.finished(run.out.parent / "tiny.toml", run.out, ["generate"])
+    code, _, told = run()
+    assert code == 1 and "of train" in told and "of generate" not in told
+    # Stages that were never begun are not.
+    code, _, _ = run("--repair")
+    assert code == 1 and Ledger(run.out).state(run.of(Training)) == "missing"
+
+
+def test_a_shard_that_is_gone_is_named_and_made_again(run):
+    expected, shard = made_up.contents(run.out), run.of(Shard)
+    (run.out / shard.products[0]).unlink()
+    code, _, told = run()
+    assert code == 1 and f"{run.out / shard.products[0]}: missing" in told
+    assert run("--repair")[0] == 0
+    same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
+
+
+def test_files_cut_short_are_named_and_made_again(run):
+    expected = made_up.contents(run.out)
+    for path in (run.of(Shard).products[0], run.of(Training).products[0]):
+        (run.out / path).write_bytes(expected[path][:-1])
+    code, _, told = run()
+    assert code == 2 and told.count(": cut: it has") == 2
+    assert run("--repair")[0] == 0
+    same(made_up.contents(run.out), expected)
+
+
+def test_a_foreign_file_is_named_and_kept(run):
+    foreign = (run.out / run.of(Shard).products[0]).with_name("part-0123456789abcdef.parquet")
+    foreign.write_text("not a shard")
+    (run.out / run.of(Training).folder / "notes.txt").write_text("by hand")
+    (run.out / run.of(Page).folder / "results.md").write_text("by `twillight results`")
+    (run.out / "crash-12345678.txt").write_text("not in a folder of the recipe")
+    code, _, told = run()
+    assert code == 2 and told.count(": foreign: no task of this recipe made it") == 2
+    assert run("--repair")[0] == 2 and foreign.exists()
+
+
+def test_a_page_of_other_measurements_is_outdated(run):
+    page = run.of(Page)
+    (run.out / "ledger" / f"{page.id}.json").unlink()
+    code, _, told = run()
+    assert code == 1 and f"{run.out / page.products[0]}: outdated" in told
+    assert run("--repair")[0] == 0
+
+
+def test_values_that_were_never_right_are_odd(run):
+    """A shard whose hash is on the receipt, with a value that no truth gives."""
+    shard = run.of(Shard)
+    path = run.out / shard.products[0]
+    table = read_table(path)
+    columns = {name: table.column(name).to_numpy().copy() for name in table.schema.names[1:]}
+    columns["diffuse_warp"][3] = -1.0
+    write_columns(path, "components", shard.shard.fabric.name, columns, {})
+    Ledger(run.out).finish(shard, {path.name: made_up.measure(path)}, 1.0)
+    code, _, told = run()
+    assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
+
+
+def test_a_measurement_of_time_is_taken_again_and_shown(run):
+    timing = next(task for task in run.tasks if task.alone)
+    expected = made_up.contents(run.out)
+    flip(run.out / timing.records)
+    assert run("--repair")[0] == 0
+    found, page = made_up.contents(run.out), run.of(Page)
+    changed = [timing.records, page.products[0], f"ledger/{timing.id}.json", f"ledger/{page.id}.json"]
+    same(found, expected, but=changed)
+    assert found[page.products[0]] != expected[page.products[0]]
+
+
+def test_many_faults_are_counted(run):
+    struck = [path for place in ("records/*", "models/*/*", "datasets/*/*.parquet") for path in run.out.glob(place)]
+    for path in struck:
+        flip(path)
+    code, _, told = run()
+    assert code == 2 and len(told.splitlines()) == 22
+    assert told.splitlines()[20] == f"and {len(struck) - 20} damaged more"
+
+
+def rounds(run, count, flips):
+    """Flip bytes of random files, each of another kind in turn; each is named, and all come back."""
+    chance = random.Random(1)
+    kinds = ["datasets/*/*.parquet", "datasets/*/manifest.json", "ledger/*.json", "models/*/model.safetensors"]
+    kinds += ["models/*/card.json", "records/*", "report/*/index.html", "report/*/files.json", "report/*/figures/*"]
+    expected = made_up.contents(run.out)
+    for _ in range(count):
+        struck = {chance.choice(sorted(run.out.glob(kind))) for kind in chance.sample(kinds, flips)}
+        for path in struck:
+            flip(path, chance)
+        code, _, told = run()
+        assert code == 2
+        by_task = {path for path in struck if any(str(path) in line for line in told.splitlines())}
+        receipts = {path.stem for path in struck if path.parent.name == "ledger"}
+        # A product whose receipt was struck too is not named: it is made again with it.
+        for path in struck - by_task:
+            tasks = [task for task in run.tasks if str(path.relative_to(run.out)) in task.products]
+            assert any(task.id in receipts for task in tasks) or "report" in str(path), (path, told)
+        assert run("--repair")[0] == 0
+        assert run()[0] == 0
+        found = made_up.contents(run.out)
+        times = {path for task in run.tasks if task.alone or isinstance(task, Page) for path in task.products}
+        times |= {f"ledger/{task.id}.json" for task in run.tasks if task.stage == "bench" or isinstance(task, Page)}
+        same(found, expected, but=times)
+        assert not receipts & {task.id for task in run.tasks if Ledger(run.out).receipt(task) is None}
+
+
+def test_flips_of_all_kinds_of_files_are_found_and_repaired(run):
+    rounds(run, 4, 5)
+
+
+@pytest.mark.slow
+def test_two_hundred_flips_are_found_and_repaired(run):
+    rounds(run, 40, 5)

@@ -1,0 +1,109 @@
+"""Two folders of products become one; what does not fit is refused, what is damaged left out."""
+
+import shutil
+
+import pytest
+
+from jobs.cli import main
+from jobs.plan.dataset import folder_of, shards
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile
+from jobs.run.receipt import measure
+from pipeline.shards.manifest import Manifest
+from tests.jobs import made_up
+from tests.jobs.verbs.test_prune import RECIPE
+
+
+@pytest.fixture
+def parts(tmp_path, monkeypatch, capsys):
+    """Return the command line on two folders, each with every other shard of a data set."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wide.toml").write_text(RECIPE.format(name="wide", train=512, model="woven"))
+    recipe = load_recipe("wide.toml")
+    tasks = made_up.plan(recipe)
+    for first, name in enumerate("ab"):
+        out = tmp_path / name
+        made_up.execute(tasks[first:10:2], out)
+        ManifestFile(recipe, shards(recipe), Ledger(out)).save()
+
+    def merge(*tokens):
+        code = main(["merge", *tokens])
+        told = capsys.readouterr()
+        return code, " ".join(told.out.split()), told.err
+
+    merge.tasks, merge.folder = tasks, folder_of(shards(recipe))
+    return merge
+
+
+def test_parts_of_a_data_set_become_the_whole(parts, tmp_path):
+    made_up.finished("wide.toml", tmp_path / "whole", ["generate"])
+    code, said, told = parts("a", "b", "--out", "c")
+    assert code == 0 and told == "" and "10 finished tasks, 5 from a, 5 from b" in said
+    found, expected = made_up.contents(tmp_path / "c"), made_up.contents(tmp_path / "whole")
+    assert found.keys() == expected.keys()
+    assert {path for path in found if found[path] != expected[path]} == set()
+    assert len(Manifest.load(tmp_path / "c" / parts.folder).shards) == 10
+    assert made_up.execute(parts.tasks, tmp_path / "c", stages=["generate"]).ran == []
+
+
+def test_a_folder_may_be_joined_to_another_and_twice(parts, tmp_path):
+    assert parts("a", "b", "--out", "a")[0] == 0
+    before = made_up.contents(tmp_path / "a")
+    assert "10 finished tasks" in parts("a", "b", "--out", "a")[1]
+    assert made_up.contents(tmp_path / "a") == before
+
+
+def test_a_damaged_product_is_left_out_unless_the_other_folder_has_it(parts, tmp_path):
+    first, second = parts.tasks[0], parts.tasks[1]
+    for task, name in ((first, "a"), (second, "b")):
+        path = tmp_path / name / task.products[0]
+        content = path.read_bytes()
+        path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    made_up.execute([second], tmp_path / "a")
+    code, said, told = parts("a", "b", "--out", "c")
+    assert code == 2 and "9 finished tasks" in said
+    assert told == f"a: generate {first.title}: a product is missing or damaged; it is left out\n"
+    assert Ledger(tmp_path / "c").state(first) == "missing"
+    assert len(Manifest.load(tmp_path / "c" / parts.folder).shards) == 9
+    assert made_up.execute(parts.tasks, tmp_path / "c", stages=["generate"]).ran == [first]
+
+
+def test_models_and_records_come_along_and_pages_do_not(parts, tmp_path):
+    made_up.finished("wide.toml", tmp_path / "whole")
+    assert parts("a", "whole", "--out", "c")[0] == 0
+    found, expected = made_up.contents(tmp_path / "c"), made_up.contents(tmp_path / "whole")
+    page = parts.tasks[-1]
+    left = {path for path in expected if path.startswith("report/")} | {f"ledger/{page.id}.json"}
+    assert found == {path: content for path, content in expected.items() if path not in left}
+    assert made_up.execute(parts.tasks, tmp_path / "c").ran == [page]
+
+
+def test_other_bytes_of_one_task_are_refused(parts, tmp_path):
+    task = parts.tasks[0]
+    shutil.copytree(tmp_path / "a", tmp_path / "other")
+    path = tmp_path / "other" / task.products[0]
+    path.write_bytes(b"made with another version that was not told apart")
+    Ledger(tmp_path / "other").finish(task, {path.name: measure(path)}, 1.0)
+    code, _, told = parts("a", "other", "--out", "c")
+    assert code == 2 and f"{path.name} of generate {task.title} has other bytes in each" in told
+    assert not list((tmp_path / "c").glob("datasets/*/*"))
+
+
+def test_measurements_of_time_in_both_folders_are_refused(parts, tmp_path):
+    for name in ("one", "two"):
+        made_up.finished("wide.toml", tmp_path / name)
+    code, _, told = parts("one", "two", "--out", "c")
+    assert code == 2 and "has other bytes in each: delete ledger/" in told
+
+
+def test_manifests_of_unlike_data_sets_are_refused(parts, tmp_path):
+    manifest = Manifest.load(tmp_path / "b" / parts.folder)
+    manifest.model_copy(update={"fingerprint": "0" * 16}).save(tmp_path / "b" / parts.folder)
+    code, _, told = parts("a", "b", "--out", "c")
+    assert code == 2 and "is of another data set" in told
+
+
+def test_a_folder_without_products_is_bad_input(parts):
+    code, _, told = parts("a", "nothing", "--out", "c")
+    assert code == 2 and "nothing: holds no products" in told

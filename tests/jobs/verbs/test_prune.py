@@ -1,0 +1,110 @@
+"""What no named recipe needs, and what is never removed."""
+
+import pytest
+
+from jobs.cli import main
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
+from tests.jobs import made_up
+
+RECIPE = """
+name = "{name}"
+[dataset]
+seen = ["denim"]
+shard_rows = 64
+[dataset.rows]
+train = {train}
+validation = 32
+test = 64
+[[models]]
+model = "{model}"
+[bench]
+views = ["plane"]
+"""
+
+FOREIGN = ("crash-0.txt", "recipes/require-x.toml", "records/by-hand.json", "datasets/wide/notes.txt", "models/a/x.bin")
+
+
+@pytest.fixture
+def two(tmp_path, monkeypatch, capsys):
+    """Return the command line on a folder with two finished recipes that share shards, and with foreign files."""
+    monkeypatch.chdir(tmp_path)
+    for name, train, model in (("narrow", 128, "woven"), ("wide", 256, "neumip")):
+        (tmp_path / f"{name}.toml").write_text(RECIPE.format(name=name, train=train, model=model))
+        made_up.finished(tmp_path / f"{name}.toml", tmp_path / "out")
+    for path in FOREIGN:
+        (tmp_path / "out" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "out" / path).write_text("x")
+
+    def prune(*tokens):
+        code = main(["prune", *tokens])
+        told = capsys.readouterr()
+        return code, " ".join(told.out.split()), told.err
+
+    return prune
+
+
+def done(recipe, out):
+    return all(Ledger(out).state(task) == "done" for task in made_up.plan(load_recipe(recipe)))
+
+
+def test_nothing_is_removed_that_a_named_recipe_needs(two, tmp_path):
+    before = made_up.contents(tmp_path / "out")
+    code, said, _ = two("narrow.toml", "wide.toml", "--delete")
+    assert code == 0 and "nothing to remove" in said
+    assert made_up.contents(tmp_path / "out") == before
+
+
+def test_a_list_removes_nothing_and_names_what_is_kept(two, tmp_path):
+    before = made_up.contents(tmp_path / "out")
+    code, said, _ = two("wide.toml")
+    assert code == 0 and "--delete removes them" in said
+    assert all(path in said for path in FOREIGN)
+    assert made_up.contents(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize(("kept", "gone"), [("narrow", "wide"), ("wide", "narrow")])
+def test_the_other_recipe_goes_with_receipts_and_folders(two, tmp_path, kept, gone):
+    out = tmp_path / "out"
+    alone = tmp_path / "alone"
+    made_up.finished(f"{kept}.toml", alone)
+    code, said, _ = two(f"{kept}.toml", "--delete")
+    assert code == 0 and "files removed" in said
+    assert done(f"{kept}.toml", out) and not done(f"{gone}.toml", out)
+    assert made_up.contents(out).keys() == made_up.contents(alone).keys() | set(FOREIGN)
+    assert not [path for path in out.rglob("*") if path.is_dir() and not any(path.iterdir())]
+
+
+def test_what_a_stopped_training_goes_on_from_is_kept(two, tmp_path):
+    out = tmp_path / "out"
+    for recipe in ("narrow", "wide"):
+        training = next(task for task in made_up.plan(load_recipe(f"{recipe}.toml")) if task.stage == "train")
+        for name in ("checkpoint.safetensors", ".tmp-card.json"):
+            (out / training.folder / name).write_text("x")
+    two("narrow.toml", "--delete")
+    assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1
+    assert not list(out.glob("models/*/.tmp-*"))
+
+
+def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_path):
+    """The shards that both share are hard links: removing one of two names frees nothing."""
+    shards = next(iter((tmp_path / "out" / "datasets").glob("narrow-*")))
+    shared = [path for path in shards.glob("*.parquet") if path.stat().st_nlink == 2]
+    assert len(shared) == 4
+    _, said, _ = two("wide.toml")
+    freed = said.split(f"{shards.relative_to(tmp_path / 'out')} 5 ")[1].split()
+    manifest = (shards / "manifest.json").stat().st_size
+    assert freed[1] == "kB" and float(freed[0]) == pytest.approx(manifest / 1000, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("tokens", "words"),
+    [
+        (["narrow.toml", "--out", "nothing"], "holds no products"),
+        (["quik"], "did you mean 'quick'"),
+        ([], "recipes"),
+    ],
+)
+def test_bad_input_is_one_sentence(two, tokens, words):
+    code, _, told = two(*tokens)
+    assert code == 2 and words in told.lower() and told.count("\n") == 1
