@@ -12,10 +12,10 @@ from typing import Any
 from rich.progress import track
 from rich.table import Table
 
+from jobs.console import table_of
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import Terminal
-from jobs.verbs.console import table_of
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput, WorkFailed, nearest

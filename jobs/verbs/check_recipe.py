@@ -12,6 +12,7 @@ from typing import Final
 
 from rich.progress import Progress
 
+from jobs.console import MOST_SENTENCES, print_line
 from jobs.plan.dataset import Shard
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
@@ -22,7 +23,6 @@ from jobs.run.faults import Fault, faults
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.console import MOST_SENTENCES, print_line
 from jobs.verbs.run import work
 from weaves.errors import BadInput, WorkFailed
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from jobs.console import number, table_of
 from jobs.terminal import Terminal
-from jobs.verbs.console import number, table_of
 from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions

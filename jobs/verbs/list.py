@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from jobs.console import table_of
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import Terminal
-from jobs.verbs.console import table_of
 from weaves.fabric import Fabric, load_fabric, preset_names
 
 

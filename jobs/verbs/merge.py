@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from jobs.console import MOST_SENTENCES, print_line
 from jobs.plan.dataset import DATASETS
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product, Receipt
 from jobs.terminal import Terminal
-from jobs.verbs.console import MOST_SENTENCES, print_line
 from pipeline.atomic import link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput

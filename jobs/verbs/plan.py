@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from jobs.console import duration, size, table_of
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Task, urgencies
 from jobs.recipe.load import load_recipe
 from jobs.terminal import Terminal
-from jobs.verbs.console import duration, size, table_of
 
 
 def print_plan(recipe: str) -> None:

@@ -13,6 +13,7 @@ from typing import Final
 
 from rich.table import Table
 
+from jobs.console import MOST_SENTENCES, size, table_of
 from jobs.plan.dataset import DATASETS, shards
 from jobs.plan.plan import plan
 from jobs.plan.task import Stage
@@ -21,7 +22,6 @@ from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.console import MOST_SENTENCES, size, table_of
 from weaves.errors import BadInput
 
 FOLDERS: Final[dict[Stage, str]] = {"generate": DATASETS, "train": "models", "bench": "records", "report": "report"}

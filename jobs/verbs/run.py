@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
+from jobs.console import duration, number, table_of
 from jobs.plan.dataset import shards
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
@@ -20,7 +21,6 @@ from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.console import duration, number, table_of
 from weaves.errors import WorkFailed
 
 

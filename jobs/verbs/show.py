@@ -12,8 +12,8 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from jobs.console import table_of
 from jobs.terminal import Terminal
-from jobs.verbs.console import table_of
 from pipeline.atomic import atomic_write
 from reports.images import tiles
 from reports.images.exr import write_exr

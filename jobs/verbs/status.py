@@ -7,13 +7,13 @@ from pathlib import Path
 
 from rich.table import Table
 
+from jobs.console import table_of
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
-from jobs.verbs.console import table_of
 
 
 def print_status(recipe: str, out: Path) -> None:
