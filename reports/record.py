@@ -2,11 +2,13 @@
 
 A file ``NAME.json`` holds the records of one task and nothing that differs between two runs of the same work, so that
 its bytes are a function of the work (times excepted, which are what they are). The machine, the versions of the
-packages and the date lie beside it in ``NAME.machine.json``, written first: records exist only together with it.
+packages and the date lie beside it in ``NAME.machine.json``, written first: records exist only together with it. It
+also has a hash over both files, so that damaged Records are never read.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -21,6 +23,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, Typ
 
 from pipeline import versions
 from pipeline.atomic import atomic_write
+from pipeline.fingerprint import file_sha256
 from reports.catalogue import METRICS
 from reports.error import Error
 from reports.options import Role
@@ -173,6 +176,21 @@ class Machine(BaseModel):
     """UTC, ISO 8601."""
 
 
+class _MachineFile(Machine):
+    """Content of ``NAME.machine.json``."""
+
+    sha256: str = ""
+    """Hash over the Records beside it and over its other fields; files of earlier versions have none."""
+
+    def encoded(self) -> bytes:
+        """Return the bytes of the file."""
+        return self.model_dump_json(indent=1, exclude_unset=True).encode() + b"\n"
+
+    def hash(self, records: str) -> str:
+        """Return the hash over the SHA-256 of Records and over the other fields."""
+        return hashlib.sha256(records.encode() + self.model_dump_json(exclude={"sha256"}).encode()).hexdigest()
+
+
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -193,9 +211,11 @@ def this_machine(threads: int) -> Machine:
 
 def write_records(path: Path, records: Sequence[Record], machine: Machine) -> None:
     """Write a task's records to `path` (``NAME.json``) and the machine beside it."""
-    atomic_write(machine_path(path), machine.model_dump_json(indent=1).encode() + b"\n")
     lines = ",\n".join(json.dumps(_compact(record)) for record in records)
-    atomic_write(path, f"[\n{lines}\n]\n".encode())
+    content = f"[\n{lines}\n]\n".encode()
+    hash = _MachineFile(**dict(machine)).hash(hashlib.sha256(content).hexdigest())
+    atomic_write(machine_path(path), _MachineFile(**dict(machine), sha256=hash).encoded())
+    atomic_write(path, content)
 
 
 def machine_path(path: Path) -> Path:
@@ -204,11 +224,14 @@ def machine_path(path: Path) -> Path:
 
 
 def read_records(paths: Iterable[Path]) -> list[Record]:
-    """Read records from files, in the order of the files; BadInput names the first that holds none."""
+    """Read records from files, in the order of the files; BadInput names the first that is damaged or holds none."""
     records: list[Record] = []
     for path in paths:
         try:
-            records += _RECORDS.validate_python(read_json(path, _MOST_BYTES, "a file of records"))
+            content = read_json(path, _MOST_BYTES, "a file of records")
+            if machine_path(path).exists():
+                read_machine(path)
+            records += _RECORDS.validate_python(content)
         except FileNotFoundError as error:
             raise BadInput(str(path), "", "does not exist", "records are needed; run the benchmark first") from error
         except ValidationError as error:
@@ -221,12 +244,16 @@ def read_records(paths: Iterable[Path]) -> list[Record]:
 
 
 def read_machine(path: Path) -> Machine:
-    """Read the machine of the records in `path`; BadInput if it is missing or broken."""
+    """Read the machine of the records in `path`; BadInput if it is missing, or one of both files is damaged."""
     beside = machine_path(path)
     try:
-        return Machine.model_validate(read_json(beside, MIB, "a file of one machine"))
-    except (FileNotFoundError, ValidationError) as error:
+        found = _MachineFile.model_validate(read_json(beside, MIB, "a file of one machine"))
+        whole = beside.read_bytes() == found.encoded() and found.sha256 == found.hash(file_sha256(path))
+    except (OSError, ValidationError) as error:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
+    if "sha256" in found.model_fields_set and not whole:
+        raise BadInput(str(path), "", f"damaged, or {beside.name} is: hashes differ", "run the benchmark again")
+    return Machine(**found.model_dump(exclude={"sha256"}))
 
 
 def to_table(records: Iterable[Record]) -> pd.DataFrame:

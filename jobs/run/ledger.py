@@ -53,6 +53,11 @@ class Ledger:
             return "done"
         return "failed" if self._note(task).exists() else "missing"
 
+    def is_sound(self, task: Task) -> bool:
+        """Return whether a task is done and its products have the bytes that are on its receipt; they are read."""
+        receipt = self.receipt(task)
+        return receipt is not None and all(self._is_whole(self.out / path, receipt, True) for path in task.products)
+
     def receipt(self, task: Task) -> Receipt | None:
         """Return a task's receipt; None if there is none, or no valid one."""
         return read_receipt(self._receipt(task), task.id)

@@ -202,23 +202,24 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
 
 
 def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
-    """Return the difference of the errors of both models; nothing if a picture or the truth's frames are missing."""
+    """Return the difference of the errors of both models; nothing if a picture or the truth's frames are not sound."""
     from reports.images.exr import RGB, read_exr
     from reports.measure.paired_error import mse_difference
     from reports.measure.scene.shot import read_shot
 
-    name, setting = model.options.name, _setting(model)
+    name, setting, ledger = model.options.name, _setting(model), Ledger(out)
     pictures, frames = [], None
     for task in (task for recipe in recipes for task in plan(recipe)):
-        if isinstance(task, SceneShot) and task.scene == scene:
+        if isinstance(task, SceneShot) and task.scene == scene and ledger.is_sound(task):
             frames = out / task.made.path
         if (
             isinstance(task, OnScene)
             and (task.scene, task.model.options.name) == (scene, name)
             and setting in task.shown
+            and ledger.is_sound(task)
         ):
             pictures.append(out / task.picture(setting))
-    if len(pictures) != 2 or frames is None or not all(path.is_file() for path in (*pictures, frames)):
+    if len(pictures) != 2 or frames is None:
         return []
     first = read_shot(frames).first()
     a, b = (read_exr(path).stack(*RGB) for path in pictures)
@@ -238,7 +239,7 @@ def _elsewhere(
     from reports.measure.scene.shot import read_shot
 
     for task in plan(general):
-        if not isinstance(task, SceneShot) or Ledger(out).state(task) != "done":
+        if not isinstance(task, SceneShot) or not Ledger(out).is_sound(task):
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:

@@ -1,7 +1,10 @@
+import json
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from reports.error import squared_error
@@ -47,6 +50,29 @@ def test_bytes_do_not_depend_on_the_machine_or_the_date(tmp_path):
     write_records(tmp_path / "b.json", RECORDS, other)
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
     assert machine_path(tmp_path / "a.json").read_bytes() != machine_path(tmp_path / "b.json").read_bytes()
+
+
+@given(st.data())
+def test_every_flip_of_records_or_of_their_machine_is_refused(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "flips" / "a.json"
+    write_records(path, RECORDS, this_machine(1))
+    struck = data.draw(st.sampled_from([path, machine_path(path)]))
+    content = bytearray(struck.read_bytes())
+    content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+    struck.write_bytes(content)
+    with pytest.raises(BadInput):
+        read_records([path])
+    with pytest.raises(BadInput):
+        read_machine(path)
+
+
+def test_records_of_before_hashes_are_read(tmp_path):
+    write_records(tmp_path / "a.json", RECORDS, this_machine(1))
+    beside = machine_path(tmp_path / "a.json")
+    content = json.loads(beside.read_text())
+    del content["sha256"]
+    beside.write_text(json.dumps(content))
+    assert read_records([tmp_path / "a.json"]) == RECORDS and read_machine(tmp_path / "a.json").threads == 1
 
 
 def test_table_has_a_row_a_record(tmp_path):

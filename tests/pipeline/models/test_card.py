@@ -66,5 +66,5 @@ def test_what_is_no_card_is_refused(tmp_path, content):
 def test_missing_files_are_named(folder, tmp_path):
     with pytest.raises(BadInput, match=r"card\.json: does not exist: train the model first"):
         read_card(tmp_path)
-    with pytest.raises(BadInput, match=r"model\.safetensors: No such file"):
+    with pytest.raises(BadInput, match=r"model\.safetensors: does not exist: train it again"):
         read_weights(tmp_path, read_card(folder))
