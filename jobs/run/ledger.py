@@ -140,7 +140,7 @@ class Ledger:
         receipt, removed = self.receipt(task), []
         for path in map(Path, task.products if receipt else ()):
             for file in {self.out / path, *self._copies(path)}:
-                if file.exists() and receipt and not self._is_whole(file, receipt, verify=True):
+                if file.is_file() and receipt and not self._is_whole(file, receipt, verify=True):
                     file.unlink()
                     removed.append(str(file.relative_to(self.out)))
         return sorted(removed)

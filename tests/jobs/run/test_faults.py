@@ -1,0 +1,102 @@
+import pytest
+
+from jobs.plan.dataset import Shard
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.faults import faults, is_leftover, own_files, task_faults
+from jobs.run.ledger import Ledger
+from jobs.verbs.bench import TRUTH, measured_alone
+from pipeline.training.checkpoint import CHECKPOINT
+from pipeline.training.loop import ROWS
+from reports.record import Record, machine_path, this_machine, write_records
+from tests.jobs import made_up
+
+RECIPE = """
+name = "{name}"
+[dataset]
+seen = ["denim"]
+shard_rows = 64
+[dataset.rows]
+train = {train}
+validation = 32
+test = 64
+[[models]]
+model = "neumip"
+{more}
+"""
+
+
+@pytest.fixture
+def trade(tmp_path):
+    """Return a finished recipe one of whose models another recipe trains, on a data set that shares shards."""
+    (tmp_path / "other.toml").write_text(RECIPE.format(name="other", train=128, more=""))
+    more = 'recipe = "other.toml"\n[[models]]\nmodel = "woven"'
+    (tmp_path / "trade.toml").write_text(RECIPE.format(name="trade", train=256, more=more))
+    tasks = made_up.finished(tmp_path / "trade.toml", tmp_path / "out")
+    return load_recipe(tmp_path / "trade.toml"), tasks, Ledger(tmp_path / "out")
+
+
+def kinds(found):
+    return sorted((fault.kind, fault.path) for fault in found)
+
+
+def test_two_data_sets_of_one_recipe_are_sound(trade):
+    shares = []
+    assert faults(*trade, shares.append) == []
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_each_copy_of_a_shared_shard_is_read(trade):
+    recipe, tasks, ledger = trade
+    shared = next(task for task in tasks if isinstance(task, Shard) and len(task.products) == 2)
+    second = ledger.out / shared.products[1]
+    content = second.read_bytes()
+    second.unlink()  # no longer a link to the same bytes
+    second.write_bytes(content[:-1] + b"x")
+    assert kinds(faults(recipe, tasks, ledger)) == [("damaged", shared.products[1])]
+    assert ledger.discard(shared) == [shared.products[1]]
+    # The sound copy gives the bytes again.
+    assert ledger.adopt(shared) and second.read_bytes() == content
+    assert faults(recipe, tasks, ledger) == []
+
+
+def test_a_manifest_of_either_data_set_is_compared(trade):
+    recipe, tasks, ledger = trade
+    first, second = sorted(ledger.out.glob("datasets/*/manifest.json"))
+    first.write_text(first.read_text().replace('"start": 64', '"start": 65'))
+    second.unlink()
+    places = [str(path.relative_to(ledger.out)) for path in (first, second)]
+    assert kinds(faults(recipe, tasks, ledger)) == [("damaged", places[0]), ("missing", places[1])]
+
+
+def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
+    _, tasks, ledger = trade
+    one, other = (task for task in tasks if task.stage == "train")
+    (ledger.out / one.products[0]).unlink()
+    (ledger.out / one.products[0]).mkdir()
+    with (ledger.out / other.products[0]).open("ab") as file:
+        file.write(b"x")
+    assert {fault.kind for fault in task_faults(one, ledger)} == {"damaged"}
+    assert kinds(task_faults(other, ledger)) == [("damaged", other.products[0])]
+    assert ledger.discard(other) == [other.products[0]]
+
+
+def test_damaged_records_that_no_task_writes_are_named(trade, tmp_path):
+    recipe, _, ledger = trade
+    path = ledger.out / TRUTH
+    write_records(path, [Record(method="truth")], this_machine(1))
+    assert not [fault for fault in faults(recipe, plan(recipe, measured_alone(ledger.out)), ledger) if not fault.task]
+    machine_path(path).write_text(machine_path(path).read_text().replace('"threads": 1', '"threads": 9'))
+    found = [fault for fault in faults(recipe, plan(recipe, measured_alone(ledger.out)), ledger) if not fault.task]
+    assert kinds(found) == [("damaged", TRUTH)] and "`twillight bench truth`" in found[0].why
+
+
+def test_what_a_stopped_task_leaves_is_known_by_name():
+    assert all(map(is_leftover, (CHECKPOINT, f"0123-{ROWS}", ".tmp-card.json")))
+    assert not any(map(is_leftover, ("model.safetensors", "part-0.parquet", "notes.txt")))
+
+
+def test_own_files_are_those_that_a_run_leaves(trade):
+    recipe, tasks, ledger = trade
+    left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
+    assert left <= set(own_files(recipe, tasks, ledger.out))
