@@ -9,12 +9,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
-
-from rich.console import Console
 
 from jobs.run.child import ONE_THREAD, ends_deferred, interrupts_held
 from weaves.errors import BadInput, WorkFailed
@@ -50,10 +48,10 @@ HERE: Final = Scheduler()
 
 
 @contextmanager
-def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[Any]:
+def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
 
-    A scheduler without a worker is reported on the console.
+    `say` receives a sentence when a scheduler has no worker yet.
 
     Raises
     ------
@@ -68,7 +66,7 @@ def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[
     from distributed.comm.core import CommClosedError
 
     try:
-        with _external(scheduler, console) if scheduler.address else _local(workers) as client:
+        with _external(scheduler, say) if scheduler.address else _local(workers) as client:
             yield client
     except (CancelledError, CommClosedError) as error:
         raise WorkFailed(
@@ -77,7 +75,7 @@ def connected(scheduler: Scheduler, workers: int, console: Console) -> Iterator[
 
 
 @contextmanager
-def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
+def _external(scheduler: Scheduler, say: Callable[[str], None]) -> Iterator[Any]:
     """Connect to a running scheduler that has a worker."""
     from distributed import Client, Security
 
@@ -105,7 +103,7 @@ def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
         raise BadInput("--scheduler", "", given, "no dask scheduler answers at this address") from error
     with client:
         if not client.nthreads():  # type: ignore[no-untyped-call]
-            console.print(f"{given}: no worker yet; waiting up to {_SECONDS_FOR_A_WORKER} s for one", soft_wrap=True)
+            say(f"{given}: no worker yet; waiting up to {_SECONDS_FOR_A_WORKER} s for one")
             needed = client.submit(os.getpid, pure=False)  # so that a cluster that adapts starts one
             try:
                 client.wait_for_workers(1, timeout=_SECONDS_FOR_A_WORKER)
@@ -113,6 +111,15 @@ def _external(scheduler: Scheduler, console: Console) -> Iterator[Any]:
                 raise BadInput("--scheduler", "", given, "this scheduler has no worker: start one") from error
             needed.result()
         yield client
+
+
+def dashboard_of(client: Any) -> str | None:
+    """Return the address of the scheduler's dashboard; None if it has none."""
+    try:
+        services = client.scheduler_info(n_workers=0)["services"]
+        return str(client.dashboard_link) if services.get("dashboard") else None
+    except (KeyError, OSError):
+        return None
 
 
 async def _answer(address: str, security: Any) -> None:

@@ -1,38 +1,46 @@
 """Execution: ready tasks go to dask.distributed, most urgent first, and the driver alone writes the ledger.
 
 A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
-only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry). At most one task
-a core is handed out at a time: dask, which cannot know how long a task takes, would park short ones behind a training.
+only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry).
 The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again, and a
-task that fails is tried once more if an input turns out to be damaged.
-A task that measures time runs in a process of its own (`jobs.run.alone`) while the workers have nothing to do; with
-`--scheduler` it runs in a worker, because the driver's machine may not be the one to measure.
+task that fails is tried once more if an input turns out to be damaged. Else a task that ends with an unexpected
+exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
+On this machine one task a core is handed out at a time: dask, which cannot know how long a task takes, would park
+short ones behind a training. A task that measures time runs in a process of its own (`jobs.run.alone`) while the
+workers have nothing to do; with `--scheduler` it runs in a worker, because the driver's machine may not be the one to
+measure.
 """
 
 from __future__ import annotations
 
-import math
 import os
-import time
 import uuid
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rich.console import Console
 
-from jobs.plan.task import STAGES, Stage, Task, urgencies
+from jobs.plan.ready import Ready
+from jobs.plan.task import STAGES, Stage, Task
 from jobs.run.alone import run_alone
-from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
+from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected, dashboard_of
+from jobs.run.dispatch import Dispatch
 from jobs.run.inputs import Inputs
 from jobs.run.ledger import Ledger
-from jobs.run.outcome import KILLED, Outcome, one_line, work
-from jobs.run.progress import KERNELS, LOOK, TOPIC, Board, Compiling
-from jobs.run.receipt import measure
+from jobs.run.outcome import Outcome
+from jobs.run.progress import KERNELS, LOOK, TOPIC, Board
+from jobs.run.progress_forms import ProgressForm, form_of
+from jobs.run.receipt import Product, measure
+from jobs.run.workers import Workers
 from jobs.terminal import Terminal
 from weaves.errors import BadInput, WorkFailed
 
-_SECONDS_BETWEEN_SIGNS = 0.2
+_SECONDS_BETWEEN_LOOKS: Final = 1.0  # for workers that have come
+_TRIES: Final = 3  # of a task that ends with an unexpected exception
+
+Recorded = Callable[[Task, Mapping[str, Product]], None]
+"""Function that hears of a task that is done, and of its products by file name."""
 
 
 class Preparation(NamedTuple):
@@ -70,8 +78,10 @@ def execute(
     scheduler: Scheduler = HERE,
     workers: int = 0,
     prepare: Callable[[Sequence[Task]], Sequence[Preparation]] = lambda todo: (),
-    recorded: Callable[[Task], None] = lambda task: None,
+    recorded: Recorded = lambda task, files: None,
+    settle: Callable[[], None] = lambda: None,
     console: Console | None = None,
+    progress: ProgressForm = "auto",
 ) -> Summary:
     """Run the unfinished tasks of some stages.
 
@@ -90,104 +100,67 @@ def execute(
     prepare : callable
         Work of workers before the first task.
     recorded : callable
-        Called in this process after a receipt is written, or products are taken from another data set.
+        Called in this process with a task and its products by file name, after its receipt is written, or products
+        are taken from another data set.
+    settle : callable
+        Called before a task starts that needs others, and at the end, so that `recorded` may put work off.
     console : Console, optional
         Terminal that shows progress.
+    progress : str
+        How it is shown.
 
     Raises
     ------
     BadInput
         If the number of workers or the scheduler cannot be used.
     WorkFailed
-        If a needed task of another stage is not done, the workers cannot start, or the scheduler is lost.
+        If a needed task of another stage is not done, the workers cannot start or have other software, or the
+        scheduler is lost.
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")
     out = out.resolve()
     ledger = Ledger(out)
     before = _done(tasks, ledger, recorded)
+    settle()
     finished = {task.id for task in before}
-    todo = {task.id: task for task in tasks if task.id not in finished and task.stage in stages}
-    _refuse_gaps(list(todo.values()), tasks, finished)
+    todo = [task for task in tasks if task.id not in finished and task.stage in stages]
+    _refuse_gaps(todo, tasks, finished)
     summary = Summary(before, [], [], [])
     if not todo:
         return summary
 
-    console = console or Terminal(stderr=True)
-    inputs = Inputs(tasks, ledger)
-    with connected(scheduler, min(workers or os.cpu_count() or 1, len(todo)), console) as client:
-        if preparations := prepare(list(todo.values())):
-            _prepare(client, preparations, console)
-        with Board(list(todo.values()), console) as board:
-            client.subscribe_topic(TOPIC, board.hear)
-            book = _Book(todo, finished, summary, stages, board, console)
-            running: dict[Any, Task] = {}
-            while todo or running:
-                ended: list[tuple[Task, Outcome]] = []
-                damaged: list[Task] = []
-                for task in _admitted(book.ready(), list(running.values()), slots=sum(client.nthreads().values())):
-                    if found := inputs.damaged(task):
-                        book.again(found)
-                        damaged += found
-                        continue
-                    board.begin(todo.pop(task.id))
-                    if task.alone and not scheduler.address:
-                        ended.append((task, run_alone(task, out, board)))
-                    else:
-                        running[client.submit(_work, task, str(out), key=f"{task.stage}-{task.id}-{book.run}")] = task
-                if not ended and damaged:
-                    continue
-                if not running and not ended:
-                    break  # what is left waits for tasks that failed
-                if not ended:
-                    while not (futures := _ended(running)):
-                        board.waiting_for(running.values(), workers=len(client.nthreads()))
-                    ended = [(running.pop(future), _outcome(future)) for future in futures]
-                for task, outcome in ended:
-                    outcome = _verified(task, outcome, out)
-                    if outcome.reason and book.once_more(task) and (found := inputs.damaged(task, anew=True)):
-                        book.again([*found, task])
-                        continue
-                    if outcome.reason:
-                        ledger.fail(task, outcome.reason, outcome.traceback)
-                        summary.failed.append(task)
-                    else:
-                        ledger.finish(task, outcome.files, outcome.seconds)
-                        finished.add(task.id)
-                        inputs.made(task)
-                        recorded(task)
-                        summary.ran.append(task)
-                    board.end(task)
-    book.refuse_lost()
-    summary.waiting.extend(todo.values())
+    board = Board(todo, form_of(progress, console or Terminal(stderr=True)))
+    external = bool(scheduler.address)
+    slots = min(workers or os.cpu_count() or 1, len(todo))
+    with connected(scheduler, slots, board.say) as client, board:
+        crew = Workers(client, external, board.say)
+        crew.look(now=True)
+        if preparations := prepare(todo):
+            _prepare(client, crew, preparations, board)
+        client.subscribe_topic(TOPIC, board.hear)
+        dispatch = Dispatch(client, crew, out, uuid.uuid4().hex)
+        board.start(len(crew.accepted), dashboard_of(client))
+        book = _Book(Ready(todo, finished), summary, stages, board)
+        loop = _Loop(book, crew, dispatch, board, ledger, Inputs(tasks, ledger), external, recorded, settle)
+        try:
+            loop.run()
+        finally:
+            settle()
+    book.close()
     return summary
 
 
 class _Book:
-    """Tasks of a run that are left to do and that are done, shared with its loop; tasks that are done once more."""
+    """Tasks of a run that are left to do and that are done; tasks that are done once more."""
 
-    def __init__(
-        self,
-        todo: dict[str, Task],
-        finished: set[str],
-        summary: Summary,
-        stages: Sequence[Stage],
-        board: Board,
-        console: Console,
-    ) -> None:
-        self._todo, self._finished, self._summary = todo, finished, summary
-        self._stages, self._board, self._console = stages, board, console
-        self._urgency = urgencies(list(todo.values()))
+    def __init__(self, ready: Ready, summary: Summary, stages: Sequence[Stage], board: Board) -> None:
+        self.ready, self.summary = ready, summary
+        self._stages, self._board = stages, board
         self._failed_once: set[str] = set()
         self._lost: list[Task] = []  # damaged products of stages that do not run
-        self.run = uuid.uuid4().hex
-        """Part of dask's keys: a task of another run, or one that is done once more, must not get an old result."""
-
-    def ready(self) -> list[Task]:
-        """Return the tasks whose needs are done, most urgent first."""
-        ready = [task for task in self._todo.values() if self._finished.issuperset(task.needs)]
-        ready.sort(key=lambda task: (task.alone, -self._urgency[task.id]))
-        return ready
+        self.failed_on: dict[str, list[str]] = {}
+        """Workers on which a task has failed that is tried again, by its id."""
 
     def once_more(self, task: Task) -> bool:
         """Note that a task has failed; return whether it is the first time."""
@@ -195,60 +168,142 @@ class _Book:
         self._failed_once.add(task.id)
         return first
 
-    def again(self, tasks: Sequence[Task]) -> None:
-        """Do tasks again whose products were damaged, or that failed on such products."""
-        self.run = uuid.uuid4().hex
+    def reopen(self, tasks: Sequence[Task]) -> None:
+        """Do tasks again whose products were damaged and are removed."""
+        ids = {task.id for task in tasks}
+        for done in (self.summary.before, self.summary.ran):
+            done[:] = [one for one in done if one.id not in ids]
         for task in tasks:
-            self._finished.discard(task.id)
-            self._urgency[task.id] = math.inf
-            for done in (self._summary.before, self._summary.ran):
-                done[:] = [one for one in done if one.id != task.id]
             if task.stage not in self._stages:
                 self._lost.append(task)
+                self.ready.lose(task)
                 continue
-            self._todo[task.id] = task
-            if task.id not in self._failed_once:
-                self._console.print(f"{task.stage} {task.title}: damaged, made again", style="yellow")
-                self._board.add(task)
+            self.ready.reopen(task)
+            self._board.say(f"{task.stage} {task.title}: damaged, made again")
+            self._board.add(task)
 
-    def refuse_lost(self) -> None:
-        """End the run if damaged products are of a stage that does not run."""
+    def try_again(self, task: Task, outcome: Outcome) -> bool:
+        """Put a task back if it failed by an exception that may not occur again, or its worker was refused."""
+        if not outcome.traceback and not outcome.refused:
+            return False
+        tried = self.failed_on.setdefault(task.id, [])
+        tried.append(outcome.worker)
+        if len(tried) == _TRIES:
+            return False
+        self.ready.again(task)
+        self._board.again(task, outcome.reason)
+        return True
+
+    def close(self) -> None:
+        """List what waits for tasks that failed; WorkFailed if products of a stage that does not run were damaged."""
         if self._lost:
             first = self._lost[0]
             allowed = f"run `twillight {first.stage}` first"
             raise WorkFailed(f"{first.title}: its products were damaged and are removed; {allowed}")
+        self.summary.waiting.extend(self.ready.waiting)
 
 
-def _done(tasks: Sequence[Task], ledger: Ledger, recorded: Callable[[Task], None]) -> list[Task]:
+class _Loop(NamedTuple):
+    """The driver's loop: start what is ready, take what has ended."""
+
+    book: _Book
+    crew: Workers
+    dispatch: Dispatch
+    board: Board
+    ledger: Ledger
+    inputs: Inputs
+    external: bool
+    recorded: Recorded
+    settle: Callable[[], None]
+
+    def run(self) -> None:
+        """Work until no task is left that can start."""
+        while True:
+            self.crew.look()
+            self.board.tally.workers = len(self.crew.accepted)
+            started, ended = self._start()
+            if not self.book.ready.running:
+                if started:
+                    continue  # damaged inputs are made first
+                break  # what is left waits for tasks that failed
+            for task, outcome in ended or self.dispatch.ended(_SECONDS_BETWEEN_LOOKS):
+                self._take(task, _verified(task, outcome, self.ledger.out))
+            self.board.waiting_for(self.dispatch.running, workers=len(self.crew.accepted))
+
+    def _start(self) -> tuple[list[Task], list[tuple[Task, Outcome]]]:
+        """Start as many tasks as there are slots; return them, and the outcome of one that was done alone, here."""
+        ready = self.book.ready
+        started = ready.take(self.crew.slots)
+        for task in started:
+            if found := self.inputs.damaged(task):
+                self.book.reopen(found)
+                ready.again(task)
+                continue
+            if task.needs:
+                self.settle()
+            self.board.begin(task)
+            if task.alone and not self.external:
+                return started, [(task, run_alone(task, self.ledger.out, self.board))]
+            self.dispatch.start(task, avoided=self.book.failed_on.get(task.id, ()))
+        return started, []
+
+    def _take(self, task: Task, outcome: Outcome) -> None:
+        """Write the receipt of a task that is done, try it again, or note why it failed."""
+        book, reason = self.book, outcome.reason
+        if outcome.refused:
+            self.crew.recheck(outcome.worker)
+        elif reason and book.once_more(task) and (found := self.inputs.damaged(task, anew=True)):
+            book.reopen(found)
+            book.ready.again(task)
+            self.board.again(task, reason)
+            return
+        if book.try_again(task, outcome):
+            return
+        if reason:
+            times = len(book.failed_on.get(task.id, ()))
+            reason = f"{reason}; tried {times} times" if times > 1 else reason
+            self.ledger.fail(task, reason, outcome.traceback)
+            book.ready.fail(task)
+            book.summary.failed.append(task)
+        else:
+            self.ledger.finish(task, outcome.files, outcome.seconds)
+            self.inputs.made(task)
+            book.ready.finish(task)
+            self.recorded(task, outcome.files)
+            book.summary.ran.append(task)
+        self.board.end(task, reason)
+
+
+def _done(tasks: Sequence[Task], ledger: Ledger, recorded: Recorded) -> list[Task]:
     """Return the tasks that are done, some by the products of another data set."""
     before = []
     for task in tasks:
         done = ledger.state(task) == "done"
         if not done and ledger.adopt(task):
-            recorded(task)  # to whom it was not there a moment ago
+            recorded(task, ledger.products(task))  # to whom it was not there a moment ago
             done = True
         if done:
             before.append(task)
     return before
 
 
-def _prepare(client: Any, preparations: Sequence[Preparation], console: Console) -> None:
+def _prepare(client: Any, crew: Workers, preparations: Sequence[Preparation], board: Board) -> None:
     """Compile kernels in all workers at once and show how far it is.
 
     A failure here occurs again in the task that needs the kernel, and is reported there.
     """
-    with Compiling(len(preparations), console) as shown:
-        client.subscribe_topic(KERNELS, shown.hear)
-        slots = sum(client.nthreads().values())
-        waiting, running = list(preparations), dict[Any, str]()
-        while waiting or running:
-            while waiting and len(running) < max(1, slots):
-                one = waiting.pop(0)
-                running[client.submit(_prepare_one, one, pure=False)] = one.name
-                shown.begin(one.name)
-            for future in _ended(running):
-                shown.end(running.pop(future))
-        client.unsubscribe_topic(KERNELS)
+    shown = board.compiling(len(preparations))
+    client.subscribe_topic(KERNELS, shown.hear)
+    waiting, running = list(preparations), dict[Any, str]()
+    while waiting or running:
+        crew.look()
+        while waiting and len(running) < crew.threads:
+            one = waiting.pop(0)
+            running[client.submit(_prepare_one, one, pure=False, **crew.restriction(()))] = one.name
+            shown.begin(one.name)
+        for future in _ended(running):
+            shown.end(running.pop(future))
+    client.unsubscribe_topic(KERNELS)
 
 
 def _prepare_one(one: Preparation) -> None:
@@ -270,29 +325,6 @@ def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]
         raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; run `twillight {stage}` first")
 
 
-def _admitted(ready: Sequence[Task], running: Sequence[Task], slots: int) -> list[Task]:
-    """Return the tasks to hand out now: one a free slot, and a task that must be alone only when nothing runs."""
-    if any(task.alone for task in running):
-        return []
-    admitted = [task for task in ready if not task.alone][: max(0, max(1, slots) - len(running))]
-    return admitted if admitted or running else list(ready[:1])
-
-
-def _work(task: Task, out: str) -> Outcome:
-    """Do one task in a worker."""
-    from distributed import get_worker
-
-    worker, last = get_worker(), 0.0
-
-    def progress(fraction: float) -> None:
-        nonlocal last
-        if (now := time.monotonic()) - last >= _SECONDS_BETWEEN_SIGNS:
-            worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
-            last = now
-
-    return work(task, Path(out), progress)
-
-
 def _verified(task: Task, outcome: Outcome, out: Path) -> Outcome:
     """Return the outcome, a failure if this process does not find the products that the worker measured."""
     if outcome.reason:
@@ -306,19 +338,6 @@ def _verified(task: Task, outcome: Outcome, out: Path) -> Outcome:
         if found != outcome.files[Path(path).name]:
             return outcome._replace(reason=f"{path} is not the file that its worker wrote: every worker must see {out}")
     return outcome
-
-
-def _outcome(future: Any) -> Outcome:
-    """Return the outcome of a task, also if its worker could not report it."""
-    from distributed import KilledWorker
-
-    error = future.exception()
-    if error is None:
-        outcome: Outcome = future.result()
-        return outcome
-    if isinstance(error, KilledWorker):
-        return Outcome({}, 0.0, KILLED)
-    return Outcome({}, 0.0, one_line(error))
 
 
 def _ended(running: Iterable[Any]) -> list[Any]:

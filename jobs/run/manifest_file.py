@@ -1,22 +1,27 @@
-"""Keep the manifest of a data set in step with the ledger."""
+"""Keep the manifest of a data set in step with the ledger: at once when a task reads it, else every few seconds."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from jobs.plan.dataset import Shard, fingerprint_of, folder_of
 from jobs.plan.task import Task
 from jobs.recipe.recipe import Recipe
 from jobs.run.ledger import Ledger
+from jobs.run.receipt import Product
+
+_SECONDS_BETWEEN: Final = 2.0  # two times that it is written, at least
+_SHARE: Final = 0.02  # of the driver's time that goes into writing it, at most
 
 if TYPE_CHECKING:
     from pipeline.shards.manifest import Manifest, ShardEntry
 
 
 class ManifestFile:
-    """The manifest of a data set: its content by plan and ledger, and the file, which is kept in step."""
+    """The manifest of a data set: its content by plan and ledger, and the file."""
 
     def __init__(self, recipe: Recipe, parts: Sequence[Shard], ledger: Ledger) -> None:
         self._recipe, self._ledger = recipe, ledger
@@ -24,24 +29,33 @@ class ManifestFile:
         """Folder of the data set."""
         self._parts = {part.id: part for part in parts}
         self._entries: dict[str, Any] = {}
+        self._changed = False
+        self._next = 0.0  # when it may be written again
         for part in parts:
-            self._enter(part)
+            if ledger.state(part) == "done":
+                self._enter(part, ledger.products(part))
 
-    def add(self, task: Task) -> None:
-        """List a shard that was just finished; other tasks do not matter to it."""
+    def add(self, task: Task, files: Mapping[str, Product]) -> None:
+        """List a shard that was just finished; other tasks do not matter to it.
+
+        The file grows with the data set, so it is not written for each shard: see `save`.
+        """
         if task.id in self._parts:
-            self._enter(self._parts[task.id])
-            self.save()
+            self._enter(self._parts[task.id], files)
+            if time.monotonic() >= self._next:
+                self.save()
 
     def save(self) -> None:
-        """Write the file if any shard is done."""
-        if self._entries:
+        """Write the file if any shard was listed since it was written."""
+        if self._changed:
+            start = time.monotonic()
             self.content().save(self.folder)
+            self._changed = False
+            self._next = time.monotonic() + max(_SECONDS_BETWEEN, (time.monotonic() - start) / _SHARE)
 
-    def _enter(self, part: Shard) -> None:
-        if self._ledger.state(part) == "done":
-            name = Path(part.products[0]).name
-            self._entries[part.id] = entry_of(part, self._ledger.products(part)[name].sha256)
+    def _enter(self, part: Shard, files: Mapping[str, Product]) -> None:
+        self._entries[part.id] = entry_of(part, files[Path(part.products[0]).name].sha256)
+        self._changed = True
 
     def content(self) -> Manifest:
         """Return the manifest of the shards that are done."""

@@ -16,12 +16,30 @@ KILLED = "the process that ran it was killed several times over; is there enough
 
 
 class Outcome(NamedTuple):
-    """Result of a task: its products, or the reason of its failure."""
+    """Result of a task: its products, or the reason of its failure.
+
+    Attributes
+    ----------
+    files : dict
+        Products by file name.
+    seconds : float
+        Time that the task took.
+    reason : str
+        One line; empty if the task is done.
+    traceback : str
+        That of an unexpected exception, which may not occur elsewhere; empty for bad input and for work that failed.
+    worker : str
+        Address of the worker; empty if it is not known.
+    refused : bool
+        True if the worker's software is not the driver's, so that nothing was computed.
+    """
 
     files: dict[str, Product]
     seconds: float
     reason: str = ""
     traceback: str = ""
+    worker: str = ""
+    refused: bool = False
 
 
 def work(task: Task, out: Path, progress: Progress) -> Outcome:

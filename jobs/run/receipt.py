@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
@@ -53,7 +52,7 @@ class Receipt(BaseModel):
 
     def encoded(self) -> bytes:
         """Return the bytes of its file."""
-        return _encoded(self.model_dump(exclude_unset=True))
+        return self._encoded()
 
     def with_checksum(self) -> Receipt:
         """Return it with the hash of the rest."""
@@ -64,8 +63,10 @@ class Receipt(BaseModel):
         return "checksum" not in self.model_fields_set or self.checksum == self._hash()
 
     def _hash(self) -> str:
-        content = self.model_dump(exclude_unset=True, exclude={"checksum"})
-        return hashlib.sha256(_encoded(content)).hexdigest()[:_CHECKSUM_DIGITS]
+        return hashlib.sha256(self._encoded("checksum")).hexdigest()[:_CHECKSUM_DIGITS]
+
+    def _encoded(self, *left_out: str) -> bytes:
+        return self.model_dump_json(indent=1, exclude_unset=True, exclude={*left_out}).encode() + b"\n"
 
 
 def leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
@@ -94,10 +95,6 @@ def read_receipt(path: Path, task: str) -> Receipt | None:
     if receipt is None or receipt.task != task or content != receipt.encoded() or not receipt.is_whole():
         return None
     return receipt
-
-
-def _encoded(content: Mapping[str, Any]) -> bytes:
-    return json.dumps(content, indent=1).encode() + b"\n"
 
 
 def measure(path: Path) -> Product:

@@ -19,12 +19,21 @@ from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
+from jobs.run.progress_forms import ProgressForm
+from jobs.run.receipt import Product
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
 from weaves.errors import WorkFailed
 
 
-def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Scheduler, workers: int) -> None:
+def work(
+    recipe_name: str,
+    stages: Sequence[Stage],
+    out: Path,
+    scheduler: Scheduler,
+    workers: int,
+    progress: ProgressForm = "auto",
+) -> None:
     """Run the unfinished tasks of some stages of a recipe and print a summary.
 
     Raises
@@ -43,9 +52,13 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Schedu
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
 
-        def recorded(task: Task) -> None:
+        def recorded(task: Task, files: Mapping[str, Product]) -> None:
             for manifest in manifests:
-                manifest.add(task)
+                manifest.add(task, files)
+
+        def settle() -> None:
+            for manifest in manifests:
+                manifest.save()
 
         summary = execute(
             tasks,
@@ -55,6 +68,8 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, scheduler: Schedu
             workers=workers,
             prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
             recorded=recorded,
+            settle=settle,
+            progress=progress,
         )
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:

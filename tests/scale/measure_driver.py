@@ -111,7 +111,15 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
             manifest = ManifestFile(recipe, own, ledger)
             manifest.save()
             quiet = Console(file=io.StringIO())
-            summary = execute(tasks, ledger.out, scheduler=connection, workers=2, recorded=manifest.add, console=quiet)
+            summary = execute(
+                tasks,
+                ledger.out,
+                scheduler=connection,
+                workers=2,
+                recorded=manifest.add,
+                settle=manifest.save,
+                console=quiet,
+            )
             assert len(summary.ran) + len(summary.before) == count, summary
 
         if here:

@@ -58,7 +58,7 @@ def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp
     address, process = scheduler
     tasks = [fake.task("first"), *(fake.task(f"long {index}", seconds=30) for index in range(2))]
 
-    def kill(task):
+    def kill(task, files):
         process.kill()
 
     with pytest.raises(WorkFailed, match="the dask scheduler is gone"):
@@ -136,7 +136,7 @@ for address in sys.argv[1:]:
 
 def test_a_stranger_gets_no_answer_from_the_cluster_on_this_machine():
     """Neither without a certificate nor with one of its own, over TLS or not."""
-    with connected(HERE, 1, quiet()) as client:
+    with connected(HERE, 1, str) as client:
         addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
         addresses += [worker["nanny"] for worker in client.scheduler_info()["workers"].values()]
         assert len(addresses) == 3 and all(address.startswith("tls://127.0.0.1:") for address in addresses)

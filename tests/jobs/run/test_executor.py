@@ -46,13 +46,15 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     slow = [fake.task(f"slow {index}", seconds=0.5) for index in range(2)]
     tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
     recorded = []
-    summary = execute(tasks, tmp_path, workers=2, recorded=lambda task: recorded.append(task.title), console=quiet())
+    summary = execute(
+        tasks, tmp_path, workers=2, recorded=lambda task, files: recorded.append(task.title), console=quiet()
+    )
 
     assert {task.title for task in summary.ran} == {"good", "fine", "timed", "slow 0", "slow 1"} == set(recorded)
     assert {task.title for task in summary.failed} == {"bad", "forgetful"}
     assert [task.title for task in summary.waiting] == ["stuck"]
     ledger = Ledger(tmp_path)
-    assert ledger.reason(bad) == "ZeroDivisionError: by zero"
+    assert ledger.reason(bad) == "ZeroDivisionError: by zero; tried 3 times"
     assert "forgetful.txt" in ledger.reason(forgetful)
     assert ledger.state(stuck) == "missing"
 
@@ -104,9 +106,11 @@ def test_tasks_that_run_alone_have_a_process_each(tmp_path, fake):
     failing = fake.task("fails", fake.FakeTiming, fails="ValueError('late')")
     summary = execute([*tasks, failing], tmp_path, workers=2, console=quiet())
     assert {task.title for task in summary.ran} == {task.title for task in tasks}
-    assert Ledger(tmp_path).reason(failing) == "ValueError: late"
+    assert Ledger(tmp_path).reason(failing) == "ValueError: late; tried 3 times"
     starts = [event for event in fake.events(tmp_path) if event["event"] == "start"]
-    assert len(starts) == len({event["pid"] for event in starts}) == 7  # one of them died and was replaced
+    assert (
+        len(starts) == len({event["pid"] for event in starts}) == 9
+    )  # one died and was replaced, one was tried three times
     assert {event["threads"] for event in starts} == {"1"}
 
 
@@ -185,8 +189,8 @@ def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
     ledger = Ledger(tmp_path)
     ledger.finish(first, {"x.txt": measure(tmp_path / first.products[0])}, 1.0)
     recorded = []
-    summary = execute([twin], tmp_path, recorded=recorded.append, console=quiet())
+    summary = execute([twin], tmp_path, recorded=lambda task, files: recorded.append(task), console=quiet())
     assert recorded == [twin] == summary.before and not summary.ran
     recorded.clear()
-    execute([twin], tmp_path, recorded=recorded.append, console=quiet())
+    execute([twin], tmp_path, recorded=lambda task, files: recorded.append(task), console=quiet())
     assert not recorded

@@ -5,6 +5,7 @@ from rich.console import Console
 
 from jobs.run import progress
 from jobs.run.progress import Board
+from jobs.run.progress_forms import form_of
 
 
 @pytest.fixture
@@ -20,7 +21,8 @@ def test_silence_is_told_after_a_minute_and_less_and_less_often(fake, monkeypatc
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     out = io.StringIO()
     task = fake.task("tweed")
-    with Board([task], Console(file=out, width=200)) as board:
+    with Board([task], form_of("plain", Console(file=out, width=200))) as board:
+        board.start(2, None)
         said = []
         for now in range(0, 600, 5):
             before = len(out.getvalue())

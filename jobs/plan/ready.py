@@ -1,0 +1,113 @@
+"""Ready tasks: those whose needs are done, most urgent first, in constant time a task and need.
+
+The driver of a run and the simulated schedule of a plan hand tasks out by the same rule.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable, Sequence
+
+from jobs.plan.task import Task, urgencies
+
+
+class Ready:
+    """The tasks of a run that are not done: a heap of those that can start, and the number of unmet needs of each.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        The tasks to do, each after those it needs.
+    finished : iterable of str
+        Ids of tasks that are done; a need that is neither here nor among `tasks` is never met.
+    """
+
+    def __init__(self, tasks: Sequence[Task], finished: Iterable[str]) -> None:
+        self._done = set(finished)
+        self._order = {id: -seconds for id, seconds in urgencies(tasks).items()}
+        self._waiting: dict[str, Task] = {}
+        self._unmet: dict[str, int] = {}  # of the waiting tasks
+        self._after: dict[str, list[str]] = {}
+        # Entries of tasks that have started, or wait again for a need, are skipped when they come up.
+        self._beside: list[tuple[float, int, Task]] = []
+        self._alone: list[tuple[float, int, Task]] = []
+        self._pushed = 0
+        self._running: dict[str, Task] = {}
+        for task in tasks:
+            for need in set(task.needs):
+                self._after.setdefault(need, []).append(task.id)
+            self._wait(task)
+
+    def take(self, slots: int) -> list[Task]:
+        """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs."""
+        taken: list[Task] = []
+        if slots < 1 or any(task.alone for task in self._running.values()):
+            return taken
+        while len(self._running) < slots and (task := self._pop(self._beside)):
+            taken.append(task)
+        if not self._running and (task := self._pop(self._alone)):
+            taken.append(task)
+        return taken
+
+    def finish(self, task: Task) -> None:
+        """Note that a started task is done; what waited for it alone is now ready."""
+        del self._running[task.id]
+        self._done.add(task.id)
+        for id in self._after.get(task.id, ()):
+            if id in self._waiting:
+                self._unmet[id] -= 1
+                if not self._unmet[id]:
+                    self._push(self._waiting[id])
+
+    def fail(self, task: Task) -> None:
+        """Note that a started task failed; what needs it stays waiting."""
+        del self._running[task.id]
+
+    def again(self, task: Task) -> None:
+        """Put a started task back, to be started once more when its needs are done."""
+        del self._running[task.id]
+        self._wait(task)
+
+    def reopen(self, task: Task) -> None:
+        """Take a task that was done as not done; it comes first."""
+        self._done.discard(task.id)
+        for id in self._after.get(task.id, ()):
+            if id in self._waiting:
+                self._unmet[id] += 1
+        self._order[task.id] = -math.inf
+        self._wait(task)
+
+    def lose(self, task: Task) -> None:
+        """Take a task that was done as not done, and never do it; what needs it stays waiting."""
+        self.reopen(task)
+        del self._waiting[task.id]
+
+    @property
+    def running(self) -> list[Task]:
+        """Tasks that were started and have not ended."""
+        return list(self._running.values())
+
+    @property
+    def waiting(self) -> list[Task]:
+        """Tasks that are to be started."""
+        return list(self._waiting.values())
+
+    def _wait(self, task: Task) -> None:
+        self._waiting[task.id] = task
+        self._unmet[task.id] = sum(need not in self._done for need in set(task.needs))
+        if not self._unmet[task.id]:
+            self._push(task)
+
+    def _push(self, task: Task) -> None:
+        self._pushed += 1  # equally urgent tasks start in the order in which they became ready
+        heapq.heappush(self._alone if task.alone else self._beside, (self._order[task.id], self._pushed, task))
+
+    def _pop(self, heap: list[tuple[float, int, Task]]) -> Task | None:
+        """Start the most urgent task of a heap."""
+        while heap:
+            task = heapq.heappop(heap)[2]
+            if task.id in self._waiting and not self._unmet[task.id]:
+                self._running[task.id] = self._waiting.pop(task.id)
+                return task
+        return None
