@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -49,7 +49,7 @@ _CONTINUES = "finished work is kept, and the same command continues"
 
 @dataclass(frozen=True)
 class WorkerFlags:
-    """Processes that do the tasks."""
+    """Processes that do the tasks, and how their progress is shown."""
 
     workers: Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
     scheduler: Annotated[
@@ -58,6 +58,10 @@ class WorkerFlags:
     tls_ca: Annotated[str, Parameter(help="Certificate of the scheduler's authority, a PEM file.")] = ""
     tls_certificate: Annotated[str, Parameter(help="Own certificate for the scheduler, a PEM file.")] = ""
     tls_key: Annotated[str, Parameter(help="Its key, a PEM file.")] = ""
+    progress: Annotated[
+        Literal["auto", "rich", "plain", "json"],
+        Parameter(help="Progress as bars, as lines of a log, or as JSON lines; auto: bars on a terminal, else lines."),
+    ] = "auto"
 
     def connection(self) -> Scheduler:
         """Return the scheduler to connect to."""
@@ -132,7 +136,7 @@ def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> N
     """Compute the ground truth: the shards of a recipe's data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["generate"], out, on.connection(), on.workers)
+    work(recipe, ["generate"], out, on.connection(), on.workers, on.progress)
 
 
 @app.command(sort_key=5)
@@ -198,7 +202,7 @@ def train(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None
     """Train the models of a recipe on its data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["train"], out, on.connection(), on.workers)
+    work(recipe, ["train"], out, on.connection(), on.workers, on.progress)
 
 
 @app.command(sort_key=8)
@@ -218,11 +222,11 @@ def bench(
     from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
-        bench_alone(recipe, out, on.connection(), on.workers)
+        bench_alone(recipe, out, on.connection(), on.workers, on.progress)
         return
     from jobs.verbs.run import work
 
-    work(recipe, ["bench"], out, on.connection(), on.workers)
+    work(recipe, ["bench"], out, on.connection(), on.workers, on.progress)
 
 
 @app.command(sort_key=9)
@@ -230,7 +234,7 @@ def report(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> Non
     """Write the page: pictures, tables and plots of all measurements."""
     from jobs.verbs.run import work
 
-    work(recipe, ["report"], out, on.connection(), on.workers)
+    work(recipe, ["report"], out, on.connection(), on.workers, on.progress)
 
 
 @app.command(sort_key=10)
@@ -239,7 +243,7 @@ def run(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
     from jobs.plan.task import STAGES
     from jobs.verbs.run import work
 
-    work(recipe, STAGES, out, on.connection(), on.workers)
+    work(recipe, STAGES, out, on.connection(), on.workers, on.progress)
 
 
 @app.command(sort_key=11)

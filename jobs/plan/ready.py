@@ -27,7 +27,7 @@ class Ready:
         self._done = set(finished)
         self._order = {id: -seconds for id, seconds in urgencies(tasks).items()}
         self._waiting: dict[str, Task] = {}
-        self._unmet: dict[str, int] = {}  # of the waiting tasks
+        self._unmet: dict[str, int] = {}  # of every task that has ever waited; right for those that wait
         self._after: dict[str, list[str]] = {}
         # Entries of tasks that have started, or wait again for a need, are skipped when they come up.
         self._beside: list[tuple[float, int, Task]] = []
@@ -35,8 +35,6 @@ class Ready:
         self._pushed = 0
         self._running: dict[str, Task] = {}
         for task in tasks:
-            for need in set(task.needs):
-                self._after.setdefault(need, []).append(task.id)
             self._wait(task)
 
     def take(self, slots: int) -> list[Task]:
@@ -94,8 +92,12 @@ class Ready:
         return list(self._waiting.values())
 
     def _wait(self, task: Task) -> None:
+        needs = set(task.needs)
+        if task.id not in self._unmet:
+            for need in needs:
+                self._after.setdefault(need, []).append(task.id)
         self._waiting[task.id] = task
-        self._unmet[task.id] = sum(need not in self._done for need in set(task.needs))
+        self._unmet[task.id] = sum(need not in self._done for need in needs)
         if not self._unmet[task.id]:
             self._push(task)
 

@@ -75,6 +75,8 @@ class Tally:
     @property
     def seconds_left(self) -> float | None:
         """Time that the rest takes if the work goes on as fast as so far; None before any was done."""
+        if self.ended == self.planned:
+            return 0.0
         done = sum(self.work.values())
         return self.seconds * max(0.0, sum(self.all_work.values()) - done) / done if done > 0 else None
 

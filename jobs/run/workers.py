@@ -79,8 +79,9 @@ class Workers:
 
     def recheck(self, address: str) -> None:
         """Check a worker again that did not accept a task."""
-        self._checked.pop(address, None)
-        self.look(now=True)
+        if not self._checked.get(address):
+            self._checked.pop(address, None)
+            self.look(now=True)
 
     def _check(self, new: list[str]) -> None:
         found = self._client.run(software, workers=new, on_error="return")

@@ -38,17 +38,18 @@ def measured_alone(out: Path) -> dict[str, str]:
     return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
 
 
-def bench_alone(name: str, out: Path, scheduler: Scheduler = HERE, workers: int = 0) -> None:
+def bench_alone(name: str, out: Path, scheduler: Scheduler = HERE, workers: int = 0, progress: str = "auto") -> None:
     """Run one of `BENCHES`.
 
     Raises
     ------
     BadInput
-        If a scheduler or workers are given.
+        If a scheduler, workers or a form of progress are given.
     WorkFailed
         If an expression exceeds its limit.
     """
-    for option, value in (("--scheduler", scheduler.address), ("--workers", workers)):
+    own = "" if progress == "auto" else progress
+    for option, value in (("--scheduler", scheduler.address), ("--workers", workers), ("--progress", own)):
         if value:
             raise BadInput(f"bench {name}", option, value, "leave it out: the measurement runs in this process")
     BENCHES[name](out)

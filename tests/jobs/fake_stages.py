@@ -24,6 +24,7 @@ class Fake(Task):
     fails: str = ""
     forgets: bool = False
     hides: bool = False
+    breaks: bool = False
     damages: str = ""
     always: bool = False
 
@@ -62,6 +63,8 @@ class Fake(Task):
             raise ValueError("a file that cannot be read")
         if self.fails:
             raise eval(self.fails)
+        if self.breaks and os.environ.get("ELSEWHERE"):
+            raise OSError("this worker has a broken disk")
         if not self.forgets:
             path = out / self.products[0]
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from distributed import Client, LocalCluster
 from rich.console import Console
 
 from jobs.run.cluster import HERE, Scheduler, connected
@@ -33,25 +34,55 @@ def quiet():
     return Console(file=io.StringIO())
 
 
+class Processes:
+    """A scheduler and its workers, each in a process of its own."""
+
+    def __init__(self, folder):
+        self.folder, self.file = folder, folder / "scheduler.json"
+        self.common = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
+        command = [*dask, "--scheduler-file", str(self.file), "--no-dashboard"]
+        self.processes = [subprocess.Popen(command, env=ENVIRONMENT, **self.common)]
+        deadline = time.monotonic() + 60
+        while not self.file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        self.given = Scheduler(str(self.file))
+
+    def add(self, preload="", **environment):
+        """Start a worker that lives in another folder; `preload` is code that it runs first."""
+        elsewhere = self.folder / f"worker-{len(self.processes)}"
+        elsewhere.mkdir()
+        worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(self.file)]
+        command = [*worker, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+        if preload:
+            (elsewhere / "preload.py").write_text(preload)
+            command += ["--preload", str(elsewhere / "preload.py")]
+        self.processes.append(subprocess.Popen(command, cwd=elsewhere, env=ENVIRONMENT | environment, **self.common))
+
+    def wait_for(self, count):
+        """Wait until so many workers are there."""
+        with Client(scheduler_file=str(self.file)) as client:
+            client.wait_for_workers(count, timeout=60)
+
+    def close(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
 @pytest.fixture
-def scheduler(tmp_path):
-    """A scheduler in a process of its own with one worker, which lives in another folder."""
-    file, elsewhere = tmp_path / "scheduler.json", tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    common = {"env": ENVIRONMENT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
-    processes = [subprocess.Popen([*dask, "--scheduler-file", str(file), "--no-dashboard"], **common)]
-    deadline = time.monotonic() + 60
-    while not file.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
-    common["env"] = ENVIRONMENT | {"ELSEWHERE": "1"}
-    processes.append(subprocess.Popen([*worker, "--no-dashboard", "--no-nanny"], cwd=elsewhere, **common))
-    yield Scheduler(str(file)), processes[0]
-    for process in processes:
-        process.kill()
-        process.wait()
+def processes(tmp_path):
+    found = Processes(tmp_path)
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def scheduler(processes):
+    """A scheduler with one worker, which may see other files."""
+    processes.add(ELSEWHERE="1")
+    return processes.given, processes.processes[0]
 
 
 def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp_path, fake, scheduler, capfd):
@@ -93,6 +124,86 @@ def test_a_product_that_was_written_elsewhere_is_no_product(tmp_path, fake, sche
     summary = execute([task], tmp_path / "out", scheduler=scheduler[0], console=quiet())
     assert summary.failed == [task]
     assert "every worker must see --out" in Ledger(tmp_path / "out").reason(task)
+
+
+OTHER_NUMBA = """
+import jobs.run.software as module
+found = module.software() | {"numba": "0.1"}
+module.software = lambda: found
+"""
+
+NO_PACKAGE = """
+import sys
+sys.modules["jobs"] = None
+"""
+
+
+@pytest.mark.parametrize(
+    ("preload", "difference"),
+    [(OTHER_NUMBA, r"it has numba 0\.1 \(here \d+\.\d+\.\d+\)"), (NO_PACKAGE, r"it has no twillight of this version")],
+)
+def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, fake, processes, preload, difference):
+    processes.add(preload)
+    with pytest.raises(
+        WorkFailed, match=rf"^every worker is refused; worker tcp://127\.0\.0\.1:\d+ gets no task: {difference}"
+    ):
+        execute([fake.task("one")], tmp_path, scheduler=processes.given, console=quiet())
+    assert not (tmp_path / "log.jsonl").exists()
+
+
+def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, fake, processes):
+    processes.add()
+    tasks = [fake.task(f"shard {index}", seconds=0.3) for index in range(8)]
+    before = []
+
+    def join(task, files):
+        if not before:
+            processes.add(OTHER_NUMBA)
+            processes.wait_for(2)
+        before.append(task)
+
+    console = quiet()
+    summary = execute(tasks, tmp_path, scheduler=processes.given, console=console, recorded=join)
+    assert len(summary.ran) == 8
+    assert len({event["pid"] for event in fake.events(tmp_path)}) == 1
+    told = console.file.getvalue()
+    assert told.count("gets no task: it has numba 0.1") == 1
+
+
+def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, fake, processes):
+    """Also when the broken worker is there first and takes everything."""
+    processes.add(ELSEWHERE="1")
+    tasks = [fake.task(f"shard {index}", breaks=True) for index in range(3)]
+
+    def prepare(todo):
+        processes.add()
+        processes.wait_for(2)
+        return ()
+
+    summary = execute(tasks, tmp_path, scheduler=processes.given, console=quiet(), prepare=prepare)
+    assert len(summary.ran) == 3 and not summary.failed
+
+
+def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
+    shards = [fake.task(f"shard {index}", seconds=0.3) for index in range(18)]
+    tasks = [*shards, fake.task("net", fake.FakeTraining, needs=shards)]
+    seen = []
+    with LocalCluster(
+        n_workers=0, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    ) as cluster:
+        adaptive = cluster.adapt(minimum=0, maximum=3, interval="100ms", wait_count=2, target_duration="300ms")
+
+        def change(task, files):
+            seen.append(len(cluster.scheduler_info["workers"]))
+            if len(seen) == 10:
+                adaptive.maximum = 1
+
+        given = Scheduler(cluster.scheduler_address)
+        summary = execute(tasks, tmp_path, scheduler=given, console=quiet(), recorded=change)
+    assert len(summary.ran) == len(tasks) and not summary.failed and not summary.waiting
+    assert all((tmp_path / task.products[0]).read_text() == f"{task.title}\n" * 100 for task in tasks)
+    assert seen[0] == 1 < max(seen) and seen[-1] == 1
 
 
 def test_a_port_that_listens_and_never_answers_is_bad_input(fake, tmp_path):

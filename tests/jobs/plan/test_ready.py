@@ -1,0 +1,118 @@
+"""Order in which tasks start, compared with the definition by sorting all ready tasks each time."""
+
+from typing import ClassVar
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jobs.plan.ready import Ready
+from jobs.plan.task import Task, urgencies
+
+
+class Step(Task):
+    stage: ClassVar = "generate"
+
+    name: int
+    seconds: float = 1.0
+    after: tuple[str, ...] = ()
+
+    @property
+    def needs(self):
+        return self.after
+
+    @property
+    def cost(self):
+        return self.seconds
+
+    def versions(self):
+        return {}
+
+
+class Alone(Step):
+    alone: ClassVar = True
+
+
+@st.composite
+def plans(draw):
+    tasks = []
+    for name in range(draw(st.integers(1, 8))):
+        kind = draw(st.sampled_from([Step, Step, Alone]))
+        needs = draw(st.lists(st.sampled_from([task.id for task in tasks] or ["absent"]), max_size=3, unique=True))
+        needs = [need for need in needs if need != "absent"]
+        tasks.append(kind(name=name, seconds=draw(st.integers(1, 5)), after=tuple(needs)))
+    return tasks
+
+
+@given(plans(), st.integers(1, 3), st.randoms(use_true_random=False))
+@settings(max_examples=150, deadline=None)
+def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
+    ready, urgency = Ready(tasks, []), urgencies(tasks)
+    done, waiting, running = set(), {task.id: task for task in tasks}, {}
+    while waiting or running:
+        taken = ready.take(slots)
+        for task in taken:
+            able = [other for other in waiting.values() if done.issuperset(other.needs)]
+            assert task in able
+            if task.alone:
+                assert not running and all(other.alone for other in able)
+            else:
+                assert len(running) < slots and not any(other.alone for other in running.values())
+            assert urgency[task.id] == max(urgency[other.id] for other in able if other.alone == task.alone)
+            running[task.id] = waiting.pop(task.id)
+        # No slot stays free that a task could have.
+        able = [other for other in waiting.values() if done.issuperset(other.needs)]
+        if len(running) < slots and not any(other.alone for other in running.values()):
+            assert not [other for other in able if not other.alone]
+        assert running
+        task = random.choice(list(running.values()))
+        del running[task.id]
+        match random.choice(["finish", "finish", "again", "fail"]):
+            case "finish":
+                ready.finish(task)
+                done.add(task.id)
+            case "again":
+                ready.again(task)
+                waiting[task.id] = task
+            case "fail":
+                ready.fail(task)
+                # What needs it, directly or not, stays behind.
+                lost = {task.id}
+                for other in tasks:
+                    if lost.intersection(other.needs):
+                        lost.add(other.id)
+                waiting = {id: other for id, other in waiting.items() if id not in lost}
+        assert {other.id for other in ready.running} == set(running)
+        assert {other.id for other in ready.waiting} >= set(waiting)
+
+
+def test_a_task_that_is_opened_again_comes_first_and_holds_back_what_needs_it():
+    first, other = Step(name=1), Step(name=2, seconds=9.0)
+    after = Step(name=3, after=(first.id,))
+    ready = Ready([other, after], [first.id])
+    assert ready.take(2) == [other, after]
+    ready.again(after)  # it found that the products of the first are damaged
+    ready.reopen(first)
+    assert ready.take(2) == [first]
+    ready.finish(first)
+    assert ready.take(2) == [after] and not ready.waiting
+    ready.finish(after)
+
+
+def test_a_task_that_was_done_before_waits_for_its_needs_when_both_are_opened_again():
+    first = Step(name=1)
+    second = Step(name=2, after=(first.id,))
+    third = Step(name=3, after=(second.id,))
+    ready = Ready([third], [first.id, second.id])
+    ready.reopen(second)
+    ready.reopen(first)
+    for task in (first, second, third):
+        assert ready.take(9) == [task]
+        ready.finish(task)
+
+
+def test_what_needs_a_lost_task_waits_for_ever():
+    first = Step(name=1)
+    after = Step(name=2, after=(first.id,))
+    ready = Ready([after], [first.id])
+    ready.lose(first)
+    assert not ready.take(9) and ready.waiting == [after]
