@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -45,9 +45,9 @@ class Dispatch:
         client.subscribe_topic(self._topic, self._hear)
 
     @property
-    def running(self) -> Collection[Task]:
+    def running(self) -> Iterator[Task]:
         """Tasks that have not ended."""
-        return [task for task, _ in self._running.values()]
+        return (task for task, _ in self._running.values())
 
     def start(self, task: Task, avoided: Collection[str] = ()) -> None:
         """Give a task to a worker, to none of `avoided` if there is a choice."""

@@ -143,7 +143,8 @@ class Lines:
 
     def compiling(self, tally: Tally, done: int, total: int, kernels: int, under_way: Sequence[str]) -> None:
         """Print a line now and then."""
-        self._print(_compiling(done, total, kernels, under_way), always=done == total)
+        if done == total or self._due():
+            self._print(_compiling(done, total, kernels, under_way))
 
     def begin(self, tally: Tally) -> None:
         """Print what there is to do, and the dashboard."""
@@ -170,13 +171,17 @@ class Lines:
         """Print nothing: the last stage has ended, or a sentence follows."""
 
     def _progress(self, tally: Tally, stage: Stage, always: bool = False) -> None:
+        if not always and not self._due():
+            return
         done = f"{stage} {tally.ended[stage]:,} of {tally.planned[stage]:,} tasks"
-        self._print(f"{done}; all {tally.ended.total():,} of {tally.planned.total():,}, {rate_and_left(tally)}", always)
+        self._print(f"{done}; all {tally.ended.total():,} of {tally.planned.total():,}, {rate_and_left(tally)}")
 
-    def _print(self, line: str, always: bool = True) -> None:
-        if always or time.monotonic() - self._last >= _SECONDS_BETWEEN_LINES:
-            self._last = time.monotonic()
-            self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+    def _due(self) -> bool:
+        return time.monotonic() - self._last >= _SECONDS_BETWEEN_LINES
+
+    def _print(self, line: str) -> None:
+        self._last = time.monotonic()
+        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 class Objects:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
-from types import NoneType
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.fingerprint import file_sha256, fingerprint
+from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 from weaves.reading import read_bytes
 
@@ -80,9 +80,9 @@ def leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
 
 
 def _leaf(value: Any) -> Leaf:
-    if isinstance(value, int | float | NoneType) or (isinstance(value, str) and len(value) <= _LONGEST_LEAF):
+    if value is None or isinstance(value, int | float) or (isinstance(value, str) and len(value) <= _LONGEST_LEAF):
         return value
-    return f"#{fingerprint(value, 8)}"
+    return f"#{hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]}"
 
 
 def read_receipt(path: Path, task: str) -> Receipt | None:
