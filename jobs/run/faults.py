@@ -64,7 +64,7 @@ def faults(
         for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
             found += of_task
             seen((index + 1) / len(tasks))
-    bad = {Path(fault.path).name for fault in found}
+    bad = {Path(path).name for fault in found if fault.task for path in fault.task.products}
     for one in recipe.together:
         found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
     for page in (task for task in tasks if isinstance(task, Page)):
@@ -168,8 +168,13 @@ def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[F
     except BadInput:
         yield Fault("damaged", where, "it is no manifest")
         return
-    if not whole or found.without(bad).encoded() != expected.without(bad).encoded():
-        yield Fault("damaged", where, "it does not say what the plan and the receipts say")
+    listed, done = found.without(bad), expected.without(bad)
+    if not whole or found.model_copy(update={"shards": expected.shards}).encoded() != expected.encoded():
+        yield Fault("damaged", where, "it does not say what the plan says")
+    elif not set(listed.shards) <= set(done.shards):
+        yield Fault("damaged", where, "it does not say what the receipts say")
+    elif len(listed.shards) < len(done.shards):
+        yield Fault("outdated", where, f"it lists {len(listed.shards):,} of {len(done.shards):,} finished shards")
 
 
 def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:

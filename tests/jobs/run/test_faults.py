@@ -6,6 +6,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.faults import faults, is_leftover, own_files, task_faults
 from jobs.run.ledger import Ledger
 from jobs.verbs.bench import TRUTH, measured_alone
+from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT
 from pipeline.training.loop import ROWS
 from reports.record import Record, machine_path, this_machine, write_records
@@ -67,6 +68,19 @@ def test_a_manifest_of_either_data_set_is_compared(trade):
     second.unlink()
     places = [str(path.relative_to(ledger.out)) for path in (first, second)]
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", places[0]), ("missing", places[1])]
+
+
+def test_a_manifest_that_a_killed_run_left_behind_its_receipts_is_outdated(trade):
+    recipe, tasks, ledger = trade
+    path = next(path for path in ledger.out.glob("datasets/trade-*/manifest.json"))
+    manifest = Manifest.load(path.parent)
+    manifest.without({shard.file for shard in manifest.shards[:2]}).save(path.parent)
+    (fault,) = faults(recipe, tasks, ledger)
+    assert fault.kind == "outdated" and f"of {len(manifest.shards)} finished shards" in fault.why
+    # A shard whose receipt is gone is a fault of its own, not one of the manifest that lists it.
+    manifest.save(path.parent)
+    (ledger.out / ledger.receipt_path(tasks[0])).unlink()
+    assert kinds(faults(recipe, tasks, ledger)) == [("missing", ledger.receipt_path(tasks[0]))]
 
 
 def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
