@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
+from pipeline.scenes.sources import elements
 from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
@@ -175,6 +176,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
     """Return the scene as Mitsuba loads it."""
     try:
         if isinstance(scene.source, Path):
+            elements(scene)  # refuses what Mitsuba would not survive
             world = instantiate(mi, scene.source, where)
         else:
             world = mi.load_dict(scene.source(mi), optimize=False)

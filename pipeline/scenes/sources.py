@@ -1,11 +1,38 @@
-"""Cloths and files of a scene, read without Mitsuba."""
+"""Cloths and files of a scene, read without Mitsuba.
+
+Mitsuba itself ends without a sentence where elements are nested some ten thousand deep, and waits for ever for a pipe
+that a scene names as a file. So a scene's XML is checked before Mitsuba reads it (`elements`).
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import Final, NamedTuple
+from xml.parsers import expat
 
 from pipeline.scenes.scene import PREFIX, Scene
+from weaves.errors import BadInput, one_line
+from weaves.reading import MIB, read_text, refuse_irregular
+
+MOST_DEPTH: Final = 32
+"""Most elements inside one another."""
+
+_MOST_BYTES: Final = 16 * MIB
+_MOST_INCLUDED: Final = 64
+
+
+class Element(NamedTuple):
+    """An element of a scene's XML, and the folder of the file that it stands in."""
+
+    tag: str
+    attributes: dict[str, str]
+    folder: Path
+
+    def filename(self) -> str:
+        """Return the file that it names; empty if none."""
+        if "filename" in self.attributes:
+            return self.attributes["filename"]
+        return self.attributes.get("value", "") if self.attributes.get("name") == "filename" else ""
 
 
 def worn(scene: Scene) -> dict[str, str]:
@@ -22,24 +49,79 @@ def files(scene: Scene) -> list[Path]:
     if not isinstance(scene.source, Path):
         return []
     folder = scene.source.parent
-    named = [folder / value for element in _elements(scene) for value in _filenames(element)]
+    named = [folder / name for element in elements(scene) if (name := element.filename())]
     return [scene.source, *sorted({path for path in named if path.is_file()})]
 
 
-def _ids(scene: Scene) -> list[str]:
-    return [element.get("id", "") for element in _elements(scene) if element.tag == "bsdf"]
+def elements(scene: Scene) -> list[Element]:
+    """Return the elements of a scene's XML and of the files that it includes; none of a scene that is no file.
 
-
-def _filenames(element: ElementTree.Element) -> list[str]:
-    own = [element.get("filename", "")] if element.tag == "include" else []
-    return own + ([element.get("value", "")] if element.get("name") == "filename" else [])
-
-
-def _elements(scene: Scene) -> list[ElementTree.Element]:
-    """Return all elements of a scene's XML; none of what is no XML, which Mitsuba will say."""
+    Raises
+    ------
+    BadInput
+        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, has a document type or an element `path`,
+        or names a file by a parameter or one that is no regular file.
+    """
     if not isinstance(scene.source, Path):
         return []
+    found: list[Element] = []
+    left, home = [scene.source], scene.source.parent
+    for path in left:
+        inside = _parsed(path)
+        for element in inside:
+            _refuse(element, path, home)
+        found += inside
+        included = {home / element.filename() for element in inside if element.tag == "include"}
+        left += sorted(name for name in included if name.is_file() and name not in left)
+        if len(left) > _MOST_INCLUDED:
+            raise BadInput(str(scene.source), "include", len(left), f"at most {_MOST_INCLUDED} files may be included")
+    return found
+
+
+def _parsed(path: Path) -> list[Element]:
+    """Return the elements of one file."""
+    found: list[Element] = []
+    where, depth = str(path), 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MOST_DEPTH:
+            raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed")
+        found.append(Element(tag, attributes, path.parent))
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def doctype(*_: object) -> None:
+        raise BadInput(where, "", "has a document type", "leave the line <!DOCTYPE …> out")
+
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler, parser.EndElementHandler, parser.StartDoctypeDeclHandler = start, end, doctype
     try:
-        return list(ElementTree.parse(scene.source).iter())
-    except (ElementTree.ParseError, OSError):
-        return []
+        parser.Parse(read_text(path, _MOST_BYTES, "a Mitsuba XML"), True)
+    except FileNotFoundError as error:
+        raise BadInput(where, "", "does not exist", "a Mitsuba XML is needed") from error
+    except expat.ExpatError as error:
+        raise BadInput(
+            where, "", f"broken XML ({one_line(error)})", "a Mitsuba 3 scene that loads is needed"
+        ) from error
+    return found
+
+
+def _refuse(element: Element, path: Path, home: Path) -> None:
+    """Refuse an element that names files in a way that cannot be checked, or names one that is no regular file."""
+    where, name = str(path), element.filename()
+    if element.tag == "path":
+        raise BadInput(
+            where, "path", element.attributes.get("value", ""), "leave it out, and name files beside the scene"
+        )
+    if "$" in name or "$" in element.attributes.get("name", ""):
+        raise BadInput(where, "filename", name, "names of files and of properties are written out, without parameters")
+    for folder in {home, element.folder} if name else ():
+        refuse_irregular(folder / name, f"a file, which the scene {path.name} names,")
+
+
+def _ids(scene: Scene) -> list[str]:
+    return [element.attributes.get("id", "") for element in elements(scene) if element.tag == "bsdf"]
