@@ -56,20 +56,21 @@ lint: $(READY)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
+# PyTorch's build for the CPU alone is taken where the package index has it: it needs no CUDA.
 # Nothing is installed again until the pinned versions or the package's own description change.
-$(READY): requirements.txt requirements-cuda.txt pyproject.toml
+$(READY): requirements.txt requirements-cpu.txt requirements-cuda.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Twillight needs Python 3.11 or newer: say which with make PYTHON=/path/to/python3"; exit 1; }
 	@echo "installing, 1 of 3: the virtual environment .venv"
 	@$(PYTHON) -m venv .venv
 	@echo "installing, 2 of 3: the packages pinned in requirements.txt; this downloads about a gigabyte and takes minutes"
+	@$(INSTALL) --requirement requirements-cpu.txt 2>/dev/null || true
 	@$(INSTALL) --requirement requirements.txt
 	@$(BIN)/python -c 'import importlib.metadata as m, sys; sys.exit("nvidia" in str(m.requires("torch")))' || { echo "this build of PyTorch needs CUDA: three more gigabytes"; $(INSTALL) --requirement requirements-cuda.txt; }
 	@echo "installing, 3 of 3: twillight itself"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
-# Hash of PyTorch's build for the CPU alone (Linux x86_64, Python 3.11), which is no file of the package index; it belongs
-# to the version in requirements.txt. Empty: only the builds of the index are accepted.
+# Hash of PyTorch's build for the CPU alone (Linux x86_64, Python 3.11), of the version in requirements.txt.
 TORCH_CPU := 6746dbcbeb526eb61330b76b41ff1b4eb848951103a892eeb080dfa2b264667b
 
 # The newest packages that fit pyproject.toml, with the hashes of all their files, for every platform.
@@ -78,11 +79,13 @@ pins:
 	@build/pins/bin/pip install --quiet --disable-pip-version-check uv
 	@build/pins/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --extra dev pyproject.toml --output-file build/pins/all.txt
 	@awk -v cpu=$(TORCH_CPU) ' \
-	  BEGIN { print "# Exact versions and hashes of everything `make` installs, for every platform; pyproject.toml has the ranges.\n# Written by `make pins`, do not edit." > "requirements.txt"; \
-	          print "# The libraries of CUDA for PyTorch on Linux; not needed by its build for the CPU alone.\n# Written by `make pins`, do not edit." > "requirements-cuda.txt" } \
+	  BEGIN { note = "Written by `make pins`, do not edit."; \
+	    print "# Versions and hashes of everything `make` installs, for every platform; pyproject.toml has the ranges. " note > "requirements.txt"; \
+	    print "# The build of PyTorch for the CPU alone, taken where the package index has it. " note > "requirements-cpu.txt"; \
+	    print "# The libraries of CUDA, for other builds of PyTorch on Linux. " note > "requirements-cuda.txt" } \
 	  /^[a-z]/ { cuda = /^(cuda|nvidia|triton)/ } \
 	  { print > (cuda ? "requirements-cuda.txt" : "requirements.txt") } \
-	  cpu && /^torch==/ { print "    --hash=sha256:" cpu " \\" > "requirements.txt" }' build/pins/all.txt
+	  /^torch==/ { print $$1 "+cpu --hash=sha256:" cpu > "requirements-cpu.txt" }' build/pins/all.txt
 
 # Products in out/ stay.
 clean:

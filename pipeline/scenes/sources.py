@@ -18,6 +18,7 @@ MOST_DEPTH: Final = 32
 """Most elements inside one another."""
 
 _MOST_BYTES: Final = 16 * MIB
+_MOST_ELEMENTS: Final = 200_000
 _MOST_INCLUDED: Final = 64
 
 
@@ -59,7 +60,7 @@ def elements(scene: Scene) -> list[Element]:
     Raises
     ------
     BadInput
-        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, has a document type or an element `path`,
+        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document type or an element `path`,
         or names a file by a parameter or one that is no regular file.
     """
     if not isinstance(scene.source, Path):
@@ -88,6 +89,8 @@ def _parsed(path: Path) -> list[Element]:
         depth += 1
         if depth > MOST_DEPTH:
             raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed")
+        if len(found) == _MOST_ELEMENTS:
+            raise BadInput(where, "", "too many elements", f"at most {_MOST_ELEMENTS:,} are allowed")
         found.append(Element(tag, attributes, path.parent))
 
     def end(tag: str) -> None:
@@ -104,9 +107,8 @@ def _parsed(path: Path) -> list[Element]:
     except FileNotFoundError as error:
         raise BadInput(where, "", "does not exist", "a Mitsuba XML is needed") from error
     except expat.ExpatError as error:
-        raise BadInput(
-            where, "", f"broken XML ({one_line(error)})", "a Mitsuba 3 scene that loads is needed"
-        ) from error
+        reason = f"broken XML ({one_line(error)})"
+        raise BadInput(where, "", reason, "a Mitsuba 3 scene that loads is needed") from error
     return found
 
 
@@ -114,13 +116,12 @@ def _refuse(element: Element, path: Path, home: Path) -> None:
     """Refuse an element that names files in a way that cannot be checked, or names one that is no regular file."""
     where, name = str(path), element.filename()
     if element.tag == "path":
-        raise BadInput(
-            where, "path", element.attributes.get("value", ""), "leave it out, and name files beside the scene"
-        )
+        folder = element.attributes.get("value", "")
+        raise BadInput(where, "path", folder, "leave it out, and name files beside the scene")
     if "$" in name or "$" in element.attributes.get("name", ""):
         raise BadInput(where, "filename", name, "names of files and of properties are written out, without parameters")
-    for folder in {home, element.folder} if name else ():
-        refuse_irregular(folder / name, f"a file, which the scene {path.name} names,")
+    for place in {home, element.folder} if name else ():
+        refuse_irregular(place / name, f"a file, which the scene {path.name} names,")
 
 
 def _ids(scene: Scene) -> list[str]:

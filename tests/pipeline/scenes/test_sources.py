@@ -1,10 +1,15 @@
 """What a scene is made of, without loading it: equal to what Mitsuba finds."""
 
+import os
+import re
 from pathlib import Path
+
+import pytest
 
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.shipped import SHIPPED
-from pipeline.scenes.sources import files, worn
+from pipeline.scenes.sources import elements, files, worn
+from weaves.errors import BadInput
 
 XML = """<scene version="3.0.0">
   <bsdf type="diffuse" id="fabric_denim"/>
@@ -30,10 +35,39 @@ def test_files_that_are_there_are_part_of_a_scene(tmp_path):
     assert files(scene) == [tmp_path / "sofa.xml", tmp_path / "sheet.ply"]
 
 
-def test_a_file_that_is_no_xml_wears_nothing(tmp_path):
-    (tmp_path / "broken.xml").write_text("<scene")
-    scene = load_scene(tmp_path / "broken.xml")
-    assert worn(scene) == {} and files(scene) == [tmp_path / "broken.xml"]
+SHAPE = '<shape type="obj"><string name="filename" value="{}"/></shape>'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<scene", "broken XML"),
+        ("", "broken XML"),
+        ("<a>" * 40_000 + "</a>" * 40_000, "nested too deeply"),
+        ("<scene>" + "<a/>" * 200_000 + "</scene>", "too many elements"),
+        ('<!DOCTYPE a [<!ENTITY b "cc">]><scene/>', "document type"),
+        ('<scene><path value="/etc"/></scene>', "path = '/etc'"),
+        (f"<scene>{SHAPE.format('$x')}</scene>", "filename = '$x'"),
+        ('<scene><string name="$n" value="pipe"/></scene>', "without parameters"),
+        (f"<scene>{SHAPE.format('pipe')}</scene>", "is a pipe"),
+        (f"<scene>{SHAPE.format('/dev/zero')}</scene>", "is a device"),
+        (f"<scene>{SHAPE.format('.')}</scene>", "is a folder"),
+        ('<scene><spectrum name="a" filename="pipe"/></scene>', "is a pipe"),
+        ('<scene><include filename="pipe"/></scene>', "is a pipe"),
+        ('<scene><include filename="part.xml"/></scene>', "is a pipe"),
+    ],
+)
+def test_a_file_that_mitsuba_would_not_survive_is_one_sentence(tmp_path, text, words):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "part.xml").write_text('<scene><include filename="pipe"/></scene>')
+    (tmp_path / "sofa.xml").write_text(text)
+    with pytest.raises(BadInput, match=re.escape(words)):
+        files(load_scene(tmp_path / "sofa.xml"))
+
+
+def test_a_scene_that_includes_itself_is_read_once(tmp_path):
+    (tmp_path / "sofa.xml").write_text(f'<scene>{SHAPE.format("a.ply")}<include filename="sofa.xml"/></scene>')
+    assert [element.tag for element in elements(load_scene(tmp_path / "sofa.xml"))].count("shape") == 1
 
 
 def test_shipped_scenes_say_all_that_they_wear():
