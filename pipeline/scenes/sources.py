@@ -60,8 +60,8 @@ def elements(scene: Scene) -> list[Element]:
     Raises
     ------
     BadInput
-        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document type or an element `path`,
-        or names a file by a parameter or one that is no regular file.
+        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document
+        type or an element `path`, or names a file by a parameter or one that is no regular file.
     """
     if not isinstance(scene.source, Path):
         return []
