@@ -53,7 +53,7 @@ def make(task, out):
             path.write_text(json.dumps({"file": path.name, "date": now, "values": [0.5] * 20}))
 
 
-def execute(tasks, out, *, stages=STAGES, recorded=lambda task: None, **rest):
+def execute(tasks, out, *, stages=STAGES, recorded=lambda task, files: None, settle=lambda: None, **rest):
     """Do the unfinished tasks one after the other in this process, as `jobs.run.executor.execute` would."""
     ledger, summary = Ledger(out), Summary([], [], [], [])
     for task in tasks:
@@ -61,9 +61,11 @@ def execute(tasks, out, *, stages=STAGES, recorded=lambda task: None, **rest):
             summary.before.append(task)
         elif task.stage in stages:
             make(task, out)
-            ledger.finish(task, {Path(path).name: measure(out / path) for path in task.products}, 1.5)
-            recorded(task)
+            files = {Path(path).name: measure(out / path) for path in task.products}
+            ledger.finish(task, files, 1.5)
+            recorded(task, files)
             summary.ran.append(task)
+    settle()
     return summary
 
 
