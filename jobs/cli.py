@@ -124,11 +124,16 @@ def export(
 
 
 @app.command(sort_key=3)
-def plan(recipe: RecipeName) -> None:
-    """Show the tasks of a recipe with their rows, bytes and estimated time; nothing is computed."""
+def plan(
+    recipe: RecipeName,
+    *,
+    out: Out = OUT,
+    workers: Annotated[int, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
+) -> None:
+    """Show what would run and why, with rows, bytes and time; nothing is computed."""
     from jobs.verbs.plan import print_plan
 
-    print_plan(recipe)
+    print_plan(recipe, out, workers)
 
 
 @app.command(sort_key=4)

@@ -34,18 +34,20 @@ class Ready:
         self._alone: list[tuple[float, int, Task]] = []
         self._pushed = 0
         self._running: dict[str, Task] = {}
+        self._one_alone = ""  # the last task that was started alone
         for task in tasks:
             self._wait(task)
 
     def take(self, slots: int) -> list[Task]:
         """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs."""
         taken: list[Task] = []
-        if slots < 1 or any(task.alone for task in self._running.values()):
+        if self._one_alone in self._running:
             return taken
         while len(self._running) < slots and (task := self._pop(self._beside)):
             taken.append(task)
-        if not self._running and (task := self._pop(self._alone)):
+        if slots > 0 and not self._running and (task := self._pop(self._alone)):
             taken.append(task)
+            self._one_alone = task.id
         return taken
 
     def finish(self, task: Task) -> None:

@@ -132,6 +132,14 @@ class Ledger:
             link(source, self.out / path)
         return self.state(task) == "done"
 
+    def is_elsewhere(self, task: Task) -> bool:
+        """Return whether a task that is not done here has products of the right size in other data sets."""
+        receipt = self.receipt(task)
+        return receipt is not None and all(
+            any(self._is_whole(file, receipt) for file in (self.out / path, *self._copies(path)))
+            for path in map(Path, task.products)
+        )
+
     def discard(self, task: Task) -> list[str]:
         """Remove the products of a done task that are not those of its receipt; return their paths.
 

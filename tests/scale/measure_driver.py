@@ -69,7 +69,7 @@ def scheduler(folder: Path) -> Iterator[Scheduler]:
     path = os.pathsep.join([str(ROOT), str(Path(__file__).parent)])
     common = {"env": os.environ | {"PYTHONPATH": path}, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "8"]
     processes = [subprocess.Popen([*dask, "--scheduler-file", str(file), "--no-dashboard"], **common)]
     try:
         while not file.exists():

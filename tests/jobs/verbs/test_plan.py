@@ -1,0 +1,80 @@
+"""`twillight plan`: reasons and schedules of a recipe whose shards are partly done."""
+
+import pytest
+
+from jobs.cli import main
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
+from jobs.run.reasons import ELSEWHERE
+from jobs.run.receipt import Product
+from jobs.verbs.plan import facts_of, moved
+from weaves.errors import BadInput
+
+
+def finish(ledger, task, seconds):
+    """Write products of one byte, and a receipt."""
+    files = {}
+    for path in task.products:
+        (ledger.out / path).parent.mkdir(parents=True, exist_ok=True)
+        (ledger.out / path).write_bytes(b"x")
+        files[path.rpartition("/")[2]] = Product(sha256="0" * 64, bytes=1)
+    ledger.finish(task, files, seconds)
+
+
+@pytest.fixture
+def out(files, tmp_path):
+    out = tmp_path / "out"
+    (out / "ledger").mkdir(parents=True)
+    ledger = Ledger(out)
+    for task in plan(load_recipe(files.write())):
+        if task.stage == "generate":
+            finish(ledger, task, 2 * task.cost)
+    return out
+
+
+def test_the_changed_key_of_a_recipe_is_named(files, out, capsys):
+    files.exchange("relative_error = 0.05", "relative_error = 0.04").write()
+    assert main(["plan", str(files.path), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert ": changed: truth.relative_error 0.05 → 0.04\n" in told
+    assert "never made" in told and "done" not in told
+    files.exchange("relative_error = 0.04", "relative_error = 0.05").write()
+    assert main(["plan", str(files.path), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "done" in told and "changed" not in told
+
+
+def test_estimates_are_scaled_by_what_was_measured(files, out):
+    tasks = plan(load_recipe(files.exchange("train = 2500", "train = 4500").write()))
+    facts = facts_of(tasks, Ledger(out))
+    new = [task for task in facts.left(tasks) if task.stage == "generate"]
+    # The data set has another folder now; what both have is only linked.
+    shared = [task for task in tasks if facts.why.get(task.id) == ELSEWHERE]
+    assert len(shared) > len(new) > 0
+    for task in new:
+        assert facts.seconds[task.id] == pytest.approx(2 * task.cost, rel=0.05)  # receipts have three decimals
+    training = next(task for task in tasks if task.stage == "train")
+    assert facts.seconds[training.id] == training.cost and facts.bytes[training.id] == training.size
+    assert {facts.bytes[task.id] for task in shared} == {1}
+    written, read = moved([*shared, training], facts.bytes)
+    assert written == sum(facts.bytes.values())
+    assert read == written + sum(facts.bytes[need] for need in training.needs)
+
+
+def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys):
+    assert main(["plan", str(files.path), "--out", str(out), "--workers", "3"]) == 0
+    told = capsys.readouterr().out.replace("\n", " ")
+    for part in ("3 workers: ", "workers save less than 5%", "moved: ", "durations are measured"):
+        assert part in " ".join(told.split())
+
+
+@pytest.mark.parametrize("workers", ["-1", "100001"])
+def test_an_impossible_number_of_workers_is_refused(files, out, capsys, workers):
+    assert main(["plan", str(files.path), "--out", str(out), "--workers", workers]) == BadInput.exit_code
+    assert "--workers" in capsys.readouterr().err
+
+
+def test_a_plan_of_a_folder_that_is_not_there_is_one_of_new_tasks(files, tmp_path, capsys):
+    assert main(["plan", files.write(), "--out", str(tmp_path / "none")]) == 0
+    assert "never made" in capsys.readouterr().out and not (tmp_path / "none").exists()
