@@ -1,0 +1,116 @@
+"""The snippets of jobs/CLUSTER.md, with a local cluster or local processes in place of each service."""
+
+import io
+import os
+import re
+import stat
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+from distributed import LocalCluster
+from rich.console import Console
+
+from jobs.cli import app
+from jobs.run.cluster import Scheduler
+from jobs.run.executor import execute
+
+TESTS = Path(__file__).parent
+ROOT = TESTS.parents[1]
+TEXT = (ROOT / "jobs" / "CLUSTER.md").read_text(encoding="utf-8")
+PATH = os.pathsep.join([str(TESTS), str(ROOT)])
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    monkeypatch.syspath_prepend(TESTS)
+    monkeypatch.setenv("PYTHONPATH", PATH)
+    import fake_stages
+
+    return fake_stages
+
+
+class Service:
+    """A local cluster with the arguments and methods that the snippets use."""
+
+    def __init__(self, **options):
+        self.options = options
+        count = options.get("n_workers", 0)
+        quiet = {"dashboard_address": ":0", "silence_logs": 50}
+        self._cluster = LocalCluster(n_workers=min(count, 2), threads_per_worker=1, host="127.0.0.1", **quiet)
+        self.scheduler_address = self._cluster.scheduler_address
+        self.close = self._cluster.close
+
+    def adapt(self, minimum, maximum):
+        self._cluster.adapt(minimum=minimum, maximum=min(maximum, 2), interval="100ms")
+
+
+def cluster_spec(name, image, env, worker_command):
+    """Return the parts of `dask_kubernetes.operator.make_cluster_spec` that the snippet changes."""
+    return {"spec": {"worker": {"spec": {"containers": [{"image": image, "env": env, "args": worker_command}]}}}}
+
+
+@pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S), ids=["slurm", "k8s", "aws"])
+def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, fake, monkeypatch, code):
+    for name in ("dask_jobqueue", "dask_kubernetes", "dask_kubernetes.operator", "dask_cloudprovider"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setitem(sys.modules, "dask_cloudprovider.aws", types.ModuleType("aws"))
+    monkeypatch.setattr(sys.modules["dask_jobqueue"], "SLURMCluster", Service, raising=False)
+    monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "KubeCluster", Service, raising=False)
+    monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "make_cluster_spec", cluster_spec, raising=False)
+    monkeypatch.setattr(sys.modules["dask_cloudprovider.aws"], "FargateCluster", Service, raising=False)
+    tasks = [fake.task(f"shard {index}", seconds=0.1) for index in range(6)]
+    summaries = []
+
+    def run(command, check):
+        assert command[0] == "twillight" and check
+        app.parse_args(command[1:], exit_on_error=False, print_error=False)
+        given = Scheduler(command[command.index("--scheduler") + 1])
+        summaries.append(execute(tasks, tmp_path, scheduler=given, console=Console(file=io.StringIO())))
+
+    started = types.SimpleNamespace(run=run)
+    exec(code.replace("import subprocess\n", ""), {"subprocess": started})
+    (summary,) = summaries
+    assert len(summary.ran) == 6 and not summary.failed
+
+
+SRUN = """#!/bin/sh
+"$@" &
+"$@" &
+wait
+"""
+
+TWILLIGHT = f"""#!{sys.executable}
+import sys
+from pathlib import Path
+from jobs.cli import app
+from jobs.run.cluster import Scheduler
+from jobs.run.executor import execute
+import fake_stages
+app.parse_args(sys.argv[1:], exit_on_error=False, print_error=False)
+given = Scheduler(sys.argv[sys.argv.index("--scheduler") + 1])
+execute([fake_stages.task(f"shard {{index}}", seconds=0.1) for index in range(6)], Path.cwd(), scheduler=given)
+"""
+
+DASK = f"""#!{sys.executable}
+from dask.__main__ import main
+if __name__ == "__main__":  # workers are started from it
+    main()
+"""
+
+
+def test_the_job_of_slurm_runs_tasks(tmp_path, fake):
+    (script,) = re.findall(r"^```sh\n(#!/bin/bash\n.*?)^```$", TEXT, re.M | re.S)
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    for name, content in (("srun", SRUN), ("twillight", TWILLIGHT), ("dask", DASK), ("job", script)):
+        (folder / name).write_text(content)
+        (folder / name).chmod(stat.S_IRWXU)
+    environment = os.environ | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
+    command = ["setsid", "--wait", str(folder / "job")]
+    options = {"capture_output": True, "text": True, "timeout": 120, "check": False}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, **options)
+    assert "6 of 6 tasks" in done.stderr, done.stderr
+    assert len(list((tmp_path / "generate").glob("*.txt"))) == 6
