@@ -7,8 +7,10 @@ BIN := .venv/bin
 # Every package is listed with the hashes of its files: a file that has another one is refused, and no other is fetched.
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-deps
 READY := .venv/installed
+# A run and its tests start many processes: compiled modules are kept, whatever the environment says.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: report run list plan generate check train bench status savings readme results test tests test-slow lint pins clean
+.PHONY: report run list plan generate check train bench status savings readme results test tests test-slow faults lint pins clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -45,11 +47,15 @@ test: $(READY)
 	@$(MAKE) --no-print-directory --jobs 2 lint tests
 
 tests: $(READY)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow" --numprocesses logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow and not faults" --numprocesses logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 # The tests marked slow: long statistics, every kernel compiled from nothing, every recipe made small. Takes long.
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow
+
+# Kills, full disks, wrong clocks, signals and damaged files; every run ends with the bytes of an undisturbed one.
+faults: $(READY)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
 
 lint: $(READY)
 	$(BIN)/ruff check

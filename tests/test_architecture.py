@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -72,15 +72,23 @@ MODULES = {
 }
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Yield every module that a file imports, at its top or inside a function."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imported(path: Path) -> list[str]:
+    """Return every module that a file imports, at its top or inside a function."""
+    found: list[str] = []
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0 and node.module, f"{path}: relative imports hide where they point"
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
-            yield from (name if name in MODULES else node.module for name in inner)
+            found += [name if name in MODULES else node.module for name in inner]
+    return found
 
 
 def layer(module: str) -> int:
@@ -204,7 +212,7 @@ def defined(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     return found
 
 
-TOP = {module: defined(ast.parse(path.read_text(encoding="utf-8")).body) for module, path in MODULES.items()}
+TOP = {module: defined(parsed(path).body) for module, path in MODULES.items()}
 
 
 def exists(name: str) -> bool:
@@ -234,7 +242,7 @@ def prose(path: Path) -> str:
     """Return the docstrings and comments of a file."""
     with path.open("rb") as file:
         comments = [token.string for token in tokenize.tokenize(file.readline) if token.type == tokenize.COMMENT]
-    nodes = (node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Expr))
+    nodes = (node.value for node in ast.walk(parsed(path)) if isinstance(node, ast.Expr))
     strings = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     return "\n".join(strings + comments)
 

@@ -1,0 +1,129 @@
+"""A small recipe of every stage, run by the command line as a user runs it, and the bytes that it leaves."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+
+ROOT = Path(__file__).parents[2]
+START = "import sys; from jobs.entry import main; sys.exit(main())"
+TIMEOUT = 300.0
+RECIPE = """
+name = "faults"
+
+[dataset]
+seen = ["polyester_lining"]
+shard_rows = 256
+seed = 5
+
+[dataset.rows]
+train = 2048
+validation = 64
+test = 128
+
+[dataset.truth]
+estimator = "owen"
+relative_error = 0.2
+min_count = 64
+max_count = 512
+
+[[models]]
+model = "neumip"
+texels_per_yarn = 4
+[models.training]
+steps = 60
+batch = 64
+checkpoint_every = 10
+device = "cpu"
+
+[[models]]
+model = "point_sampled"
+counts = [2]
+
+[bench]
+sphere_size = [16, 16]
+plane_size = [16, 16]
+picture_counts = [2]
+frames = 3
+frame_size = [16, 16]
+rows = 64
+timing_rows = 64
+timing_repeats = 20
+latents = false
+truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 128 }
+"""
+
+
+class End(NamedTuple):
+    """End of a run: its exit code and the lines on stderr."""
+
+    code: int
+    stderr: str
+
+    def assert_sentence(self):
+        """One sentence of at most 300 letters ends stderr, and no traceback is in it."""
+        assert "Traceback" not in self.stderr, self.stderr
+        last = self.stderr.strip().splitlines()[-1]
+        assert 0 < len(last) <= 300, last
+
+
+def write_recipe(folder):
+    path = folder / "faults.toml"
+    path.write_text(RECIPE, encoding="utf-8")
+    return path
+
+
+def start(recipe, out, *arguments, verb="run", before=(), env=None):
+    """Start the command line in a session of its own; Ctrl-C reaches it although pytest may ignore it."""
+    return subprocess.Popen(
+        [*before, sys.executable, "-c", START, verb, str(recipe), "--out", str(out), *arguments],
+        cwd=ROOT,
+        env=os.environ | {"COLUMNS": "400", "OMP_NUM_THREADS": "1"} | (env or {}),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def end(process, timeout=TIMEOUT):
+    _, stderr = process.communicate(timeout=timeout)
+    return End(process.returncode, stderr)
+
+
+def run(recipe, out, *arguments, **others):
+    return end(start(recipe, out, *arguments, **others))
+
+
+def hashes(recipe, out):
+    """Return the hash of every product but those with times in them, and of the manifest."""
+    tasks = [task for task in plan(load_recipe(recipe)) if not task.alone and task.stage != "report"]
+    files = [out / path for task in tasks for path in task.products] + sorted(out.glob("datasets/*/manifest.json"))
+    return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def assert_no_leftovers(out):
+    """Nothing half-written is left by a run that has ended well."""
+    assert not list(out.rglob(".tmp-*"))
+
+
+def gone(processes, seconds=20.0):
+    """Wait until processes have ended; return those that have not."""
+    return psutil.wait_procs(processes, timeout=seconds)[1]
+
+
+def family(process):
+    """Return the processes that a run has started."""
+    try:
+        return psutil.Process(process.pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        return []

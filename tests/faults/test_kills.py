@@ -1,0 +1,155 @@
+"""Kills at random moments: the same command continues, and the bytes are those of a run that nothing disturbs."""
+
+import random
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import psutil
+import pytest
+
+from tests.faults.runs import ROOT, assert_no_leftovers, end, family, gone, hashes, run, start
+
+pytestmark = pytest.mark.faults
+
+KILLS = 20
+LONGEST = 12.0  # seconds until a kill
+
+
+def wait_for_a_moment(process, out, random):
+    """Wait for a random time, or until a random number of new files has appeared; True if the run still lives."""
+    limit = time.monotonic() + LONGEST
+    if random.random() < 0.5:
+        limit = time.monotonic() + random.uniform(0.2, LONGEST)
+        files = float("inf")
+    else:
+        files = sum(1 for _ in out.rglob("*")) + random.randint(1, 12)
+    while time.monotonic() < limit and process.poll() is None and sum(1 for _ in out.rglob("*")) < files:
+        time.sleep(0.002)
+    return process.poll() is None
+
+
+@contextmanager
+def cluster(folder, number):
+    """A scheduler and two workers of their own; yields the scheduler's process and its file."""
+    file = folder / f"scheduler-{number}.json"
+    base = [sys.executable, "-m"]
+    quiet = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    scheduler = subprocess.Popen(
+        [*base, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+        + ["--scheduler-file", str(file)],
+        **quiet,
+    )
+    while not file.exists():
+        time.sleep(0.05)
+    worker = [*base, "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
+    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
+    try:
+        yield scheduler, file
+    finally:
+        for process in (*workers, scheduler):
+            children = family(process)
+            for one in (*children, process):
+                one.kill()
+            process.wait()
+
+
+def finish(recipe, out, undisturbed, *arguments):
+    found = run(recipe, out, *arguments)
+    assert found.code == 0, found.stderr
+    assert hashes(recipe, out) == undisturbed[1]
+    assert_no_leftovers(out)
+
+
+def test_killed_drivers(recipe, undisturbed, tmp_path):
+    seeded, kills, out = random.Random(1), 0, tmp_path / "0"
+    while kills < KILLS:
+        out.mkdir(exist_ok=True)
+        process = start(recipe, out)
+        alive = wait_for_a_moment(process, out, seeded)
+        children = family(process)
+        if alive:
+            process.kill()
+            kills += 1
+        found = end(process)
+        assert not gone(children), "a killed driver leaves no process"
+        if not alive:
+            assert found.code == 0, found.stderr
+            assert hashes(recipe, out) == undisturbed[1]
+            out = tmp_path / str(kills)
+    finish(recipe, out, undisturbed)
+
+
+def test_killed_workers(recipe, undisturbed, tmp_path):
+    """A run survives the loss of its workers, three of them in a row at most."""
+    seeded, kills, runs = random.Random(2), 0, 0
+    while kills < KILLS:
+        out = tmp_path / str(runs)
+        out.mkdir()
+        runs += 1
+        process = start(recipe, out)
+        for _ in range(3):
+            if not wait_for_a_moment(process, out, seeded):
+                break
+            workers = [one for one in family(process) if not psutil_children(one) and "spawn_main" in command(one)]
+            if workers:
+                seeded.choice(workers).kill()
+                kills += 1
+        found = end(process)
+        if found.code != 0:  # a task may have lost its worker too often: the same command continues
+            found.assert_sentence()
+        finish(recipe, out, undisturbed)
+
+
+def test_killed_schedulers(recipe, undisturbed, tmp_path):
+    seeded, out, kills = random.Random(3), tmp_path / "0", 0
+    while kills < KILLS:
+        out.mkdir(exist_ok=True)
+        with cluster(tmp_path, kills) as (scheduler, file):
+            process = start(recipe, out, "--scheduler", str(file))
+            alive = wait_for_a_moment(process, out, seeded)
+            if alive:
+                scheduler.kill()
+                kills += 1
+            found = end(process)
+        if alive and found.code != 0:
+            found.assert_sentence()
+        elif not alive:
+            assert found.code == 0, found.stderr
+            assert hashes(recipe, out) == undisturbed[1]
+            out = tmp_path / str(kills)
+    finish(recipe, out, undisturbed)
+
+
+def test_killed_clients(recipe, undisturbed, tmp_path):
+    """Workers may still be at the tasks of a killed client when the next one hands them out again."""
+    seeded, out, kills = random.Random(4), tmp_path / "0", 0
+    with cluster(tmp_path, 0) as (_, file):
+        while kills < KILLS:
+            out.mkdir(exist_ok=True)
+            process = start(recipe, out, "--scheduler", str(file))
+            alive = wait_for_a_moment(process, out, seeded)
+            if alive:
+                process.kill()
+                kills += 1
+            found = end(process)
+            if not alive:
+                assert found.code == 0, found.stderr
+                assert hashes(recipe, out) == undisturbed[1]
+                out = tmp_path / str(kills)
+        finish(recipe, out, undisturbed, "--scheduler", str(file))
+
+
+def command(process):
+    try:
+        return " ".join(process.cmdline())
+    except psutil.NoSuchProcess:
+        return ""
+
+
+def psutil_children(process):
+    try:
+        return process.children()
+    except psutil.NoSuchProcess:
+        return []
