@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -105,9 +107,10 @@ def run(recipe, out, *arguments, **others):
 
 
 def hashes(recipe, out):
-    """Return the hash of every product but those with times in them, and of the manifest."""
+    """Return the hash of every product without times or a machine in it, and of the manifest."""
     tasks = [task for task in plan(load_recipe(recipe)) if not task.alone and task.stage != "report"]
-    files = [out / path for task in tasks for path in task.products] + sorted(out.glob("datasets/*/manifest.json"))
+    products = [out / path for task in tasks for path in task.products if not path.endswith(".machine.json")]
+    files = products + sorted(out.glob("datasets/*/manifest.json"))
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
@@ -127,3 +130,27 @@ def family(process):
         return psutil.Process(process.pid).children(recursive=True)
     except psutil.NoSuchProcess:
         return []
+
+
+@contextmanager
+def cluster(folder, number):
+    """A scheduler and two workers of their own; yields the scheduler's process and its file."""
+    file = folder / f"scheduler-{number}.json"
+    base, local = [sys.executable, "-m"], ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    quiet = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    scheduler = subprocess.Popen(
+        [*base, "distributed.cli.dask_scheduler", *local, "--scheduler-file", str(file)],
+        **quiet,
+    )
+    while not file.exists():
+        time.sleep(0.05)
+    worker = [*base, "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
+    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
+    try:
+        yield scheduler, file
+    finally:
+        for process in (*workers, scheduler):
+            children = family(process)
+            for one in (*children, process):
+                one.kill()
+            process.wait()

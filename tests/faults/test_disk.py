@@ -32,7 +32,7 @@ def test_a_full_disk_ends_a_run_and_the_next_one_continues(recipe, undisturbed, 
     found.assert_sentence()
     assert "No space left" in found.stderr
     assert_no_leftovers(out)
-    kept = {path for path in out.rglob("*.parquet")}
+    kept = set(out.rglob("*.parquet"))
     found = run(recipe, out)
     assert found.code == 0, found.stderr
     assert hashes(recipe, out) == undisturbed[1] and all(path.exists() for path in kept)

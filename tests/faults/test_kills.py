@@ -1,15 +1,12 @@
 """Kills at random moments: the same command continues, and the bytes are those of a run that nothing disturbs."""
 
 import random
-import subprocess
-import sys
 import time
-from contextlib import contextmanager
 
 import psutil
 import pytest
 
-from tests.faults.runs import ROOT, assert_no_leftovers, end, family, gone, hashes, run, start
+from tests.faults.runs import assert_no_leftovers, cluster, end, family, gone, hashes, run, start
 
 pytestmark = pytest.mark.faults
 
@@ -28,31 +25,6 @@ def wait_for_a_moment(process, out, random):
     while time.monotonic() < limit and process.poll() is None and sum(1 for _ in out.rglob("*")) < files:
         time.sleep(0.002)
     return process.poll() is None
-
-
-@contextmanager
-def cluster(folder, number):
-    """A scheduler and two workers of their own; yields the scheduler's process and its file."""
-    file = folder / f"scheduler-{number}.json"
-    base = [sys.executable, "-m"]
-    quiet = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-    scheduler = subprocess.Popen(
-        [*base, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-        + ["--scheduler-file", str(file)],
-        **quiet,
-    )
-    while not file.exists():
-        time.sleep(0.05)
-    worker = [*base, "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
-    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
-    try:
-        yield scheduler, file
-    finally:
-        for process in (*workers, scheduler):
-            children = family(process)
-            for one in (*children, process):
-                one.kill()
-            process.wait()
 
 
 def finish(recipe, out, undisturbed, *arguments):

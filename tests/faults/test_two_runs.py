@@ -4,8 +4,7 @@ import time
 
 import pytest
 
-from tests.faults.runs import assert_no_leftovers, end, hashes, run, start
-from tests.faults.test_kills import cluster
+from tests.faults.runs import assert_no_leftovers, cluster, end, hashes, run, start
 
 pytestmark = pytest.mark.faults
 
