@@ -16,6 +16,7 @@ from jobs.plan.task import Stage, Task
 from jobs.recipe.recipe import Recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile, entry_of
+from jobs.run.reasons import CHANGED, NEVER, reasons
 from jobs.run.receipt import Product
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
@@ -64,6 +65,7 @@ def faults(
         for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
             found += of_task
             seen((index + 1) / len(tasks))
+    found = _explained(found, tasks, ledger)
     bad = {Path(path).name for fault in found if fault.task for path in fault.task.products}
     for one in recipe.together:
         found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
@@ -177,6 +179,21 @@ def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[F
         yield Fault("outdated", where, f"it lists {len(listed.shards):,} of {len(done.shards):,} finished shards")
 
 
+def _explained(found: Sequence[Fault], tasks: Sequence[Task], ledger: Ledger) -> list[Fault]:
+    """Call the products of tasks that were run with another identity outdated, and name what has changed."""
+    if not any(fault.never_run or fault.kind == "outdated" for fault in found):
+        return list(found)
+    why, result = reasons(tasks, ledger), []
+    for fault in found:
+        reason = why.get(fault.task.id, NEVER) if fault.task else NEVER
+        if reason.startswith(CHANGED) and (fault.never_run or fault.kind == "outdated"):
+            fault = fault._replace(kind="outdated", why=f"it was made before; {reason}")
+        elif fault.never_run and reason != NEVER:
+            fault = fault._replace(why=f"{fault.why}; {reason}")
+        result.append(fault)
+    return result
+
+
 def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
     """Replace the faults of a stage none of whose tasks was run by one fault."""
     planned = Counter(task.stage for task in tasks)
@@ -191,6 +208,7 @@ def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
         elif stage is not None and stage not in told:
             told.add(stage)
             why = f"it does not exist, nor does any product of the {never[stage]:,} tasks of {stage}"
+            why += f"; {fault.why}" if fault.kind == "outdated" else ""
             result.append(fault._replace(why=why, tasks=never[stage]))
     return result
 

@@ -16,6 +16,9 @@ NEVER: Final = "never made"
 ELSEWHERE: Final = "taken from another data set"
 """Reason of a task that need not run: its products are in another data set, and a run links them."""
 
+CHANGED: Final = "changed: "
+"""Beginning of the reason of a task that was made before with another identity."""
+
 _MOST_KEYS: Final = 3  # that a reason names
 
 
@@ -55,7 +58,7 @@ def _changed(task: Task, before: Sequence[Receipt]) -> str:
     lists = [_differences(identity, now) for identity in known]
     changes = min(lists, key=len)
     more = f" and {len(changes) - _MOST_KEYS} more" if len(changes) > _MOST_KEYS else ""
-    return f"changed: {', '.join(changes[:_MOST_KEYS])}{more}"
+    return f"{CHANGED}{', '.join(changes[:_MOST_KEYS])}{more}"
 
 
 def _differences(before: Mapping[str, Leaf], now: Mapping[str, Leaf]) -> list[str]:

@@ -6,6 +6,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.faults import faults, is_leftover, own_files, task_faults
 from jobs.run.ledger import Ledger
 from jobs.verbs.bench import TRUTH, measured_alone
+from pipeline import versions
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT
 from pipeline.training.loop import ROWS
@@ -103,6 +104,22 @@ def test_damaged_records_that_no_task_writes_are_named(trade, tmp_path):
     machine_path(path).write_text(machine_path(path).read_text().replace('"threads": 1', '"threads": 9'))
     found = [fault for fault in faults(recipe, plan(recipe, measured_alone(ledger.out)), ledger) if not fault.task]
     assert kinds(found) == [("damaged", TRUTH)] and "`twillight bench truth`" in found[0].why
+
+
+def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
+    (tmp_path / "other.toml").write_text(RECIPE.format(name="other", train=128, more=""))
+    recipe = load_recipe(tmp_path / "other.toml")
+    with monkeypatch.context() as patch:
+        patch.setattr(versions, "TRAINING", versions.TRAINING - 1)
+        made_up.finished(tmp_path / "other.toml", tmp_path / "out")
+    tasks, ledger = plan(recipe), Ledger(tmp_path / "out")
+    found = {(fault.task.stage, fault.task.title): fault for fault in faults(recipe, tasks, ledger) if fault.task}
+    training = found["train", "neumip on denim"]
+    assert training.kind == "outdated" and training.why.startswith("it was made before; changed: versions.training")
+    assert found["report", "page of other"].kind == "outdated"
+    # What no network is part of is not touched by it.
+    assert {stage for stage, _ in found} == {"train", "bench", "report"}
+    assert len(found) < sum(task.stage != "generate" for task in tasks)
 
 
 def test_what_a_stopped_task_leaves_is_known_by_name():
