@@ -48,7 +48,7 @@ class Receipt(BaseModel):
     identity: dict[str, Leaf] = {}
     """What the task depended on, by dotted key (`leaves`); it says later which key has changed."""
     checksum: str = ""
-    """Hash of the rest; receipts of earlier versions have none."""
+    """Hash of the rest; receipts of earlier versions have none, and their bytes may be of another form."""
 
     def encoded(self) -> bytes:
         """Return the bytes of its file."""
@@ -58,9 +58,9 @@ class Receipt(BaseModel):
         """Return it with the hash of the rest."""
         return self.model_copy(update={"checksum": self._hash()})
 
-    def is_whole(self) -> bool:
-        """Return whether its hash, if it has one, is that of the rest."""
-        return "checksum" not in self.model_fields_set or self.checksum == self._hash()
+    def is_content_of(self, file: bytes) -> bool:
+        """Return whether a file's bytes are those that were written, as far as it has a hash."""
+        return "checksum" not in self.model_fields_set or (file == self.encoded() and self.checksum == self._hash())
 
     def _hash(self) -> str:
         return hashlib.sha256(self._encoded("checksum")).hexdigest()[:_CHECKSUM_DIGITS]
@@ -92,9 +92,7 @@ def read_receipt(path: Path, task: str) -> Receipt | None:
         receipt = Receipt.model_validate_json(content)
     except (OSError, BadInput, ValidationError, RecursionError):
         return None
-    if receipt is None or receipt.task != task or content != receipt.encoded() or not receipt.is_whole():
-        return None
-    return receipt
+    return receipt if receipt.task == task and receipt.is_content_of(content) else None
 
 
 def measure(path: Path) -> Product:

@@ -101,7 +101,8 @@ def test_an_odd_receipt_counts_as_missing(done, change):
 
 
 def test_a_receipt_of_before_checksums_is_read(done):
-    rewrite(done, {})
+    rewrite(done, {"title": "rows 0–9", "identity": {"error": 1e-05}})
+    assert b"\\u2013" in (done.folder / f"{TASK.id}.json").read_bytes()
     assert done.state(TASK) == "done"
 
 

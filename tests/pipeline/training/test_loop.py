@@ -75,6 +75,22 @@ def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path):
     assert contents(half) == contents(whole)
 
 
+def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tmp_path):
+    whole, damaged = tmp_path / "whole", tmp_path / "damaged"
+    train(NEUMIP, SHORT, folder, FABRICS["neumip"], whole)
+    for place in (300, -1000):  # in what a checkpoint says of itself, in a tensor
+        with pytest.raises(Killed):
+            train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, killed_at(0.9))
+        for path in damaged.iterdir():
+            content = bytearray(path.read_bytes())
+            content[place] ^= 16
+            path.write_bytes(content)
+        assert read_checkpoint(damaged / CHECKPOINT) is None
+        shares = []
+        train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, shares.append)
+        assert shares[0] == pytest.approx(1 / 30) and contents(damaged) == contents(whole)
+
+
 @pytest.mark.parametrize("model", ["woven", "neumip"])
 def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
     """Held-out mean squared error against the variance of the truth, over all four components.
