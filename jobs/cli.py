@@ -6,6 +6,7 @@ SIGTERM, 129 SIGHUP. A verb's modules are imported when it runs, so that help is
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import shlex
@@ -43,6 +44,9 @@ RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or 
 Out = Annotated[Path, Parameter(help="Folder of all products.")]
 
 OUT = Path("out")
+
+_NAMES = {errno.ENAMETOOLONG, errno.ELOOP}
+"""Errors of looking for a file that show a path as one that no file can have."""
 
 _CONTINUES = "finished work is kept, and the same command continues"
 
@@ -394,6 +398,8 @@ def main(tokens: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in _NAMES:
+            return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
         saved = _save_crash(tokens, traceback.format_exc())
         return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
 

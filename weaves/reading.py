@@ -57,7 +57,7 @@ def read_bytes(path: Path, most: int, needed: str) -> bytes:
             if not stat.S_ISREG(found.st_mode):
                 raise BadInput(where, "", f"is {kind(found.st_mode)}", f"{needed} is needed")
             content = file.read(most + 1) if found.st_size <= most else b""
-    except FileNotFoundError:
+    except (FileNotFoundError, BadInput):
         raise
     except OSError as error:
         raise BadInput(where, "", error.strerror or "not readable", f"{needed} that can be read is needed") from error

@@ -35,35 +35,41 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     BadInput
-        If the file is missing, no regular file, larger than `MOST_TEXT`, not UTF-8, not TOML (naming the line), or
-        nested more deeply than `MOST_DEPTH`.
+        If the file is missing, no regular file, larger than `MOST_TEXT`, not UTF-8, or as `parse_toml`.
     """
-    where = str(path)
     try:
         text = read_text(path, MOST_TEXT, "a TOML file")
-        if _LONG_KEY.search(text):
-            raise BadInput(where, "", "nested too deeply", f"a key has at most {MOST_DEPTH} parts")
-        content = tomllib.loads(text)
-    except BadInput:
-        raise
     except FileNotFoundError as error:
-        raise BadInput(where, "", "no such file", "the path of a TOML file is needed") from error
+        raise BadInput(str(path), "", "no such file", "the path of a TOML file is needed") from error
+    return parse_toml(text, str(path))
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Return the content of a TOML text of bounded length.
+
+    Raises
+    ------
+    BadInput
+        If it is no TOML (naming the line), nested more deeply than `MOST_DEPTH`, or has integers beyond 64 bits.
+    """
+    allowed = f"at most {MOST_DEPTH} levels are allowed"
+    if _LONG_KEY.search(text):
+        raise BadInput(where, "", "nested too deeply", allowed)
+    try:
+        content = tomllib.loads(text)
     except RecursionError as error:
-        raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed") from error
+        raise BadInput(where, "", "nested too deeply", allowed) from error
     except ValueError as error:  # TOMLDecodeError, numbers of absurd length
         raise BadInput(where, "", "broken TOML", one_line(error)) from error
-    if _depth(content) > MOST_DEPTH:
-        raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed")
-    return content
-
-
-def _depth(content: object) -> int:
-    """Return how many tables and lists are inside one another; counting stops beyond `MOST_DEPTH`."""
-    level, depth = [content], 0
-    while level and depth <= MOST_DEPTH:
+    level, depth = list[Any]([content]), 0
+    while level:
+        if bits := next((one.bit_length() for one in level if isinstance(one, int) and one.bit_length() > 64), 0):
+            raise BadInput(where, "", f"an integer of {bits:,} bits", "TOML has integers of 64 bits")
         inside = [one.values() if isinstance(one, dict) else one for one in level if isinstance(one, dict | list)]
         level, depth = [item for items in inside for item in items], depth + bool(inside)
-    return depth
+        if depth > MOST_DEPTH:
+            raise BadInput(where, "", "nested too deeply", allowed)
+    return content
 
 
 def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:

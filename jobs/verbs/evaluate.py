@@ -9,6 +9,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from jobs.console import number, table_of
+from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import Terminal
 from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
@@ -59,8 +60,8 @@ def evaluate(
     BadInput
         As `pipeline.shards.evaluate.evaluate_file`, and if the seed or the number of threads cannot be used.
     """
-    if workers < 0:
-        raise BadInput(WHERE, "--workers", workers, "must be 0 (one per core) or more")
+    if not 0 <= workers <= MOST_WORKERS:
+        raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
     if not 0 <= seed < 2**64:
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
     console = Terminal(stderr=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,8 @@ from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
 from weaves.fabric import Fabric
+from weaves.reading import MOST_TEXT
+from weaves.validation import parse_toml
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -173,8 +174,8 @@ def _options(changes: Iterable[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for change in changes:
         try:
-            found |= tomllib.loads(change)
-        except ValueError as error:
+            found |= parse_toml(change[:MOST_TEXT], "require")
+        except BadInput as error:
             raise BadInput("require", "--set", change, "must be KEY=VALUE as in TOML, such as hidden=64") from error
     return found
 

@@ -1,0 +1,464 @@
+"""A listed set of bad inputs: each ends with exit code 1 or 2 and one short sentence, in little time and memory."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import tomllib
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import tomli_w
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from jobs.cli import main
+from jobs.recipe.load import load_recipe
+from pipeline.scenes.catalogue import load_scene
+from reports.record import Record, this_machine, write_records
+from weaves.errors import MOST_LETTERS, BadInput
+
+SECONDS = 60  # a pipe that is opened would wait for ever
+MEMORY = 1 << 30
+
+# A place for every subject of the command line that is a file, or a folder of files, from outside; {} is the subject.
+FILES = {
+    "fabric": ["show {}.toml", "export {}.toml --mesh a.ply", "evaluate {}.toml good.parquet --out a.parquet"],
+    "recipe": [
+        f"{verb} {{}}.toml" for verb in ["plan", "generate", "train", "bench", "report", "run", "status", "results"]
+    ],
+    "either": ["check {}.toml"],
+    "scene": ["plan names_xml.toml", "savings smoke {}.xml"],
+    "described scene": ["plan names_toml.toml", "savings smoke {}.toml"],
+    "queries": ["evaluate denim {}.parquet --out a.parquet"],
+    "records": ["compare {}.json good.json", "compare good.json {}.json"],
+    "markdown": ["results smoke --readme {}.md"],
+    "scheduler": ["generate smoke --scheduler {}.json"],
+}
+SUFFIX = {"scene": ".xml", "queries": ".parquet", "records": ".json", "markdown": ".md", "scheduler": ".json"}
+
+
+def _link(target):
+    return lambda path: path.symlink_to(target)
+
+
+def _text(text):
+    return lambda path: path.write_bytes(text.encode() if isinstance(text, str) else text)
+
+
+def _huge(path):
+    with path.open("wb") as file:
+        file.truncate(10**8 if path.suffix == ".toml" else 10**11)
+
+
+KINDS = {
+    "missing": lambda path: None,
+    "folder": lambda path: path.mkdir(),
+    "pipe": os.mkfifo,
+    "device": _link("/dev/zero"),
+    "circle": lambda path: path.symlink_to(path),
+    "dangling": _link("nowhere"),
+    "empty": _text(""),
+    "huge": _huge,
+    "zeros": _text(b"\0" * 1000),
+    "random": _text(np.random.default_rng(0).bytes(1000)),
+    "latin-1": _text('name = "caf\xe9"'.encode("latin-1")),
+    "brackets": _text("[" * 20_000),
+    "dotted": _text("a." * 100_000 + "b = 1"),
+    "quoted dots": _text('"a\\""."b".' * 10_000 + "c = 1"),
+    "tables": _text("a = " + "{a = " * 20_000),
+    "large integer": _text("a = 0x" + "f" * 200_000),
+    "digits": _text("a = " + "1" * 200_000),
+    "escapes": _text('name = "\\u001b[31m"\n[draft]\nfamily = "\\u009b2J"\n[dataset]\nseen = ["\\u001b]0;x\\u0007"]\n'),
+    "unknown keys": _text("\n".join(f"key_{index} = {index}" for index in range(15_000))),
+    "json": _text('{"name": ' + '{"a": ' * 2000 + "1" + "}" * 2001),
+}
+
+RECIPE = {
+    "name": '"x"',
+    "dataset.seen": '["denim"]',
+    "dataset.shard_rows": "256",
+    "dataset.seed": "0",
+    "dataset.unseen": "[]",
+    "dataset.rows.train": "256",
+    "dataset.rows.test": "256",
+    "dataset.population.count": "0",
+    "dataset.queries.sigma": "[0.1, 1.0]",
+    "dataset.truth.max_count": "4096",
+    "dataset.truth.relative_error": "0.1",
+    "dataset.truth.estimator": '"auto"',
+    "bench.frames": "3",
+    "bench.timing_rows": "64",
+    "bench.threads": "[1]",
+    "bench.scenes.names": "[]",
+}
+FABRIC = {
+    "name": '"x"',
+    "source": '""',
+    "optical_thickness": "2.0",
+    "draft.family": '"twill"',
+    "draft.over": "[2]",
+    "draft.under": "[2]",
+    "warp.bend": "20.0",
+    "warp.roughness": "0.3",
+    "warp.diffuse": '"#804020"',
+    "weft.bend": "20.0",
+    "weft.roughness": "0.3",
+}
+SCENE = {"name": '"x"', "source": '"good.xml"', "frames": "3", "step": "[0.0, 0.0, 0.0]"}
+
+VALUES = [
+    "9223372036854775808",
+    "-1",
+    "0x" + "f" * 5000,
+    "1e999",
+    "nan",
+    "1979-05-27",
+    '"\\u001b[2J\\u0007"',
+    '"' + "long " * 2000 + '"',
+    "[" + "1, " * 5000 + "]",
+    "{ a = { b = 1 } }",
+]
+"""Values that none of the keys allows."""
+
+SINGLE = [
+    ({"dataset.rows.train": "10000000000"}, "recipe"),
+    ({"dataset.rows.test": "64000001"}, "recipe"),
+    ({"dataset.population.count": "100001"}, "recipe"),
+    ({"dataset.truth.max_count": str(2**62)}, "recipe"),
+    ({"dataset.truth.max_count": "100"}, "recipe"),
+    ({"dataset.queries.sigma": "[1.0, 0.1]"}, "recipe"),
+    ({"dataset.seen": '["denim", "denim"]'}, "recipe"),
+    ({"dataset.seen": '["../../../etc/passwd"]'}, "recipe"),
+    ({"dataset.seen": '["x\\u0000.toml"]'}, "recipe"),
+    ({"dataset.seen": f'["{"a" * 300}.toml"]'}, "recipe"),
+    ({"name": '"../x"'}, "recipe"),
+    ({"name": f'"{"x" * 61}"'}, "recipe"),
+    ({"bench.scenes.names": f'["{"a" * 300}.xml"]'}, "recipe"),
+    ({"bench.scenes.names": '["pipe.xml"]'}, "recipe"),
+    ({"source": '"pipe.xml"'}, "described scene"),
+    ({"source": f'"{"a" * 5000}"'}, "described scene"),
+    ({"source": '"a\\u0000.xml"'}, "described scene"),
+    ({"draft.over": "[" + "100, " * 300 + "]"}, "fabric"),
+    ({"draft.over": "[128]", "draft.under": "[128]"}, "fabric"),
+]
+
+COMMANDS = f"""
+plna smoke
+plan
+plan smoke smoke
+plan {"a" * 300}
+plan {"a" * 300}.toml
+plan {"a/" * 3000}b.toml
+plan {"/".join(["a" * 200] * 10)}.toml
+show {"a" * 100_000}
+show \x1b[31m
+show \x1b[31m.toml
+show \udcff.toml
+check \x1b]0;title\x07
+check nothing
+generate smoke --workers -3
+generate smoke --workers 1000000
+generate smoke --workers {2**63}
+generate smoke --workers {"9" * 5000}
+generate smoke --workers two
+generate smoke --workrs 2
+generate smoke --out {"o" * 300}
+generate smoke --out {"/".join(["o" * 200] * 30)}
+generate smoke --out good.json
+generate smoke --out good.json/below
+generate smoke --out /dev/null
+generate smoke --out pipe.xml
+generate smoke --out /proc/nothing
+generate smoke --scheduler tcp//nowhere
+generate smoke --scheduler tcp://127.0.0.1:1
+generate smoke --scheduler tcp://127.0.0.1:99999999
+generate smoke --scheduler {"a" * 5000}
+generate smoke --scheduler \x1b[2J
+generate smoke --scheduler good.json
+generate smoke --scheduler tls://127.0.0.1:1 --tls-ca nothing.pem
+generate smoke --scheduler tls://127.0.0.1:1 --tls-ca good.json
+generate smoke --scheduler tls://127.0.0.1:1 --tls-ca good.json --tls-key good.json --tls-certificate good.json
+train smoke
+bench smoke
+report smoke
+bench truth --workers 2
+bench stability --scheduler tcp://127.0.0.1:1
+status smoke --nothing
+results smoke
+results smoke --out good.json
+results smoke --readme nothing.md
+compare nothing nothing
+compare . .
+compare good.json good.json
+require nothing
+require sphere --recipe nothing
+require sphere --error nan
+require sphere --error -1
+require sphere --time 0
+require sphere --frames 0
+require sphere --frames -{2**63}
+require sphere --margin 0.5
+require sphere --margin nan
+require sphere --effort 0
+require sphere --effort nan
+require sphere --method nothing
+require sphere --set hidden
+require sphere --set =
+require sphere --set {"a." * 1000}b=1
+require sphere --set a=0x{"f" * 5000}
+require sphere --set a={"[" * 5000}
+require sphere --recipe smoke
+require {"s" * 300}.xml
+savings smoke nothing
+savings smoke
+savings smoke sphere
+export denim
+export denim --mesh a.txt
+export denim --mesh a.ply --vertices 1
+export denim --mesh a.ply --vertices -5
+export denim --mesh a.ply --vertices 1000000
+export denim --mesh a.ply --vertices {10**30}
+export denim --mesh a.ply --repeats 0
+export denim --mesh a.ply --repeats {10**30}
+export denim --mesh {"m" * 300}.ply --vertices 2
+export denim --mesh good.json/a.ply --vertices 2
+export denim --mesh folder.ply --vertices 2
+evaluate denim
+evaluate denim nothing.parquet --out a.parquet
+evaluate denim good.parquet --out a.parquet --estimator nothing
+evaluate denim good.parquet --out a.parquet --max-count {2**63}
+evaluate denim good.parquet --out a.parquet --max-count 100
+evaluate denim good.parquet --out a.parquet --relative-error nan
+evaluate denim good.parquet --out a.parquet --relative-error 2
+evaluate denim good.parquet --out a.parquet --absolute-error -1
+evaluate denim good.parquet --out a.parquet --footprint round
+evaluate denim good.parquet --out a.parquet --frame upright
+evaluate denim good.parquet --out a.parquet --seed -1
+evaluate denim good.parquet --out a.parquet --seed {2**64}
+evaluate denim good.parquet --out a.parquet --workers -1
+evaluate denim good.parquet --out a.parquet --workers 1000000
+evaluate denim good.parquet --out {"a" * 300}.parquet
+evaluate denim good.parquet --out good.json/a.parquet
+evaluate denim good.parquet --out folder.ply
+evaluate denim good.parquet --out good.parquet
+evaluate denim good.parquet --out a.parquet --model nothing
+evaluate denim good.parquet --out a.parquet --model {"a" * 5000}
+evaluate denim good.parquet --out a.parquet --model .
+evaluate denim good.parquet --out a.parquet --model selvage --seed 1
+evaluate nothing good.parquet --out a.parquet
+show denim --out good.json
+show denim --out {"a" * 300}
+""".strip().splitlines()
+
+CONTENTS = [
+    "",
+    "{",
+    "[]",
+    "{}",
+    "null",
+    "3",
+    '"text"',
+    "NaN",
+    "[" * 100_000,
+    "[" + "0," * 100_000 + "0]",
+    "[" + "{}," * 100_000 + "{}]",
+    '{"a": ' * 900 + "1" + "}" * 900,
+    json.dumps({f"key {index}": 0 for index in range(100_000)}),
+    '{"name": "\\u001b[2J", "\\u001b[31m": 1}',
+    "9" * 10_000,
+]
+"""Contents of a file of JSON that none of the readers takes."""
+
+FOLDERS = {
+    "manifest.json": "check broken",
+    "card.json": "evaluate denim good.parquet --out a.parquet --model broken",
+    "report/smoke/records.json": "compare broken broken",
+    "report/smoke/records.machine.json": "compare broken broken",
+}
+"""Files that are read from a folder, and a command that reads them."""
+
+
+def write(path, base, change):
+    """Write a TOML file of dotted keys with some of them changed."""
+    lines = [f"{key} = {value}" for key, value in (base | change).items()]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def cases():
+    """Yield a name, what makes the files, and the command, of every bad input."""
+    for subject, commands in FILES.items():
+        for kind, command in product(KINDS, commands):
+            suffix = SUFFIX.get(subject, ".toml")
+            yield (
+                f"{command.format(kind)}, {kind}",
+                lambda kind=kind, suffix=suffix: KINDS[kind](Path(f"bad{suffix}")),
+                command,
+            )
+    bases = {"recipe": (RECIPE, "plan {}.toml"), "fabric": (FABRIC, "show {}.toml")}
+    bases["described scene"] = (SCENE, "plan names_toml.toml")
+    for subject, (base, command) in bases.items():
+        for key, (index, value) in product(base, enumerate(VALUES)):
+            if (key, index) not in ALLOWED:
+                make = lambda base=base, key=key, value=value: write(Path("bad.toml"), base, {key: value})  # noqa: E731
+                yield f"{subject} {key} {index}", make, command
+        for index, (change, of) in enumerate(SINGLE):
+            if of == subject:
+                make = lambda base=base, change=change: write(Path("bad.toml"), base, change)  # noqa: E731
+                yield f"{subject} {index}", make, command
+    for (name, command), (index, content) in product(FOLDERS.items(), enumerate(CONTENTS)):
+        yield f"{name} {index}", lambda name=name, content=content: put(name, content), command
+    for index, command in enumerate(COMMANDS):
+        yield f"{index} {command[:60]}", lambda: None, command
+
+
+ALLOWED = {("source", 6), ("source", 7)}
+"""Keys and values that are no bad input after all: what a fabric's `source` says is free, up to its length."""
+
+
+def put(name, content):
+    """Write a file below the folder `broken`, and the others that its reader needs."""
+    path = Path("broken", name)
+    path.parent.mkdir(parents=True)
+    if name == "report/smoke/records.machine.json":
+        path.with_name("records.json").write_text('[{"method": "a"}]')
+    path.write_text(content)
+
+
+def surroundings():
+    """Write the good files that commands name."""
+    Path("good.json").write_text('[{"method": "a"}]')
+    Path("good.xml").write_text("<scene/>")
+    Path("folder.ply").mkdir()
+    os.mkfifo("pipe.xml")
+    for suffix in (".xml", ".toml"):
+        write(Path(f"names_{suffix[1:]}.toml"), RECIPE, {"bench.scenes.names": f'["bad{suffix}"]'})
+    page = Path("out/report/smoke")
+    page.mkdir(parents=True)
+    write_records(page / "records.json", [Record(method="a")], this_machine(1))
+    query = {
+        "u": 0.5,
+        "v": 0.5,
+        "sigma": 0.5,
+        "wi_x": 0.0,
+        "wi_y": 0.0,
+        "wi_z": 1.0,
+        "wo_x": 0.0,
+        "wo_y": 0.0,
+        "wo_z": 1.0,
+    }
+    pq.write_table(pa.table({name: pa.array([value], pa.float32()) for name, value in query.items()}), "good.parquet")
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    surroundings()
+
+
+CASES = {f"{index} {name}": (make, command) for index, (name, make, command) in enumerate(cases())}
+
+
+def faults(code, sentence, shown):
+    """Return what is wrong with the end of a command."""
+    lines = sentence.splitlines()
+    found = [] if code in (1, 2) else [f"exit code {code}"]
+    found += [] if len(lines) == 1 else [f"{len(lines)} lines on stderr"]
+    found += [f"{len(line)} letters" for line in lines if len(line) > MOST_LETTERS]
+    found += ["control characters"] if not (sentence + shown).replace("\n", "").isprintable() else []
+    return found + [word for word in ("Traceback", "this is a bug") if word in sentence]
+
+
+def test_at_least_three_hundred_are_listed():
+    assert len(CASES) >= 300
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_bad_input_ends_with_one_sentence(case, place, capsys):
+    make, command = CASES[case]
+    make()
+    signal.signal(signal.SIGALRM, _late)
+    signal.alarm(SECONDS)
+    try:
+        code = main(command.format("bad").split(" "))
+    finally:
+        signal.alarm(0)
+    captured = capsys.readouterr()
+    assert not faults(code, captured.err, captured.out), (code, captured.err)
+
+
+def _late(number, frame):
+    raise AssertionError(f"it takes more than {SECONDS} s")
+
+
+LARGE = [name for name in CASES if any(word in name for word in ("huge", "device", "dots", "brackets", "unknown keys"))]
+LARGE += [name for name in CASES if ".json 8" in name or ".json 9" in name or ".json 10" in name or ".json 12" in name]
+
+
+@pytest.mark.slow
+def test_the_largest_ones_take_less_than_a_gigabyte():
+    # In a process of its own, so that nothing else counts.
+    program = "import sys; from tests.jobs.test_bad_inputs import alone; sys.exit(alone())"
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        check=False,
+    )
+    assert ended.returncode == 0
+
+
+def alone():
+    """Run the largest bad inputs in this process; return 0 if it never took as much memory as is allowed."""
+    resource.setrlimit(resource.RLIMIT_DATA, (4 * MEMORY, 4 * MEMORY))
+    with tempfile.TemporaryDirectory() as folder:
+        for index, name in enumerate(LARGE):
+            place = Path(folder, str(index))
+            place.mkdir()
+            os.chdir(place)
+            surroundings()
+            CASES[name][0]()
+            main(CASES[name][1].format("bad").split(" "))
+        os.chdir("/")
+    return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY)
+
+
+values = st.recursive(
+    st.one_of(st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(), st.text(max_size=20)),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=8), inner, max_size=3)),
+    max_leaves=5,
+)
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.sampled_from([*RECIPE, "models", "bench", "dataset", "dataset.truth.nothing"]), values)
+def test_a_recipe_with_any_value_at_any_key_is_a_recipe_or_one_sentence(place, key, value):
+    table = tomllib.loads("\n".join(f"{name} = {text}" for name, text in RECIPE.items()))
+    inner = table
+    *parents, last = key.split(".")
+    for parent in parents:
+        inner = inner[parent]
+    inner[last] = value
+    Path("any.toml").write_text(tomli_w.dumps(table), encoding="utf-8", errors="surrogatepass")
+    try:
+        assert load_recipe("any.toml").fabrics
+    except BadInput as refused:
+        assert not faults(2, str(refused), "")
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.sampled_from([*SCENE, "cloths", "cloths.denim"]), values)
+def test_a_scene_with_any_value_at_any_key_is_a_scene_or_one_sentence(place, key, value):
+    table = tomllib.loads("\n".join(f"{name} = {text}" for name, text in SCENE.items()))
+    table |= {"cloths": {"denim": value}} if key == "cloths.denim" else {key: value}
+    Path("any.toml").write_text(tomli_w.dumps(table), encoding="utf-8", errors="surrogatepass")
+    try:
+        assert load_scene("any.toml").frames
+    except BadInput as refused:
+        assert not faults(2, str(refused), "")
