@@ -194,7 +194,9 @@ def check(
         from jobs.verbs.check_recipe import check_recipe
         from jobs.verbs.check_recipe import repair as repaired
 
-        return repaired(subject, out, on.connection(), on.workers) if repair else check_recipe(subject, out)
+        if repair:
+            return repaired(subject, out, on.connection(), on.workers, on.progress)
+        return check_recipe(subject, out)
     if repair:
         raise BadInput("check", "--repair", subject, "only the files of a recipe can be made again; name a recipe")
     if isinstance(found, Fabric):

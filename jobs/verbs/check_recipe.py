@@ -21,6 +21,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.cluster import Scheduler
 from jobs.run.faults import Fault, faults
 from jobs.run.ledger import Ledger
+from jobs.run.progress_forms import ProgressForm
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
 from jobs.verbs.run import work
@@ -42,7 +43,7 @@ def check_recipe(name: str, out: Path) -> int:
     return exit_code(found)
 
 
-def repair(name: str, out: Path, scheduler: Scheduler, workers: int) -> int:
+def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: ProgressForm = "auto") -> int:
     """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
 
     Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
@@ -72,7 +73,7 @@ def repair(name: str, out: Path, scheduler: Scheduler, workers: int) -> int:
     never = {stage for stage in never if _never(stage, found) == planned[stage]}
     if any(fault.kind != "foreign" for fault in found):
         if stages := [stage for stage in STAGES if stage not in never]:
-            work(name, stages, out, scheduler, workers)
+            work(name, stages, out, scheduler, workers, progress)
         found = _found(name, out)[1]
         if found:
             print_line("what is left:")
