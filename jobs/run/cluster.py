@@ -145,6 +145,9 @@ def _local(workers: int) -> Iterator[Any]:
         "distributed.nanny.pre-spawn-environ": ONE_THREAD,
         # A worker that is replaced slowly, or dies again, is not given up: its supervisor always starts another.
         "distributed.deploy.lost-worker-timeout": "1000 days",
+        # Its servers of web pages, which know no TLS, have no pages: other users would read names of tasks there.
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
     }
     with dask.config.set(settings):
         try:

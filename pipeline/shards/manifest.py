@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, FailFast, ValidationError
+from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError
 
 from pipeline.atomic import atomic_write
 from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
@@ -39,7 +39,7 @@ class ShardEntry(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
-    file: str
+    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,80}\.parquet$")]
     """Name within the data set's folder."""
     fabric: str
     """Name of the fabric of all its rows."""

@@ -7,8 +7,11 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
+from itertools import product
 from pathlib import Path
 
+import psutil
 import pytest
 from distributed import Client, LocalCluster
 from rich.console import Console
@@ -256,6 +259,23 @@ def test_a_stranger_gets_no_answer_from_the_cluster_on_this_machine():
         assert done.stdout.split() == ["refused"] * 12, done.stderr
         # And the run's own client still works.
         assert client.submit(os.getpid).result() != os.getpid()
+
+
+def listening():
+    """Return the ports at which this process and those it started wait for others."""
+    driver = psutil.Process()
+    connections = [one for process in (driver, *driver.children(True)) for one in process.net_connections()]
+    return {one.laddr.port for one in connections if one.status == "LISTEN"}
+
+
+def test_the_ports_of_the_cluster_on_this_machine_have_no_web_pages():
+    before = listening()
+    with connected(HERE, 1, str):
+        ports = listening() - before
+        assert len(ports) >= 4
+        for port, page in product(ports, ("", "health", "info/main/workers.html", "json/counts.json", "metrics")):
+            with pytest.raises(OSError):  # HTTPError is one
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
 
 
 def test_workers_that_cannot_start_are_no_bug(monkeypatch, fake, tmp_path):
