@@ -67,6 +67,8 @@ def check_dataset(folder: Path) -> list[str]:
         If the folder has no manifest.
     """
     manifest = Manifest.load(folder)
+    if not manifest.shards:
+        return [f"{folder}: its manifest lists no shards; run `twillight generate`"]
     console = Terminal(stderr=True)
     faults = []
     for entry in track(manifest.shards, "checking", console=console, disable=not console.is_terminal):

@@ -64,10 +64,6 @@ def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: P
         _print(found, out)
         for fault in found:
             _remove(fault, ledger)
-        again = {fault.task.id for fault in found if fault.task}
-        if any(task.alone and task.id in again for task in tasks):
-            for page in (task for task in tasks if isinstance(task, Page)):
-                (out / page.products[0]).unlink(missing_ok=True)
     planned = Counter(task.stage for task in tasks)
     never = {fault.task.stage for fault in found if fault.task and fault.never_run}
     never = {stage for stage in never if _never(stage, found) == planned[stage]}

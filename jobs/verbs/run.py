@@ -51,6 +51,8 @@ def work(
         manifests = [ManifestFile(one, shards(one), ledger) for one in recipe.together]
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
+        if "bench" in stages:
+            _withdraw_page(tasks, ledger)
 
         def recorded(task: Task, files: Mapping[str, Product]) -> None:
             for manifest in manifests:
@@ -86,6 +88,14 @@ def work(
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
         raise WorkFailed(f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}`")
+
+
+def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
+    """Remove a finished page if times that it shows will be measured again: they will not be the same."""
+    page = next(task for task in tasks if isinstance(task, Page))
+    timed = [task for task in tasks if task.alone and task.id in page.needs]
+    if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
+        (ledger.out / page.products[0]).unlink()
 
 
 def summary_of(records: Sequence[Path]) -> Any:

@@ -162,6 +162,12 @@ def test_check_finds_a_sound_data_set_sound(twillight, dataset):
     assert code == 0 and "1 shards with 100 rows are sound" in text
 
 
+def test_no_shards_are_not_sound(twillight, dataset):
+    Manifest.load(dataset).without({"part-a.parquet"}).save(dataset)
+    code, text, told = twillight("check", str(dataset))
+    assert code == 2 and "sound" not in text and "lists no shards" in told
+
+
 def test_check_tells_of_a_shard_cut_in_half(twillight, dataset):
     shard = dataset / "part-a.parquet"
     shard.write_bytes(shard.read_bytes()[: shard.stat().st_size // 2])

@@ -159,6 +159,17 @@ def test_a_measurement_of_time_is_taken_again_and_shown(run):
     assert found[page.products[0]] != expected[page.products[0]]
 
 
+def test_a_run_writes_the_page_again_if_times_are_missing(run, capsys):
+    timing, page = next(task for task in run.tasks if task.alone), run.of(Page)
+    before = (run.out / page.products[0]).read_bytes()
+    (run.out / timing.records).unlink()
+    command = [str(run.out.parent / "tiny.toml"), "--out", str(run.out)]
+    assert main(["bench", *command]) == 0 and not (run.out / page.products[0]).exists()
+    assert main(["report", *command]) == 0 and (run.out / page.products[0]).read_bytes() != before
+    capsys.readouterr()
+    assert run()[0] == 0
+
+
 def test_many_faults_are_counted(run):
     struck = [path for place in ("records/*", "models/*/*", "datasets/*/*.parquet") for path in run.out.glob(place)]
     for path in struck:
