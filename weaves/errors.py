@@ -40,7 +40,7 @@ class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
     def __init__(self, where: str, key: str, value: object, allowed: str) -> None:
         self.where, self.key, self.value, self.allowed = where, key, value, allowed
         place = one_line(where, _PART, keep="end")
-        subject = f"{one_line(key, _PART)} = {brief(value)}" if key else one_line(value, 2 * _PART)
+        subject = f"{one_line(key, _PART)} = {brief(value)}" if key else one_line(value, 180)
         super().__init__(one_line(f"{place}: {subject}: {allowed}"))
 
     def __reduce__(self) -> tuple[type[BadInput], tuple[str, str, object, str]]:

@@ -181,7 +181,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
         else:
             world = mi.load_dict(scene.source(mi), optimize=False)
     except (RuntimeError, TypeError, OSError) as error:
-        said = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error))
+        said = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)).replace(where, Path(where).name)
         raise BadInput(where, "", " ".join(said.split()), "a Mitsuba 3 scene that loads is needed") from error
     if not isinstance(world, mi.Scene):
         raise BadInput(where, "", type(world).__name__, 'a Mitsuba scene must have the type "scene"')

@@ -75,7 +75,7 @@ def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
         (["missing.parquet"], "missing.parquet: no such file"),
         (["file"], "file: not a whole Parquet file"),
         (["cut.parquet"], "cut.parquet: not a whole Parquet file"),
-        (["."], "not a whole Parquet file"),
+        (["."], "is a folder: a Parquet file is needed"),
         (["bad.parquet"], "row 4, column wi_x..z = [0.6, 0.0, 3.0]: must have unit length (1 more bad row;"),
         (["queries.parquet", "--out", "queries.parquet"], "must not be the file of the queries"),
         (["queries.parquet", "--out", "."], "is a folder"),
@@ -88,7 +88,7 @@ def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
         (["queries.parquet", "--max-count", "1000"], "must be a power of two"),
         (["queries.parquet", "--seed", "-1"], "--seed = -1: must be from 0"),
         (["queries.parquet", "--seed", "one"], "one"),
-        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be 0 (one per core) or more"),
+        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be from 0 (one per core) to 1024"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, tokens, said):

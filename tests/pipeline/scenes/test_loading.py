@@ -26,7 +26,7 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 MAP = '<texture type="bitmap" name="reflectance"><string name="filename" value="lost.png"/></texture>'
 
 BROKEN = {
-    "<scene": "Error parsing",
+    "<scene": "broken XML",
     BALL + CAMERA: "a scene needs a light",
     BALL + SUN: "a scene needs a camera",
     BALL + SUN + '<sensor type="thinlens"><float name="aperture_radius" value="0.1"/></sensor>': "must be perspective",
