@@ -40,8 +40,10 @@ class ManifestFile:
 
         The file grows with the data set, so it is not written for each shard: see `save`.
         """
-        if task.id in self._parts:
-            self._enter(self._parts[task.id], files)
+        part = self._parts.get(task.id)
+        # A shard may be needed in the folder of another recipe alone.
+        if part is not None and set(part.products) <= set(task.products):
+            self._enter(part, files)
             if time.monotonic() >= self._next:
                 self.save()
 
