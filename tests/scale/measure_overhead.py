@@ -1,0 +1,75 @@
+"""Measure which share of the workers' time is not spent in tasks while there is work for all of them.
+
+Command: ``PYTHONPATH=. python tests/scale/measure_overhead.py [--shards 16] [--workers 2] [--rows 8192]``
+
+Shards of the default size are generated on a cluster of this machine. Each task's own time is that of its receipt; the
+time of the workers is counted from the first start to the last start of a task, when every worker should be busy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import tempfile
+from pathlib import Path
+
+from rich.console import Console
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.recipe.recipe import DatasetOptions
+from jobs.run.compiling import compile_group, kernel_groups
+from jobs.run.executor import Preparation, execute
+from jobs.run.ledger import Ledger
+
+RECIPE = """
+name = "overhead"
+[dataset]
+seen = ["denim"]
+shard_rows = {rows}
+[dataset.rows]
+train = {train}
+validation = 64
+test = 64
+[[models]]
+model = "woven"
+"""
+
+
+def main() -> None:
+    """Generate the shards and print the share."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--shards", type=int, default=16)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rows", type=int, default=DatasetOptions.model_fields["shard_rows"].default)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        content = RECIPE.format(rows=options.rows, train=options.rows * options.shards)
+        (folder / "overhead.toml").write_text(content)
+        tasks = [task for task in plan(load_recipe(folder / "overhead.toml")) if " train " in task.title]
+        tasks = [task for task in tasks if task.stage == "generate"]
+        log = io.StringIO()
+        execute(
+            tasks,
+            folder,
+            workers=options.workers,
+            prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
+            console=Console(file=log),
+            progress="json",
+        )
+        ledger = Ledger(folder)
+        seconds = {task.id: ledger.seconds(task) for task in tasks}
+    events = [json.loads(line) for line in log.getvalue().splitlines()]
+    begins = {event["task"]: event["time"] for event in events if event["event"] == "begin"}
+    ends = {event["task"]: event["time"] for event in events if event["event"] == "end"}
+    first, last = min(begins.values()), max(begins.values())
+    busy = sum(seconds[id] if ends[id] <= last else last - begins[id] for id in seconds)
+    share = 1 - busy / (options.workers * (last - first))
+    mean = sum(seconds.values()) / len(seconds)
+    print(f"{len(tasks)} shards of {options.rows:,} rows, {mean:.1f} s each, {options.workers} workers: {share:.2%}")
+
+
+if __name__ == "__main__":
+    main()
