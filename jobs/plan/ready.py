@@ -38,21 +38,28 @@ class Ready:
         for task in tasks:
             self._wait(task)
 
-    def take(self, slots: int) -> list[Task]:
-        """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs."""
+    def take(self, slots: int, alone: bool = True) -> list[Task]:
+        """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs.
+
+        Without `alone`, only tasks that run beside others are returned.
+        """
         taken: list[Task] = []
         if self._one_alone in self._running:
             return taken
         while len(self._running) < slots and (task := self._pop(self._beside)):
             taken.append(task)
-        if slots > 0 and not self._running and (task := self._pop(self._alone)):
+        if alone and slots > 0 and not self._running and (task := self._pop(self._alone)):
             taken.append(task)
             self._one_alone = task.id
         return taken
 
+    def free(self, task: Task) -> None:
+        """Note that a started task has ended, so that its slot is free; `finish`, `fail` or `again` follows."""
+        self._running.pop(task.id, None)
+
     def finish(self, task: Task) -> None:
         """Note that a started task is done; what waited for it alone is now ready."""
-        del self._running[task.id]
+        self.free(task)
         self._done.add(task.id)
         for id in self._after.get(task.id, ()):
             if id in self._waiting:
@@ -62,11 +69,11 @@ class Ready:
 
     def fail(self, task: Task) -> None:
         """Note that a started task failed; what needs it stays waiting."""
-        del self._running[task.id]
+        self.free(task)
 
     def again(self, task: Task) -> None:
         """Put a started task back, to be started once more when its needs are done."""
-        del self._running[task.id]
+        self.free(task)
         self._wait(task)
 
     def reopen(self, task: Task) -> None:

@@ -226,14 +226,19 @@ class _Loop(NamedTuple):
                 if started:
                     continue  # damaged inputs are made first
                 break  # what is left waits for tasks that failed
-            for task, outcome in ended or self.dispatch.ended(_SECONDS_BETWEEN_LOOKS):
+            if not ended:
+                ended = self.dispatch.ended(_SECONDS_BETWEEN_LOOKS)
+                for task, _ in ended:
+                    self.book.ready.free(task)
+                self._start(alone=False)  # workers have something to do while receipts are written
+            for task, outcome in ended:
                 self._take(task, _verified(task, outcome, self.ledger.out))
             self.board.waiting_for(self.dispatch.running, workers=len(self.crew.accepted))
 
-    def _start(self) -> tuple[list[Task], list[tuple[Task, Outcome]]]:
+    def _start(self, alone: bool = True) -> tuple[list[Task], list[tuple[Task, Outcome]]]:
         """Start as many tasks as there are slots; return them, and the outcome of one that was done alone, here."""
         ready = self.book.ready
-        started = ready.take(self.crew.slots)
+        started = ready.take(self.crew.slots, alone)
         for task in started:
             if found := self.inputs.damaged(task):
                 self.book.reopen(found)

@@ -66,6 +66,9 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
         assert running
         task = random.choice(list(running.values()))
         del running[task.id]
+        if random.choice([True, False]):
+            ready.free(task)
+            assert task.id not in {other.id for other in ready.running}
         match random.choice(["finish", "finish", "again", "fail"]):
             case "finish":
                 ready.finish(task)
@@ -83,6 +86,21 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
                 waiting = {id: other for id, other in waiting.items() if id not in lost}
         assert {other.id for other in ready.running} == set(running)
         assert {other.id for other in ready.waiting} >= set(waiting)
+
+
+def test_a_free_slot_is_filled_before_the_task_that_ended_is_done():
+    first, other, alone = Step(name=1, seconds=9.0), Step(name=2), Alone(name=3)
+    after = Step(name=4, after=(first.id,))
+    ready = Ready([first, other, alone, after], [])
+    assert ready.take(1) == [first]
+    ready.free(first)
+    assert ready.take(1, alone=False) == [other]  # what needs the first still waits
+    ready.finish(first)
+    ready.free(other)
+    ready.fail(other)
+    assert ready.take(1, alone=False) == [after]
+    ready.finish(after)
+    assert ready.take(1, alone=False) == [] and ready.take(1) == [alone]
 
 
 def test_a_task_that_is_opened_again_comes_first_and_holds_back_what_needs_it():
