@@ -41,6 +41,7 @@ class Dispatch:
         self._running: dict[str, tuple[Task, Any]] = {}  # with its future, by key
         self._ended: SimpleQueue[str] = SimpleQueue()  # keys; filled by threads of dask's
         self._outcomes: dict[str, Outcome] = {}
+        self._begun: set[str] = set()
         self._number = 0
         client.subscribe_topic(self._topic, self._hear)
 
@@ -70,7 +71,8 @@ class Dispatch:
         for key in keys:
             if key not in self._running:
                 continue  # an outcome comes as a message, and its future ends
-            outcome = self._outcomes.pop(key, None) or _failure(self._running[key][1])
+            outcome = self._outcomes.pop(key, None) or _failure(self._running[key][1], key in self._begun)
+            self._begun.discard(key)
             found.append((self._running.pop(key)[0], outcome))
         return found
 
@@ -79,20 +81,30 @@ class Dispatch:
         return f"{_OUTCOMES}-{self._run}"
 
     def _hear(self, event: tuple[float, Any]) -> None:
-        """Take the outcome of a task from its worker: a message costs a tenth of a result that dask gathers."""
+        """Take the outcome of a task from its worker, or nothing: that it begins.
+
+        A message costs a tenth of a result that dask gathers.
+        """
         key, message = event[1]
+        if message is None:
+            self._begun.add(key)
+            return
         files = {name: Product(**product) for name, product in message.pop("files").items()}
         self._outcomes[key] = Outcome(files, **message)
         self._ended.put(key)
 
 
-def _failure(future: Any) -> Outcome:
-    """Return the outcome of a task that ended without a message."""
+def _failure(future: Any, begun: bool) -> Outcome:
+    """Return the outcome of a task that ended without a message.
+
+    Dask blames the death of a worker on all tasks that were with it; one that had not begun is innocent.
+    """
     from distributed import KilledWorker
 
     error = future.exception(timeout=LOOK)
     if isinstance(error, KilledWorker):
-        return Outcome({}, 0.0, KILLED)
+        innocent = "its worker died before it began"
+        return Outcome({}, 0.0, KILLED) if begun else Outcome({}, 0.0, innocent, refused=True)
     error = error or RuntimeError("its worker sent no outcome")
     return Outcome({}, 0.0, one_line(error), "".join(traceback.format_exception(error)))
 
@@ -109,6 +121,7 @@ def _work(task: Task, out: str, topic: str, expected: str) -> None:
             worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
             last = now
 
+    worker.log_event(topic, (worker.get_current_task(), None))
     if expected and expected != _digest():
         outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
     else:

@@ -5,10 +5,10 @@ only the tasks under way. A worker that dies is replaced and its task given to a
 The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again, and a
 task that fails is tried once more if an input turns out to be damaged. Else a task that ends with an unexpected
 exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
-On this machine one task a core is handed out at a time: dask, which cannot know how long a task takes, would park
-short ones behind a training. A task that measures time runs in a process of its own (`jobs.run.alone`) while the
-workers have nothing to do; with `--scheduler` it runs in a worker, because the driver's machine may not be the one to
-measure.
+On this machine one task a core is handed out at a time, and while only shards are made one more: dask, which cannot
+know how long a task takes, would park short ones behind a training. A task that measures time runs in a process of its
+own (`jobs.run.alone`) while the workers have nothing to do; with `--scheduler` it runs in a worker, because the
+driver's machine may not be the one to measure.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ class _Book:
             self._board.add(task)
 
     def try_again(self, task: Task, outcome: Outcome) -> bool:
-        """Put a task back if it failed by an exception that may not occur again, or its worker was refused."""
+        """Put a task back if it failed by an exception that may not occur again, or never began."""
         if not outcome.traceback and not outcome.refused:
             return False
         tried = self.failed_on.setdefault(task.id, [])
@@ -238,7 +238,7 @@ class _Loop(NamedTuple):
     def _start(self, alone: bool = True) -> tuple[list[Task], list[tuple[Task, Outcome]]]:
         """Start as many tasks as there are slots; return them, and the outcome of one that was done alone, here."""
         ready = self.book.ready
-        started = ready.take(self.crew.slots, alone)
+        started = ready.take(self.crew.slots, alone, self.crew.spare)
         for task in started:
             if found := self.inputs.damaged(task):
                 self.book.reopen(found)

@@ -31,7 +31,7 @@ class Outcome(NamedTuple):
     worker : str
         Address of the worker; empty if it is not known.
     refused : bool
-        True if the worker's software is not the driver's, so that nothing was computed.
+        True if nothing was computed: the worker's software is not the driver's, or the worker died before.
     """
 
     files: dict[str, Product]

@@ -65,6 +65,11 @@ class Workers:
         return 2 * self.threads + 2 if self._external else self.threads
 
     @property
+    def spare(self) -> int:
+        """Shards that may wait at the workers of this machine, one a thread: who is free starts one at once."""
+        return 0 if self._external else self.threads
+
+    @property
     def threads(self) -> int:
         """Threads of the workers that may get tasks; 1 if there is none."""
         return max(1, sum(self._threads[address] for address in self.accepted))
@@ -78,8 +83,8 @@ class Workers:
         return {"workers": preferred, "allow_other_workers": True}
 
     def recheck(self, address: str) -> None:
-        """Check a worker again that did not accept a task."""
-        if not self._checked.get(address):
+        """Check a worker again that did not accept a task, or look for another one."""
+        if self._external and not self._checked.get(address):
             self._checked.pop(address, None)
             self.look(now=True)
 

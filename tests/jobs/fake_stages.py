@@ -54,7 +54,7 @@ class Fake(Task):
         for step in range(10):
             time.sleep(self.seconds / 10)
             progress(step / 10)
-        if self.dies and not (out / f"{self.name}.died").exists():
+        if self.dies and (self.always or not (out / f"{self.name}.died").exists()):
             (out / f"{self.name}.died").touch()
             os.kill(os.getpid(), signal.SIGKILL)
         if self.damages and (self.always or not (out / f"{self.name}.damaged").exists()):

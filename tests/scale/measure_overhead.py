@@ -62,10 +62,10 @@ def main() -> None:
         ledger = Ledger(folder)
         seconds = {task.id: ledger.seconds(task) for task in tasks}
     events = [json.loads(line) for line in log.getvalue().splitlines()]
-    begins = {event["task"]: event["time"] for event in events if event["event"] == "begin"}
     ends = {event["task"]: event["time"] for event in events if event["event"] == "end"}
-    first, last = min(begins.values()), max(begins.values())
-    busy = sum(seconds[id] if ends[id] <= last else last - begins[id] for id in seconds)
+    starts = {id: ends[id] - seconds[id] for id in seconds}
+    first, last = min(starts.values()), max(starts.values())
+    busy = sum(min(ends[id], last) - starts[id] for id in seconds)
     share = 1 - busy / (options.workers * (last - first))
     mean = sum(seconds.values()) / len(seconds)
     print(f"{len(tasks)} shards of {options.rows:,} rows, {mean:.1f} s each, {options.workers} workers: {share:.2%}")

@@ -93,6 +93,15 @@ def test_a_killed_worker_costs_one_retry(tmp_path, fake):
     assert starts.count("victim") == 2
 
 
+def test_a_task_that_kills_every_worker_fails_alone(tmp_path, fake):
+    """The shards that wait at its worker die with it each time, and are done nevertheless."""
+    killer = fake.task("killer", dies=True, always=True)
+    tasks = [killer, *(fake.task(f"shard {index}") for index in range(2))]
+    summary = execute(tasks, tmp_path, workers=1, console=quiet())
+    assert summary.failed == [killer] and len(summary.ran) == 2
+    assert "is there enough memory" in Ledger(tmp_path).reason(killer)
+
+
 def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path, fake):
     """By default dask never replaces a worker that is not back when its time is over, and the run stands still."""
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "50ms"}):
