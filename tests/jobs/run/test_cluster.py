@@ -193,7 +193,7 @@ def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypa
     tasks = [*shards, fake.task("net", fake.FakeTraining, needs=shards)]
     seen = []
     with LocalCluster(
-        n_workers=0, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+        n_workers=0, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0", silence_logs=50
     ) as cluster:
         adaptive = cluster.adapt(minimum=0, maximum=3, interval="100ms", wait_count=2, target_duration="300ms")
 
