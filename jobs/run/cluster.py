@@ -11,8 +11,10 @@ import logging
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any, Final, NamedTuple
+from urllib.request import ProxyHandler, build_opener
 
 from jobs.run.child import ONE_THREAD, ends_deferred, interrupts_held
 from weaves.errors import BadInput, WorkFailed
@@ -114,12 +116,14 @@ def _external(scheduler: Scheduler, say: Callable[[str], None]) -> Iterator[Any]
 
 
 def dashboard_of(client: Any) -> str | None:
-    """Return the address of the scheduler's dashboard; None if it has none."""
+    """Return the address of the scheduler's dashboard; None if it has none that this machine can open."""
     try:
-        services = client.scheduler_info(n_workers=0)["services"]
-        return str(client.dashboard_link) if services.get("dashboard") else None
-    except (KeyError, OSError):
+        address = str(client.dashboard_link)
+        # A scheduler names an address also without a dashboard, and then has no page there.
+        build_opener(ProxyHandler({})).open(address, timeout=_SECONDS).close()
+    except (KeyError, OSError, ValueError, HTTPException):
         return None
+    return address
 
 
 async def _answer(address: str, security: Any) -> None:

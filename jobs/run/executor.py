@@ -136,11 +136,12 @@ def execute(
     with connected(scheduler, slots, board.say) as client, board:
         crew = Workers(client, external, board.say)
         crew.look(now=True)
+        board.tally.workers = len(crew.accepted)
         if preparations := prepare(todo):
             _prepare(client, crew, preparations, board)
         client.subscribe_topic(TOPIC, board.hear)
         dispatch = Dispatch(client, crew, out, uuid.uuid4().hex)
-        board.start(len(crew.accepted), dashboard_of(client))
+        board.start(len(crew.accepted), dashboard_of(client) if external else None)
         book = _Book(Ready(todo, finished), summary, stages, board)
         loop = _Loop(book, crew, dispatch, board, ledger, Inputs(tasks, ledger), external, recorded, settle)
         try:

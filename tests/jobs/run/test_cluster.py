@@ -8,15 +8,17 @@ import sys
 import threading
 import time
 import urllib.request
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
 from distributed import Client, LocalCluster
 from rich.console import Console
 
-from jobs.run.cluster import HERE, Scheduler, connected
+from jobs.run.cluster import HERE, Scheduler, connected, dashboard_of
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from weaves.errors import BadInput, WorkFailed
@@ -276,6 +278,25 @@ def test_the_ports_of_the_cluster_on_this_machine_have_no_web_pages():
         for port, page in product(ports, ("", "health", "info/main/workers.html", "json/counts.json", "metrics")):
             with pytest.raises(OSError):  # HTTPError is one
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
+
+
+@pytest.mark.parametrize(("found", "expected"), [(200, True), (404, False)])
+def test_a_dashboard_is_an_address_with_a_page(found, expected):
+    """A scheduler without one names its address too."""
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(found)
+            self.end_headers()
+
+        def log_message(self, *parts):
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Page) as server:
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        client = SimpleNamespace(dashboard_link=f"http://127.0.0.1:{server.server_port}/status")
+        assert dashboard_of(client) == (client.dashboard_link if expected else None)
+    assert dashboard_of(client) is None  # nobody answers
 
 
 def test_workers_that_cannot_start_are_no_bug(monkeypatch, fake, tmp_path):
