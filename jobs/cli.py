@@ -22,7 +22,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, Token
 
 from weaves.errors import BadInput, WorkFailed, one_line
 
@@ -41,7 +41,16 @@ app = App(
 
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
-Out = Annotated[Path, Parameter(help="Folder of all products.")]
+
+
+def _place(type_: object, tokens: Sequence[Token]) -> Path:
+    """Return the path of a folder or file of this machine or of object storage."""
+    from pipeline.storage import place
+
+    return place(tokens[0].value, tokens[0].keyword or "")
+
+
+Out = Annotated[Path, Parameter(help="Folder of all products, or an address such as s3://bucket/x.", converter=_place)]
 
 OUT = Path("out")
 
@@ -151,9 +160,9 @@ def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> N
 @app.command(sort_key=5)
 def evaluate(
     fabric: FabricName,
-    queries: Annotated[Path, Parameter(help="Parquet file of queries, with the columns of a shard.")],
+    queries: Annotated[Path, Parameter(help="Parquet file of queries, with the columns of a shard.", converter=_place)],
     *,
-    out: Annotated[Path, Parameter(help="Parquet file to write.")],
+    out: Annotated[Path, Parameter(help="Parquet file to write.", converter=_place)],
     model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
     extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
     truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),
@@ -400,10 +409,21 @@ def main(tokens: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
+        if explained := _storage_error(error):
+            return _end(str(explained), explained.exit_code)
         if isinstance(error, OSError) and error.errno in _NAMES:
             return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
         saved = _save_crash(tokens, traceback.format_exc())
         return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+
+
+def _storage_error(error: Exception) -> BadInput | WorkFailed | None:
+    """Return an error of object storage as a sentence; None if it is another error, or no storage is in use."""
+    if "upath" not in sys.modules:
+        return None
+    from pipeline.storage import explained
+
+    return explained(error)
 
 
 def _end(sentence: str, code: int) -> int:
@@ -422,7 +442,8 @@ def _save_crash(tokens: Sequence[str], trace: str) -> str:
     """
     given = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
     given += [value for option, value in pairwise(tokens) if option == "--out"]
-    for folder in (Path(given[0]) if given else OUT, Path(tempfile.gettempdir())):
+    out = Path(given[0]) if given and "://" not in given[0] else OUT
+    for folder in (out, Path(tempfile.gettempdir())):
         try:
             handle, name = tempfile.mkstemp(".txt", "crash-", folder)
             with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:  # noqa: PTH123, a handle

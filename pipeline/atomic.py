@@ -5,10 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from pipeline import storage
 from weaves.errors import BadInput, WorkFailed
 
 _UNWRITABLE = {errno.ENOENT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR}
@@ -20,6 +22,7 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on leaving without error it is synced and renamed to `path`.
 
     A process killed in between leaves only a ``.tmp-*`` file, which no reader looks at and the next writer replaces.
+    For object storage the temporary file is one of this machine.
 
     Parameters
     ----------
@@ -36,6 +39,11 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
     WorkFailed
         If the disk is full.
     """
+    if not storage.is_local(path):
+        with tempfile.TemporaryDirectory(prefix="twillight-") as folder:
+            yield (copy := Path(folder) / path.name)
+            storage.store(copy, path)
+        return
     temporary = path.with_name(f".tmp-{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,6 +81,9 @@ def _sync_folder(folder: Path) -> None:
 
 def link(source: Path, target: Path) -> None:
     """Let a second path, whole or not at all, name the same bytes; a copy of them where there are no links."""
+    if not storage.is_local(target):
+        storage.copy(source, target)
+        return
     with atomic_path(target) as temporary:
         temporary.unlink(missing_ok=True)
         try:

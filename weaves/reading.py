@@ -49,6 +49,12 @@ def read_bytes(path: Path, most: int, needed: str) -> bytes:
         If it is no regular file, larger, or cannot be read.
     """
     where = str(path)
+    if not isinstance(path, Path):  # of object storage, which has files only
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+        if len(content) > most:
+            raise BadInput(where, "", f"has more than {most:,} bytes", f"at most {most:,} are allowed")
+        return content
     try:
         # Without O_NONBLOCK, opening a pipe waits until somebody writes.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

@@ -74,6 +74,17 @@ class Page(Task):
         return self.measured
 
     @property
+    def reads(self) -> Mapping[str, str]:
+        """The Records that no task writes."""
+        return self.others
+
+    def written(self, out: Path) -> tuple[str, ...]:
+        """Return the files of its folder."""
+        from reports.page.files import read_files
+
+        return (*(f"{self.folder}/{name}" for name in read_files(out / self.folder)), *reversed(self.products))
+
+    @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
         return 15.0

@@ -7,7 +7,7 @@ work is the same task in another recipe, in another order or on more workers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
@@ -94,6 +94,15 @@ class Task(Part):
     def needs(self) -> tuple[str, ...]:
         """Ids of the tasks that must be done before."""
         return ()
+
+    @property
+    def reads(self) -> Mapping[str, str]:
+        """Files that it reads and no task makes, relative to the output folder, each with its hash."""
+        return {}
+
+    def written(self, out: Path) -> tuple[str, ...]:
+        """Return all files that it has made in the output folder `out`: the products, last, and what they list."""
+        return self.products
 
     @property
     def cost(self) -> float:

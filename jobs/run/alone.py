@@ -10,6 +10,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+from collections.abc import Mapping
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Final
@@ -23,7 +24,7 @@ from jobs.run.progress import LOOK, Board
 _TRIES: Final = 3  # a little more than once, as dask does for a task whose worker dies
 
 
-def run_alone(task: Task, out: Path, board: Board) -> Outcome:
+def run_alone(task: Task, out: Path, inputs: Mapping[str, str], board: Board) -> Outcome:
     """Do a task in a fresh process and wait for its end; a process that dies is replaced, twice at most.
 
     Parameters
@@ -31,14 +32,16 @@ def run_alone(task: Task, out: Path, board: Board) -> Outcome:
     task : Task
         The task.
     out : Path
-        Output folder.
+        Place of all products.
+    inputs : mapping
+        As for `jobs.run.workspace.workspace`.
     board : Board
         Shows the progress of the task.
     """
     context = multiprocessing.get_context("spawn")
     for _ in range(_TRIES):
         here, there = context.Pipe(duplex=False)
-        process = context.Process(target=_serve, args=(task, out, there), name=task.title)
+        process = context.Process(target=_serve, args=(task, out, inputs, there), name=task.title)
         with interrupts_held(), mock.patch.dict(os.environ, ONE_THREAD):
             process.start()
         there.close()  # so that the end of the process closes the pipe
@@ -68,12 +71,12 @@ def _received(task: Task, pipe: Connection, board: Board) -> Outcome | None:
         board.advance(task.id, message)
 
 
-def _serve(task: Task, out: Path, pipe: Connection) -> None:
+def _serve(task: Task, out: Path, inputs: Mapping[str, str], pipe: Connection) -> None:
     """Do the task in the new process, which ends with the driver."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-    pipe.send(work(task, out, pipe.send))
+    pipe.send(work(task, out, pipe.send, inputs))
 
 
 def _end_with(sentinel: int) -> None:

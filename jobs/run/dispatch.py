@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -16,6 +16,7 @@ from jobs.run.progress import LOOK, TOPIC
 from jobs.run.receipt import Product
 from jobs.run.software import digest
 from jobs.run.workers import Workers
+from pipeline.storage import place
 
 _OUTCOMES: Final = "outcomes"  # begins the name of the topic of a run
 _SECONDS_BETWEEN_SIGNS: Final = 0.2
@@ -50,12 +51,13 @@ class Dispatch:
         """Tasks that have not ended."""
         return (task for task, _ in self._running.values())
 
-    def start(self, task: Task, avoided: Collection[str] = ()) -> None:
-        """Give a task to a worker, to none of `avoided` if there is a choice."""
+    def start(self, task: Task, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
+        """Give a task with its inputs to a worker, to none of `avoided` if there is a choice."""
         self._number += 1  # a second try must not get the first one's result
         key = f"{task.stage}-{task.id}-{self._run}-{self._number}"
         where = self._workers.restriction(avoided)
-        future = self._client.submit(_work, task, str(self._out), self._topic, self._workers.digest, key=key, **where)
+        given = task, str(self._out), inputs, self._topic, self._workers.digest
+        future = self._client.submit(_work, *given, key=key, **where)
         self._running[key] = task, future
         future.add_done_callback(lambda future: self._ended.put(future.key))
 
@@ -109,7 +111,7 @@ def _failure(future: Any, begun: bool) -> Outcome:
     return Outcome({}, 0.0, one_line(error), "".join(traceback.format_exception(error)))
 
 
-def _work(task: Task, out: str, topic: str, expected: str) -> None:
+def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected: str) -> None:
     """Do one task in a worker, unless the worker's software is not the `expected` one, and send the outcome."""
     from distributed import get_worker
 
@@ -125,7 +127,7 @@ def _work(task: Task, out: str, topic: str, expected: str) -> None:
     if expected and expected != _digest():
         outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
     else:
-        outcome = work(task, Path(out), progress)
+        outcome = work(task, place(out), progress, inputs)
     files = {name: product.model_dump() for name, product in outcome.files.items()}
     message = outcome._asdict() | {"files": files, "worker": worker.address}
     worker.log_event(topic, (worker.get_current_task(), message))

@@ -249,8 +249,8 @@ class _Loop(NamedTuple):
                 self.settle()
             self.board.begin(task)
             if task.alone and not self.external:
-                return started, [(task, run_alone(task, self.ledger.out, self.board))]
-            self.dispatch.start(task, avoided=self.book.failed_on.get(task.id, ()))
+                return started, [(task, run_alone(task, self.ledger.out, self.inputs.hashes(task), self.board))]
+            self.dispatch.start(task, self.inputs.hashes(task), self.book.failed_on.get(task.id, ()))
         return started, []
 
     def _take(self, task: Task, outcome: Outcome) -> None:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 from jobs.plan.task import Task
 from jobs.run.ledger import Ledger
+from pipeline.storage import is_local
 
 
 class Inputs:
@@ -20,6 +22,16 @@ class Inputs:
         self._tasks = {task.id: task for task in tasks}
         self._ledger = ledger
         self._sound: set[str] = set()
+
+    def hashes(self, task: Task) -> dict[str, str]:
+        """Return the hashes of the products that a task needs, by path, for workers that fetch them."""
+        if is_local(self._ledger.out):
+            return {}
+        found = dict(task.reads)
+        for need in (self._tasks[need] for need in task.needs if need in self._tasks):
+            files = self._ledger.products(need)
+            found |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
+        return found
 
     def made(self, task: Task) -> None:
         """Note that the products of a task were just measured."""
@@ -37,7 +49,7 @@ class Inputs:
         """
         needs = [self._tasks[need] for need in task.needs if need in self._tasks]
         unread = [need for need in needs if anew or need.id not in self._sound]
-        if not unread:
+        if not unread or not (anew or is_local(self._ledger.out)):  # who fetches a file compares it
             return []
         with ThreadPoolExecutor() as pool:
             removed = list(pool.map(self._ledger.discard, unread))

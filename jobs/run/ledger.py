@@ -21,8 +21,10 @@ from filelock import FileLock, Timeout
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
 from jobs.run.receipt import Product, Receipt, leaves, read_receipt
+from jobs.run.workspace import workspace_of
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
+from pipeline.storage import is_local
 from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
 
@@ -164,9 +166,11 @@ class Ledger:
         WorkFailed
             If another run is at work there.
         """
+        # A lock in object storage would outlive a killed run: there, only runs of this machine and user are kept out.
+        folder = self.folder if is_local(self.out) else workspace_of(self.out)
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            lock = FileLock(self.folder / "lock", blocking=False)
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = FileLock(folder / "lock", blocking=False)
             lock.acquire()
         except Timeout as error:
             allowed = "another run is at work in this folder; wait for it, or choose another --out"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from jobs.plan.task import Progress, Task
 from jobs.run.receipt import Product, measure
+from jobs.run.workspace import workspace
 from weaves.errors import BadInput, WorkFailed
 
 KILLED = "the process that ran it was killed several times over; is there enough memory?"
@@ -42,12 +45,13 @@ class Outcome(NamedTuple):
     refused: bool = False
 
 
-def work(task: Task, out: Path, progress: Progress) -> Outcome:
-    """Do a task below the output folder `out`."""
+def work(task: Task, out: Path, progress: Progress, inputs: Mapping[str, str] = MappingProxyType({})) -> Outcome:
+    """Do a task; `out` is the place of all products, `inputs` as for `jobs.run.workspace.workspace`."""
     start = time.perf_counter()
     try:
-        task.run(out, progress)
-        files = {Path(path).name: measure(out / path) for path in task.products}
+        with workspace(task, out, inputs) as folder:
+            task.run(folder, progress)
+            files = {Path(path).name: measure(folder / path) for path in task.products}
     except (BadInput, WorkFailed) as error:
         return Outcome({}, time.perf_counter() - start, str(error))
     except Exception as error:

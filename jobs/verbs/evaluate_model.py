@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.models.registry import load_model, pretrained_folder, pretrained_names
 from pipeline.shards.evaluate import Answerer
+from pipeline.storage import place
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
@@ -42,7 +42,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         If there is no such model, its files are damaged, or it does not cover the fabric.
     """
     known = pretrained_names()
-    folder = pretrained_folder(model) if model in known else Path(model)
+    folder = pretrained_folder(model) if model in known else place(model, "--model")
     if not (folder / "card.json").is_file():
         allowed = f"the folder of a trained model or a name is needed; {nearest(model, known)}"
         raise BadInput("evaluate", "--model", model, allowed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
 from pipeline.shards.store import queries_of
+from pipeline.storage import local_copy
 from pipeline.truth.query import Queries, faults
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
@@ -62,10 +63,11 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
         If it is missing, cut short, or no such file.
     """
     refuse_irregular(path, "a Parquet file")
-    with _whole(path):
-        file = pq.ParquetFile(path, page_checksum_verification=True, buffer_size=_BUFFER)
-    with file:
-        yield file
+    with ExitStack() as stack:
+        with _whole(path):
+            here = stack.enter_context(local_copy(path))
+            file = pq.ParquetFile(here, page_checksum_verification=True, buffer_size=_BUFFER)
+        yield stack.enter_context(file)
 
 
 def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -> Iterator[pa.Table]:

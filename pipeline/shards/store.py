@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from pipeline.atomic import atomic_path
 from pipeline.shards.extra_rows import Kind
 from pipeline.shards.schema import SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
+from pipeline.storage import local_copy
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
@@ -77,7 +78,8 @@ def read_table(path: Path, kind: Kind = "components") -> pa.Table:
     schema = SCHEMAS[kind]
     refuse_irregular(path, "a shard")
     try:
-        table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
+        with local_copy(path) as file:
+            table = pq.read_table(file, page_checksum_verification=True, memory_map=False)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "generate it again with `twillight generate`") from error
     except (pa.ArrowException, OSError) as error:
