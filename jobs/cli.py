@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter, Token
 
@@ -50,7 +50,9 @@ def _place(type_: object, tokens: Sequence[Token]) -> Path:
     return place(tokens[0].value, tokens[0].keyword or "")
 
 
-Out = Annotated[Path, Parameter(help="Folder of all products, or an address such as s3://bucket/x.", converter=_place)]
+Place = Annotated[Any, Parameter(converter=_place)]
+"""A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
+Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]
 
 OUT = Path("out")
 
@@ -160,9 +162,9 @@ def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> N
 @app.command(sort_key=5)
 def evaluate(
     fabric: FabricName,
-    queries: Annotated[Path, Parameter(help="Parquet file of queries, with the columns of a shard.", converter=_place)],
+    queries: Annotated[Place, Parameter(help="Parquet file of queries, with the columns of a shard.")],
     *,
-    out: Annotated[Path, Parameter(help="Parquet file to write.", converter=_place)],
+    out: Annotated[Place, Parameter(help="Parquet file to write.")],
     model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
     extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
     truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),

@@ -179,6 +179,8 @@ class Ledger:
             allowed = "--out must name a folder that can be written"
             raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
         try:
+            if not is_local(self.out):
+                (self.folder / "lock").write_bytes(b"")  # a bucket that refuses it is reported before work begins
             yield
         finally:
             lock.release()
