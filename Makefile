@@ -79,11 +79,13 @@ $(READY): requirements.txt requirements-cpu.txt requirements-cuda.txt pyproject.
 # Hash of PyTorch's build for the CPU alone (Linux x86_64, Python 3.11), of the version in requirements.txt.
 TORCH_CPU := 6746dbcbeb526eb61330b76b41ff1b4eb848951103a892eeb080dfa2b264667b
 
-# The newest packages that fit pyproject.toml, with the hashes of all their files, for every platform.
+# The packages that pyproject.toml needs, with the hashes of all their files, for every platform. Pinned versions stay
+# as they are; `make pins PINS=--upgrade` takes the newest.
 pins:
 	@$(PYTHON) -m venv build/pins
 	@build/pins/bin/pip install --quiet --disable-pip-version-check uv
-	@build/pins/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --extra dev pyproject.toml --output-file build/pins/all.txt
+	@cat requirements.txt requirements-cuda.txt > build/pins/all.txt
+	@build/pins/bin/uv pip compile --quiet $(PINS) --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --extra dev pyproject.toml --output-file build/pins/all.txt
 	@awk -v cpu=$(TORCH_CPU) ' \
 	  BEGIN { note = "Written by `make pins`, do not edit."; \
 	    print "# Versions and hashes of everything `make` installs, for every platform; pyproject.toml has the ranges. " note > "requirements.txt"; \
