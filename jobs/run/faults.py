@@ -35,7 +35,7 @@ class Fault(NamedTuple):
     path: str
     """Relative to the output folder."""
     why: str
-    """What is wrong, a sentence about the file."""
+    """Reason, a sentence about the file."""
     task: Task | None = None
     """The task that makes it."""
     never_run: bool = False

@@ -46,7 +46,7 @@ class Receipt(BaseModel):
     """Products by file name, which is never a path: a folder of products may come from a stranger."""
     seconds: Annotated[float, Field(ge=0.0)]
     identity: dict[str, Leaf] = {}
-    """What the task depended on, by dotted key (`leaves`); it says later which key has changed."""
+    """Identity of the task, by dotted key (`leaves`); it says later which key has changed."""
     checksum: str = ""
     """Hash of the rest; receipts of earlier versions have none, and their bytes may be of another form."""
 

@@ -92,7 +92,7 @@ class Workers:
         found = self._client.run(software, workers=new, on_error="return")
         for address, there in found.items():
             if isinstance(there, OSError):
-                continue  # it is gone, or will be asked again
+                continue  # it is gone, or the next look queries it again
             self._checked[address] = difference(there)
             if self._checked[address]:
                 self._say(self._refusal(address))

@@ -26,7 +26,7 @@ MOST_WORKERS: Final = 100_000
 
 
 class Facts(NamedTuple):
-    """What the ledger knows of a plan.
+    """Knowledge of the ledger about a plan.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
 
 
 def prune(recipes: Sequence[str], out: Path, delete: bool) -> None:
-    """List the files that no recipe needs, and remove them if told to.
+    """List the files that no recipe needs, and with `delete` remove them.
 
     Raises
     ------
