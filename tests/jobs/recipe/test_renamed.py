@@ -21,7 +21,7 @@ def refusal(files):
     with pytest.raises(BadInput) as refused:
         load_recipe(path)
     assert "\n" not in str(refused.value)
-    return str(refused.value).removeprefix(f"{path}: ")
+    return str(refused.value).split(".toml: ", 1)[1]  # the front of a long path is left out
 
 
 @pytest.mark.parametrize("kind", ["model", "estimator", SCENE])
