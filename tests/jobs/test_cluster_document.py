@@ -52,6 +52,7 @@ def cluster_spec(name, image, env, worker_command):
     return {"spec": {"worker": {"spec": {"containers": [{"image": image, "env": env, "args": worker_command}]}}}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S), ids=["slurm", "k8s", "aws"])
 def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, fake, monkeypatch, code):
     for name in ("dask_jobqueue", "dask_kubernetes", "dask_kubernetes.operator", "dask_cloudprovider"):
@@ -101,6 +102,7 @@ if __name__ == "__main__":  # workers are started from it
 """
 
 
+@pytest.mark.slow
 def test_the_job_of_slurm_runs_tasks(tmp_path, fake):
     (script,) = re.findall(r"^```sh\n(#!/bin/bash\n.*?)^```$", TEXT, re.M | re.S)
     folder = tmp_path / "bin"

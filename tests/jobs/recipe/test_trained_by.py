@@ -193,7 +193,7 @@ def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
         ("validation = 100", "validation = 70"),
         ("test = 500", "test = 70"),
         ("count = 3", "count = 0"),
-        ("relative_error = 0.05", "relative_error = 0.5"),
+        ("relative_error = 0.05", 'estimator = "owen"\nrelative_error = 0.5\nmax_count = 256'),
     ):
         files.recipe = files.recipe.replace(old, new)
     twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"neumip"', '"neumip"\nname = "fine"')
