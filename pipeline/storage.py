@@ -26,7 +26,7 @@ _OBJECTS: Final = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss"
 
 _PATIENT: Final = {"config_kwargs": {"retries": {"mode": "standard", "max_attempts": 16}}}
 _OPTIONS: Final[dict[str, dict[str, Any]]] = {"s3": _PATIENT, "s3a": _PATIENT}
-"""Options of file systems: a storage that fails for a minute or two is tried again until it answers."""
+"""Options of file systems: a request that fails is tried again, with growing pauses."""
 
 _LIBRARIES: Final = {"botocore", "aiobotocore", "aiohttp", "s3fs", "gcsfs", "adlfs", "azure", "google", "urllib3"}
 """Packages whose own errors are those of a storage or of the way to it."""

@@ -8,7 +8,6 @@ stored. Nothing in it is needed again: it may be removed at any time, and saves 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,9 +18,7 @@ from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
 from pipeline import storage
 from pipeline.fingerprint import file_sha256, fingerprint
-from weaves.errors import WorkFailed
-
-_MANIFEST = "manifest.json"
+from weaves.errors import BadInput, WorkFailed
 
 
 @contextmanager
@@ -45,25 +42,27 @@ def workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Path
     if storage.is_local(out):
         yield out
         return
+    from pipeline.shards.manifest import FILE
+
     folder = workspace_of(out)
     for path, sha256 in inputs.items():
         _fetch(out, folder, path, sha256)
     for parent in sorted({str(Path(path).parent) for path in inputs if path.startswith(f"{DATASETS}/")}):
-        _fetch(out, folder, f"{parent}/{_MANIFEST}", "")  # it grows
+        _fetch(out, folder, f"{parent}/{FILE}", "")  # it grows
     yield folder
     for path in task.written(folder):
         storage.store(folder / path, out / path)
 
 
 def workspace_of(out: Path) -> Path:
-    """Return the folder of this machine and user for an address, which is made if it is missing."""
-    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(cache) / "twillight" / fingerprint(str(out))
+    """Return the folder of this machine and user for an address, made if it is missing; BadInput if it cannot be."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "twillight" / fingerprint(str(out))
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError:  # no home that can be written, as in some containers
-        folder = Path(tempfile.gettempdir()) / f"twillight-{os.getuid()}" / fingerprint(str(out))
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:  # no folder of all users instead: a stranger may have put files there
+        allowed = "XDG_CACHE_HOME must name a folder that can be written"
+        raise BadInput(str(cache), "", error.strerror or error, allowed) from error
     return folder
 
 

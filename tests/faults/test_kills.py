@@ -64,7 +64,7 @@ def test_killed_workers(recipe, undisturbed, tmp_path):
         for _ in range(3):
             if not wait_for_a_moment(process, out, seeded):
                 break
-            workers = [one for one in family(process) if not psutil_children(one) and "spawn_main" in command(one)]
+            workers = [one for one in family(process) if not children_of(one) and "spawn_main" in command(one)]
             if workers:
                 seeded.choice(workers).kill()
                 kills += 1
@@ -120,7 +120,7 @@ def command(process):
         return ""
 
 
-def psutil_children(process):
+def children_of(process):
     try:
         return process.children()
     except psutil.NoSuchProcess:
