@@ -17,7 +17,7 @@ from jobs.recipe.load import load_recipe
 
 ROOT = Path(__file__).parents[2]
 START = "import sys; from jobs.entry import main; sys.exit(main())"
-TIMEOUT = 300.0
+TIMEOUT = 900.0  # the first run compiles
 RECIPE = """
 name = "faults"
 
@@ -98,7 +98,14 @@ def start(recipe, out, *arguments, verb="run", before=(), env=None):
 
 
 def end(process, timeout=TIMEOUT):
-    _, stderr = process.communicate(timeout=timeout)
+    """Wait for the end of a run; one that takes longer is killed with all that it has started, and fails its test."""
+    try:
+        _, stderr = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        for one in (*family(process), process):
+            one.kill()
+        process.communicate()
+        raise
     return End(process.returncode, stderr)
 
 

@@ -1,0 +1,62 @@
+"""Flipped bytes: every damaged file is named, and a repair makes it again with the bytes of an undisturbed run."""
+
+import random
+import shutil
+
+import pytest
+
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from tests.faults.runs import assert_no_leftovers, hashes, run
+
+pytestmark = pytest.mark.faults
+
+KINDS = (
+    "datasets/*/*.parquet",
+    "datasets/*/manifest.json",
+    "ledger/*.json",
+    "models/*/model.safetensors",
+    "models/*/card.json",
+    "records/*.exr",
+    "records/*[!e].json",
+    "records/*.machine.json",
+    "report/*/index.html",
+    "report/*/files.json",
+    "report/*/figures/*.png",
+    "report/*/tables/*.csv",
+)
+ROUNDS, FLIPS = 10, 20
+
+
+def flip(path, seeded):
+    content = bytearray(path.read_bytes())
+    content[seeded.randrange(len(content))] ^= seeded.randrange(1, 256)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("seed", range(ROUNDS))
+def test_flips_in_all_kinds_of_files_are_repaired(recipe, undisturbed, tmp_path, seed):
+    """One file of each kind and eight others have a flipped byte."""
+    out, seeded = tmp_path / "out", random.Random(seed)
+    shutil.copytree(undisturbed[0], out)
+    kinds = [sorted(path for path in out.glob(kind) if path.stat().st_size) for kind in KINDS]
+    assert all(kinds)
+    chosen = {seeded.choice(files) for files in kinds}
+    others = sorted({path for files in kinds for path in files} - chosen)
+    chosen |= set(seeded.sample(others, FLIPS - len(chosen)))
+    before = {path: path.read_bytes() for path in chosen}
+    for path in sorted(chosen):
+        flip(path, seeded)
+    found = run(recipe, out, verb="check")
+    assert found.code == 2, found.stderr
+    unnamed = [path for path in chosen if str(path.relative_to(out)) not in found.stderr]
+    assert not unnamed, found.stderr
+    found = run(recipe, out, "--repair", verb="check")
+    assert found.code == 0, found.stderr
+    assert hashes(recipe, out) == undisturbed[1]
+    timed = {out / path for task in plan(load_recipe(recipe)) if task.alone for path in task.products}
+    # What has a time, a date or a process in it is made again with others.
+    again = {path for path in chosen if path not in timed and path.suffix in {".parquet", ".safetensors", ".exr"}}
+    assert all(path.read_bytes() == before[path] for path in again)
+    assert run(recipe, out, verb="check").code == 0
+    assert_no_leftovers(out)
