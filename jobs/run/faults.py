@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -71,7 +71,7 @@ def faults(
         found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
     for page in (task for task in tasks if isinstance(task, Page)):
         found += _other_faults(page, ledger.out)
-    return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger)
+    return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in found})
 
 
 def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
@@ -88,10 +88,11 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
             return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
         return [Fault("missing", note, f"it does not exist, but products of {name} do", task)]
     found = [_product_fault(ledger.out, path, receipt.files.get(Path(path).name), task) for path in task.products]
-    if wrong := [fault for fault in found if fault]:
+    wrong = [fault for fault in found if fault]
+    if isinstance(task, Page) and task.products[1] not in {fault.path for fault in wrong}:
+        wrong += _page_faults(task, ledger.out)
+    if wrong:
         return wrong
-    if isinstance(task, Page):
-        return list(_page_faults(task, ledger.out))
     if isinstance(task, Shard):
         return [
             Fault("odd", path, fault.removeprefix(f"{ledger.out / path}: "), task)
@@ -213,10 +214,13 @@ def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
     return result
 
 
-def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger) -> list[Fault]:
-    """Return the files in the recipe's own folders that no task made: data sets, models, page."""
+def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, faulty: Set[str]) -> list[Fault]:
+    """Return the files in the recipe's own folders that no task made: data sets, models, pages with a sound list."""
     known = set(own_files(recipe, tasks, ledger.out))
     folders = {Path(path).parent for task in tasks if task.stage != "bench" for path in task.products}
+    for page in (task for task in tasks if isinstance(task, Page)):
+        if not faulty.isdisjoint({page.products[1], ledger.receipt_path(page)}):
+            folders.discard(Path(page.folder))
     files = [path for folder in folders for path in (ledger.out / folder).rglob("*") if path.is_file()]
     named = {str(path.relative_to(ledger.out)) for path in files if not is_leftover(path.name)}
     foreign = sorted(named - known)

@@ -25,7 +25,7 @@ KINDS = (
     "report/*/figures/*.png",
     "report/*/tables/*.csv",
 )
-ROUNDS, FLIPS = 10, 20
+ROUNDS, FLIPS = 13, 16
 
 
 def flip(path, seeded):
@@ -36,7 +36,11 @@ def flip(path, seeded):
 
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_flips_in_all_kinds_of_files_are_repaired(recipe, undisturbed, tmp_path, seed):
-    """One file of each kind and eight others have a flipped byte."""
+    """One file of each kind and four others have a flipped byte.
+
+    Products of a task whose receipt is damaged, and files of a page whose list is, need not be named: nothing says what
+    they should be, and all of them are made again.
+    """
     out, seeded = tmp_path / "out", random.Random(seed)
     shutil.copytree(undisturbed[0], out)
     kinds = [sorted(path for path in out.glob(kind) if path.stat().st_size) for kind in KINDS]
@@ -49,12 +53,18 @@ def test_flips_in_all_kinds_of_files_are_repaired(recipe, undisturbed, tmp_path,
         flip(path, seeded)
     found = run(recipe, out, verb="check")
     assert found.code == 2, found.stderr
-    unnamed = [path for path in chosen if str(path.relative_to(out)) not in found.stderr]
+    tasks = plan(load_recipe(recipe))
+    unlisted = {path for task in tasks if out / f"ledger/{task.id}.json" in chosen for path in task.products}
+    page = next(task for task in tasks if task.stage == "report")
+    if not chosen.isdisjoint({out / page.products[1], out / f"ledger/{page.id}.json"}):
+        unlisted |= {str(path.relative_to(out)) for path in (out / page.folder).rglob("*.*")} - set(page.products)
+    named = {str(path.relative_to(out)) for path in chosen} - unlisted
+    unnamed = [path for path in named if path not in found.stderr]
     assert not unnamed, found.stderr
     found = run(recipe, out, "--repair", verb="check")
     assert found.code == 0, found.stderr
     assert hashes(recipe, out) == undisturbed[1]
-    timed = {out / path for task in plan(load_recipe(recipe)) if task.alone for path in task.products}
+    timed = {out / path for task in tasks if task.alone for path in task.products}
     # What has a time, a date or a process in it is made again with others.
     again = {path for path in chosen if path not in timed and path.suffix in {".parquet", ".safetensors", ".exr"}}
     assert all(path.read_bytes() == before[path] for path in again)
