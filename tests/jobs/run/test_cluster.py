@@ -103,26 +103,6 @@ def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp
     assert capfd.readouterr().err == ""
 
 
-def test_two_runs_with_two_folders_on_one_scheduler_both_get_their_files(tmp_path, fake, scheduler):
-    tasks = [fake.task(f"shard {index}", seconds=0.1) for index in range(4)]
-    outs = [tmp_path / name for name in "ab"]
-    summaries = {}
-
-    def run(out):
-        summaries[out] = execute(tasks, out, scheduler=scheduler[0], console=quiet())
-
-    for out in outs:
-        (out / "ledger").mkdir(parents=True)
-    threads = [threading.Thread(target=run, args=(out,)) for out in outs]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for out in outs:
-        assert len(summaries[out].ran) == 4
-        assert all((out / task.products[0]).exists() and Ledger(out).state(task) == "done" for task in tasks)
-
-
 def test_a_product_that_was_written_elsewhere_is_no_product(tmp_path, fake, scheduler):
     task = fake.task("hidden", hides=True)
     (tmp_path / "out").mkdir()
@@ -156,6 +136,7 @@ def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, f
     assert not (tmp_path / "log.jsonl").exists()
 
 
+@pytest.mark.slow
 def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, fake, processes):
     processes.add()
     tasks = [fake.task(f"shard {index}", seconds=0.3) for index in range(8)]
@@ -189,6 +170,7 @@ def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, fake, pro
     assert len(summary.ran) == 3 and not summary.failed
 
 
+@pytest.mark.slow
 def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     shards = [fake.task(f"shard {index}", seconds=0.3) for index in range(18)]
