@@ -1,30 +1,20 @@
 """Command line of twillight: the verbs in the order of work.
 
-Each error is one sentence on stderr. Exit codes: 0 success, 1 work that failed, 2 bad input, 130 Ctrl-C, 143
-SIGTERM, 129 SIGHUP. A verb's modules are imported when it runs, so that help is fast.
+Errors and exit codes are in `jobs.exits`. A verb's modules are imported when it runs, so that help is fast.
 """
 
 from __future__ import annotations
 
-import errno
-import io
-import os
-import shlex
-import signal
 import sys
-import tempfile
-import threading
-import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, Parameter, Token
 
-from weaves.errors import BadInput, WorkFailed, one_line
+from jobs.exits import print_error, run_to_exit
+from weaves.errors import BadInput
 
 if TYPE_CHECKING:
     from jobs.run.cluster import Scheduler
@@ -55,11 +45,6 @@ Place = Annotated[Any, Parameter(converter=_place)]
 Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]
 
 OUT = Path("out")
-
-_NAMES = {errno.ENAMETOOLONG, errno.ELOOP}
-"""Errors of looking for a file that show a path as one that no file can have."""
-
-_CONTINUES = "finished work is kept, and the same command continues"
 
 
 @dataclass(frozen=True)
@@ -215,7 +200,7 @@ def check(
         return 0
     faults = check_dataset(found)
     for fault in faults:
-        _print_error(fault)
+        print_error(fault)
     return BadInput.exit_code if faults else 0
 
 
@@ -363,97 +348,12 @@ def results(
     written(recipe, out, file, readme)
 
 
-class _Stopped(KeyboardInterrupt):
-    """A signal that ends a process, handled as Ctrl-C is."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(f"stopped by {signal.Signals(number).name}; {_CONTINUES}")
-        self.code = 128 + number
-
-
-@contextmanager
-def _signals() -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: object) -> None:
-        raise _Stopped(number)
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    tokens = sys.argv[1:] if tokens is None else tokens
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
-    try:
-        with _signals():
-            answer = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-        sys.stdout.flush()
-        return answer if isinstance(answer, int) else 0
-    except CycloptsError as error:
-        return _end(f"twillight: {error}", 2)
-    except (BadInput, WorkFailed) as error:
-        return _end(str(error), error.exit_code)
-    except KeyboardInterrupt as stop:
-        return _end(str(stop) or f"stopped; {_CONTINUES}", stop.code if isinstance(stop, _Stopped) else 130)
-    except BrokenPipeError:
-        # The reader of the output has closed it, such as `head`.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except Exception as error:
-        if explained := _storage_error(error):
-            return _end(str(explained), explained.exit_code)
-        if isinstance(error, OSError) and error.errno in _NAMES:
-            return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
-        saved = _save_crash(tokens, traceback.format_exc())
-        return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
-
-
-def _storage_error(error: Exception) -> BadInput | WorkFailed | None:
-    """Return an error of object storage as a sentence; None if it is another error, or no storage is in use."""
-    if "upath" not in sys.modules:
-        return None
-    from pipeline.storage import explained
-
-    return explained(error)
-
-
-def _end(sentence: str, code: int) -> int:
-    _print_error(sentence)
-    return code
-
-
-def _print_error(sentence: str) -> None:
-    print(one_line(sentence), file=sys.stderr, flush=True)
-
-
-def _save_crash(tokens: Sequence[str], trace: str) -> str:
-    """Save a traceback in the output folder, if there is one, else in the system's temporary folder; say where.
-
-    No folder is created: what follows `--out` may name a file that a verb was to write.
-    """
-    given = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
-    given += [value for option, value in pairwise(tokens) if option == "--out"]
-    out = Path(given[0]) if given and "://" not in given[0] else OUT
-    for folder in (out, Path(tempfile.gettempdir())):
-        try:
-            handle, name = tempfile.mkstemp(".txt", "crash-", folder)
-            with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:  # noqa: PTH123, a handle
-                file.write(f"twillight {shlex.join(tokens)}\n\n{trace}")
-        except OSError:
-            continue
-        return f"please report it with {name}"
-    return "no report of it could be written"
+    given = sys.argv[1:] if tokens is None else tokens
+    return run_to_exit(
+        lambda: app(given, exit_on_error=False, print_error=False, result_action="return_value"), given, OUT
+    )
 
 
 if __name__ == "__main__":

@@ -1,0 +1,134 @@
+"""Ends of the command line: every exception and signal becomes one sentence on stderr and an exit code.
+
+0 success, 1 work that failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP. An exception that nobody expected is a
+bug: its traceback goes to a file, and the sentence names the file.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import shlex
+import signal
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+from cyclopts import CycloptsError
+
+from weaves.errors import BadInput, WorkFailed, one_line
+
+_NO_FILE: Final = {errno.ENAMETOOLONG, errno.ELOOP}
+"""Errors of looking for a file that show a path as one that no file can have."""
+
+_CONTINUES: Final = "finished work is kept, and the same command continues"
+
+
+def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) -> int:
+    """Call a verb and return its exit code, after printing the sentence of an error.
+
+    Parameters
+    ----------
+    verb : callable
+        The verb with its arguments; an integer that it returns is the exit code.
+    tokens : sequence of str
+        Its command line, for the report of a crash.
+    out : Path
+        Folder of products if the command line names none.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
+    try:
+        with _signals():
+            answer = verb()
+        sys.stdout.flush()
+        return answer if isinstance(answer, int) else 0
+    except CycloptsError as error:
+        return _end(f"twillight: {error}", 2)
+    except (BadInput, WorkFailed) as error:
+        return _end(str(error), error.exit_code)
+    except KeyboardInterrupt as stop:
+        return _end(str(stop) or f"stopped; {_CONTINUES}", stop.code if isinstance(stop, _Stopped) else 130)
+    except BrokenPipeError:
+        # The reader of the output has closed it, such as `head`.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if explained := _storage_error(error):
+            return _end(str(explained), explained.exit_code)
+        if isinstance(error, OSError) and error.errno in _NO_FILE:
+            return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
+        saved = _save_crash(tokens, traceback.format_exc(), out)
+        return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+
+
+class _Stopped(KeyboardInterrupt):
+    """A signal that ends a process, handled as Ctrl-C is."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"stopped by {signal.Signals(number).name}; {_CONTINUES}")
+        self.code = 128 + number
+
+
+@contextmanager
+def _signals() -> Iterator[None]:
+    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: object) -> None:
+        raise _Stopped(number)
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _storage_error(error: Exception) -> BadInput | WorkFailed | None:
+    """Return an error of object storage as a sentence; None if it is another error, or no storage is in use."""
+    if "upath" not in sys.modules:
+        return None
+    from pipeline.storage import explained
+
+    return explained(error)
+
+
+def _end(sentence: str, code: int) -> int:
+    print_error(sentence)
+    return code
+
+
+def print_error(sentence: str) -> None:
+    """Print the sentence of an error to stderr, in one line and with no character that a terminal obeys."""
+    print(one_line(sentence), file=sys.stderr, flush=True)  # noqa: T201, rich would break the line
+
+
+def _save_crash(tokens: Sequence[str], trace: str, out: Path) -> str:
+    """Save a traceback in the output folder, if there is one, else in the system's temporary folder; say where.
+
+    No folder is created: what follows `--out` may name a file that a verb was to write.
+    """
+    given = [token.removeprefix("--out=") for token in tokens if token.startswith("--out=")]
+    given += [value for option, value in pairwise(tokens) if option == "--out"]
+    named = Path(given[0]) if given and "://" not in given[0] else out
+    for folder in (named, Path(tempfile.gettempdir())):
+        try:
+            handle, name = tempfile.mkstemp(".txt", "crash-", folder)
+            with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:  # noqa: PTH123, a handle
+                file.write(f"twillight {shlex.join(tokens)}\n\n{trace}")
+        except OSError:
+            continue
+        return f"please report it with {name}"
+    return "no report of it could be written"
