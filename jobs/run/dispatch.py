@@ -1,16 +1,21 @@
-"""Dispatch: hand tasks to the workers of a dask scheduler, and take their outcomes as they end."""
+"""Dispatch: hand tasks to the workers of a dask scheduler, and take their outcomes as they end.
+
+A worker does the tasks of a bundle (`jobs.run.bundles`) one after another. Their outcomes come as messages, which cost
+a tenth of a result that dask gathers.
+"""
 
 from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 from jobs.plan.task import Task
+from jobs.run.bundles import MOST_SECONDS, SECONDS
 from jobs.run.outcome import KILLED, Outcome, one_line, work
 from jobs.run.progress import LOOK, TOPIC
 from jobs.run.receipt import Product
@@ -39,9 +44,9 @@ class Dispatch:
 
     def __init__(self, client: Any, workers: Workers, out: Path, run: str) -> None:
         self._client, self._workers, self._out, self._run = client, workers, out, run
-        self._running: dict[str, tuple[Task, Any]] = {}  # with its future, by key
-        self._ended: SimpleQueue[str] = SimpleQueue()  # keys; filled by threads of dask's
-        self._outcomes: dict[str, Outcome] = {}
+        self._running: dict[str, tuple[dict[str, Task], Any]] = {}  # tasks by id, and their future, by key
+        # Keys with messages; without one: the future has ended. Filled by threads of dask's.
+        self._heard: SimpleQueue[tuple[str, Mapping[str, Any] | None]] = SimpleQueue()
         self._begun: set[str] = set()
         self._number = 0
         client.subscribe_topic(self._topic, self._hear)
@@ -49,33 +54,55 @@ class Dispatch:
     @property
     def running(self) -> Iterator[Task]:
         """Tasks that have not ended."""
-        return (task for task, _ in self._running.values())
+        return (task for tasks, _ in self._running.values() for task in tasks.values())
 
-    def start(self, task: Task, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
-        """Give a task with its inputs to a worker, to none of `avoided` if there is a choice."""
+    def start(self, tasks: Sequence[Task], inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
+        """Give tasks to a worker, which does one after another.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            A bundle, or one task.
+        inputs : mapping
+            Hashes of the products that they need, by path.
+        avoided : collection of str
+            Addresses of workers that do not get them if there is a choice.
+        """
         self._number += 1  # a second try must not get the first one's result
-        key = f"{task.stage}-{task.id}-{self._run}-{self._number}"
+        key = f"{tasks[0].stage}-{tasks[0].id}-{self._run}-{self._number}"
         where = self._workers.restriction(avoided)
-        given = task, str(self._out), inputs, self._topic, self._workers.digest
+        given = tasks, str(self._out), inputs, self._topic, self._workers.digest
         future = self._client.submit(_work, *given, key=key, **where)
-        self._running[key] = task, future
-        future.add_done_callback(lambda future: self._ended.put(future.key))
+        self._running[key] = {task.id: task for task in tasks}, future
+        future.add_done_callback(lambda future: self._heard.put((future.key, None)))
 
-    def ended(self, seconds: float) -> list[tuple[Task, Outcome]]:
-        """Wait for a task to end, so many seconds at most; return all that have ended, with their outcomes."""
-        keys, found = [], []
+    def ended(self, seconds: float) -> list[tuple[Task, Outcome | None]]:
+        """Wait for a task to end, so many seconds at most; return all that have ended, with their outcomes.
+
+        Tasks that a worker gives back, because their bundle takes too long, have none.
+        """
+        heard: list[tuple[str, Mapping[str, Any] | None]] = []
+        found: list[tuple[Task, Outcome | None]] = []
         try:
-            keys.append(self._ended.get(timeout=seconds))
+            heard.append(self._heard.get(timeout=seconds))
             while True:
-                keys.append(self._ended.get_nowait())
+                heard.append(self._heard.get_nowait())
         except Empty:
             pass
-        for key in keys:
+        for key, outcomes in heard:
             if key not in self._running:
-                continue  # an outcome comes as a message, and its future ends
-            outcome = self._outcomes.pop(key, None) or _failure(self._running[key][1], key in self._begun)
-            self._begun.discard(key)
-            found.append((self._running.pop(key)[0], outcome))
+                continue  # its outcomes came as messages, and now its future ends
+            tasks, future = self._running[key]
+            if outcomes is None:
+                failure = _failure(future, key in self._begun)
+                found += [(task, failure) for task in tasks.values()]
+                tasks.clear()
+            for id, outcome in (outcomes or {}).items():
+                if task := tasks.pop(id, None):  # else done twice: its worker died after it
+                    found.append((task, outcome and _outcome(outcome)))
+            if not tasks:
+                self._begun.discard(key)
+                del self._running[key]
         return found
 
     @property
@@ -83,23 +110,25 @@ class Dispatch:
         return f"{_OUTCOMES}-{self._run}"
 
     def _hear(self, event: tuple[float, Any]) -> None:
-        """Take the outcome of a task from its worker, or nothing: that it begins.
-
-        A message costs a tenth of a result that dask gathers.
-        """
-        key, message = event[1]
-        if message is None:
+        """Take the outcomes of tasks from their worker, or nothing: that a task begins."""
+        key, outcomes = event[1]
+        if outcomes is None:
             self._begun.add(key)
-            return
-        files = {name: Product(**product) for name, product in message.pop("files").items()}
-        self._outcomes[key] = Outcome(files, **message)
-        self._ended.put(key)
+        else:
+            self._heard.put((key, outcomes))
+
+
+def _outcome(message: Mapping[str, Any]) -> Outcome:
+    """Return the outcome in a message."""
+    files = {name: Product(**product) for name, product in message["files"].items()}
+    return Outcome(**{**message, "files": files})
 
 
 def _failure(future: Any, begun: bool) -> Outcome:
     """Return the outcome of a task that ended without a message.
 
-    Dask blames the death of a worker on all tasks that were with it; one that had not begun is innocent.
+    Dask blames the death of a worker on all tasks that were with it; one that had not begun is innocent. So is one of a
+    bundle, of which it is not known: it is tried again, without others.
     """
     from distributed import KilledWorker
 
@@ -111,11 +140,30 @@ def _failure(future: Any, begun: bool) -> Outcome:
     return Outcome({}, 0.0, one_line(error), "".join(traceback.format_exception(error)))
 
 
-def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected: str) -> None:
-    """Do one task in a worker, unless the worker's software is not the `expected` one, and send the outcome."""
+def _work(tasks: Sequence[Task], out: str, inputs: Mapping[str, str], topic: str, expected: str) -> None:
+    """Do tasks in a worker, unless the worker's software is not the `expected` one, and send their outcomes."""
     from distributed import get_worker
 
-    worker, last = get_worker(), 0.0
+    worker = get_worker()
+    key = worker.get_current_task()
+    start = sent = time.monotonic()
+    if len(tasks) == 1:
+        worker.log_event(topic, (key, None))
+    outcomes: dict[str, Any] = {}
+    for task in tasks:
+        if outcomes and (now := time.monotonic()) - sent > SECONDS:
+            worker.log_event(topic, (key, outcomes))
+            outcomes, sent = {}, now
+        if time.monotonic() - start > MOST_SECONDS:
+            outcomes[task.id] = None
+        else:
+            outcomes[task.id] = _work_one(task, out, inputs, expected, worker)
+    worker.log_event(topic, (key, outcomes))
+
+
+def _work_one(task: Task, out: str, inputs: Mapping[str, str], expected: str, worker: Any) -> dict[str, Any]:
+    """Do one task in a worker and return its outcome as a message."""
+    last = 0.0
 
     def progress(fraction: float) -> None:
         nonlocal last
@@ -123,14 +171,12 @@ def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected:
             worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
             last = now
 
-    worker.log_event(topic, (worker.get_current_task(), None))
     if expected and expected != _digest():
         outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
     else:
         outcome = work(task, place(out), progress, inputs)
     files = {name: product.model_dump() for name, product in outcome.files.items()}
-    message = outcome._asdict() | {"files": files, "worker": worker.address}
-    worker.log_event(topic, (worker.get_current_task(), message))
+    return outcome._asdict() | {"files": files, "worker": worker.address}
 
 
 _digest = cache(digest)

@@ -6,7 +6,8 @@ The inputs of a task are compared with their receipts before it starts; damaged 
 task that fails is tried once more if an input turns out to be damaged. Else a task that ends with an unexpected
 exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
 On this machine one task a core is handed out at a time, and while only shards are made one more: dask, which cannot
-know how long a task takes, would park short ones behind a training. A task that measures time runs in a process of its
+know how long a task takes, would park short ones behind a training. Shards that take a few milliseconds go several at a
+time (`jobs.run.bundles`). A task that measures time runs in a process of its
 own (`jobs.run.alone`) while the workers have nothing to do; with `--scheduler` it runs in a worker, because the
 driver's machine may not be the one to measure.
 """
@@ -24,6 +25,7 @@ from rich.console import Console
 from jobs.plan.ready import Ready
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.run.alone import run_alone
+from jobs.run.bundles import Bundles
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected, dashboard_of
 from jobs.run.dispatch import Dispatch
 from jobs.run.inputs import Inputs
@@ -143,7 +145,8 @@ def execute(
         dispatch = Dispatch(client, crew, out, uuid.uuid4().hex)
         board.start(len(crew.accepted), dashboard_of(client) if external else None)
         book = _Book(Ready(todo, finished), summary, stages, board)
-        loop = _Loop(book, crew, dispatch, board, ledger, Inputs(tasks, ledger), external, recorded, settle)
+        inputs = Inputs(tasks, ledger)
+        loop = _Loop(book, crew, dispatch, Bundles(), board, ledger, inputs, external, recorded, settle)
         try:
             loop.run()
         finally:
@@ -210,6 +213,7 @@ class _Loop(NamedTuple):
     book: _Book
     crew: Workers
     dispatch: Dispatch
+    bundles: Bundles
     board: Board
     ledger: Ledger
     inputs: Inputs
@@ -233,13 +237,18 @@ class _Loop(NamedTuple):
                     self.book.ready.free(task)
                 self._start(alone=False)  # workers have something to do while receipts are written
             for task, outcome in ended:
+                if outcome is None:
+                    self.book.ready.again(task)
+                    continue
+                self.bundles.ended(outcome.seconds)
                 self._take(task, _verified(task, outcome, self.ledger.out))
             self.board.waiting_for(self.dispatch.running, workers=len(self.crew.accepted))
 
-    def _start(self, alone: bool = True) -> tuple[list[Task], list[tuple[Task, Outcome]]]:
+    def _start(self, alone: bool = True) -> tuple[list[Task], Sequence[tuple[Task, Outcome | None]]]:
         """Start as many tasks as there are slots; return them, and the outcome of one that was done alone, here."""
-        ready = self.book.ready
-        started = ready.take(self.crew.slots, alone, self.crew.spare)
+        ready, failed_on, slots = self.book.ready, self.book.failed_on, self.crew.slots
+        size, bundle = self.bundles.size, list[Task]()
+        started = ready.take(slots, alone, size * (slots + self.crew.spare) - slots)
         for task in started:
             if found := self.inputs.damaged(task):
                 self.book.reopen(found)
@@ -250,7 +259,15 @@ class _Loop(NamedTuple):
             self.board.begin(task)
             if task.alone and not self.external:
                 return started, [(task, run_alone(task, self.ledger.out, self.inputs.hashes(task), self.board))]
-            self.dispatch.start(task, self.inputs.hashes(task), self.book.failed_on.get(task.id, ()))
+            if size == 1 or task.id in failed_on or not self.bundles.allows(task):
+                self.dispatch.start([task], self.inputs.hashes(task), failed_on.get(task.id, ()))
+                continue
+            bundle.append(task)
+            if len(bundle) == size:
+                self.dispatch.start(bundle, {})
+                bundle = []
+        if bundle:
+            self.dispatch.start(bundle, {})
         return started, []
 
     def _take(self, task: Task, outcome: Outcome) -> None:
