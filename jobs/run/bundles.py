@@ -23,9 +23,10 @@ class Bundles:
     def __init__(self) -> None:
         self._mean = 1.0  # seconds; no bundle before some thirty tasks have been short
 
-    def ended(self, seconds: float) -> None:
-        """Take the time of a task."""
-        self._mean += _WEIGHT * (seconds - self._mean)
+    def ended(self, task: Task, seconds: float) -> None:
+        """Take the time of a task that is done."""
+        if self.allows(task):
+            self._mean += _WEIGHT * (seconds - self._mean)
 
     @property
     def size(self) -> int:

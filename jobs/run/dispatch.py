@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final
@@ -144,39 +144,32 @@ def _work(tasks: Sequence[Task], out: str, inputs: Mapping[str, str], topic: str
     """Do tasks in a worker, unless the worker's software is not the `expected` one, and send their outcomes."""
     from distributed import get_worker
 
-    worker = get_worker()
-    key = worker.get_current_task()
-    start = sent = time.monotonic()
-    if len(tasks) == 1:
-        worker.log_event(topic, (key, None))
-    outcomes: dict[str, Any] = {}
-    for task in tasks:
-        if outcomes and (now := time.monotonic()) - sent > SECONDS:
-            worker.log_event(topic, (key, outcomes))
-            outcomes, sent = {}, now
-        if time.monotonic() - start > MOST_SECONDS:
-            outcomes[task.id] = None
-        else:
-            outcomes[task.id] = _work_one(task, out, inputs, expected, worker)
-    worker.log_event(topic, (key, outcomes))
+    worker, last = get_worker(), 0.0
 
-
-def _work_one(task: Task, out: str, inputs: Mapping[str, str], expected: str, worker: Any) -> dict[str, Any]:
-    """Do one task in a worker and return its outcome as a message."""
-    last = 0.0
-
-    def progress(fraction: float) -> None:
+    def progress(task: Task, fraction: float) -> None:
         nonlocal last
         if (now := time.monotonic()) - last >= _SECONDS_BETWEEN_SIGNS:
             worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
             last = now
 
-    if expected and expected != _digest():
-        outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
-    else:
-        outcome = work(task, place(out), progress, inputs)
-    files = {name: product.model_dump() for name, product in outcome.files.items()}
-    return outcome._asdict() | {"files": files, "worker": worker.address}
+    key, outcomes = worker.get_current_task(), dict[str, Any]()
+    start = sent = time.monotonic()
+    if len(tasks) == 1:
+        worker.log_event(topic, (key, None))
+    for task in tasks:
+        if (now := time.monotonic()) - sent > SECONDS and outcomes:
+            worker.log_event(topic, (key, outcomes))
+            outcomes, sent = {}, now
+        if now - start > MOST_SECONDS:
+            outcomes[task.id] = None
+            continue
+        if expected and expected != _digest():
+            outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
+        else:
+            outcome = work(task, place(out), partial(progress, task), inputs)
+        files = {name: product.model_dump() for name, product in outcome.files.items()}
+        outcomes[task.id] = outcome._asdict() | {"files": files, "worker": worker.address}
+    worker.log_event(topic, (key, outcomes))
 
 
 _digest = cache(digest)

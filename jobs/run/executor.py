@@ -240,8 +240,10 @@ class _Loop(NamedTuple):
                 if outcome is None:
                     self.book.ready.again(task)
                     continue
-                self.bundles.ended(outcome.seconds)
-                self._take(task, _verified(task, outcome, self.ledger.out))
+                outcome = _verified(task, outcome, self.ledger.out)
+                if not outcome.reason:
+                    self.bundles.ended(task, outcome.seconds)
+                self._take(task, outcome)
             self.board.waiting_for(self.dispatch.running, workers=len(self.crew.accepted))
 
     def _start(self, alone: bool = True) -> tuple[list[Task], Sequence[tuple[Task, Outcome | None]]]:
@@ -301,7 +303,7 @@ def _done(tasks: Sequence[Task], ledger: Ledger, recorded: Recorded) -> list[Tas
     """Return the tasks that are done, some by the products of another data set."""
     before = []
     for task in tasks:
-        done = ledger.state(task) == "done"
+        done = ledger.done(task) is not None
         if not done and ledger.adopt(task):
             recorded(task, ledger.products(task))  # to whom it was not there a moment ago
             done = True

@@ -50,10 +50,14 @@ class Ledger:
 
     def state(self, task: Task) -> State:
         """Return the state of a task, from its files."""
-        receipt = self.receipt(task)
-        if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products):
+        if self.done(task):
             return "done"
         return "failed" if self._note(task).exists() else "missing"
+
+    def done(self, task: Task) -> Receipt | None:
+        """Return the receipt of a task if it is done: every product is there and has the listed size."""
+        receipt = self.receipt(task)
+        return receipt if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products) else None
 
     def is_sound(self, task: Task) -> bool:
         """Return whether a task is done and its products have the bytes that are on its receipt; they are read."""
@@ -108,7 +112,7 @@ class Ledger:
         receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3), identity=identity)
         durable = (now := time.monotonic()) - self._synced >= _SECONDS_BETWEEN_SYNCS
         self._synced = now if durable else self._synced
-        atomic_write(self._receipt(task), receipt.with_checksum().encoded(), durable=durable)
+        atomic_write(self._receipt(task), receipt.sealed(), durable=durable)
         self._note(task).unlink(missing_ok=True)
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
@@ -132,7 +136,7 @@ class Ledger:
             if source is None:
                 return False
             link(source, self.out / path)
-        return self.state(task) == "done"
+        return self.done(task) is not None
 
     def is_elsewhere(self, task: Task) -> bool:
         """Return whether a task that is not done here has products of the right size in other data sets."""

@@ -32,8 +32,8 @@ class ManifestFile:
         self._changed = False
         self._next = 0.0  # when it may be written again
         for part in parts:
-            if ledger.state(part) == "done":
-                self._enter(part, ledger.products(part))
+            if receipt := ledger.done(part):
+                self._enter(part, receipt.files)
 
     def add(self, task: Task, files: Mapping[str, Product]) -> None:
         """List a shard that was just finished; other tasks do not matter to it.

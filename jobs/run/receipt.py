@@ -18,6 +18,8 @@ _MOST_BYTES: Final = 1 << 20  # of a receipt; a task has a few products
 
 _CHECKSUM_DIGITS: Final = 16
 
+_END: Final = b"\n}\n"  # of the file
+
 _LONGEST_LEAF: Final = 24  # characters of a value that is written as it is
 
 Leaf = str | int | float | bool | None
@@ -52,21 +54,27 @@ class Receipt(BaseModel):
 
     def encoded(self) -> bytes:
         """Return the bytes of its file."""
-        return self._encoded()
+        return self.model_dump_json(indent=1, exclude_unset=True).encode() + b"\n"
 
-    def with_checksum(self) -> Receipt:
-        """Return it with the hash of the rest."""
-        return self.model_copy(update={"checksum": self._hash()})
+    def sealed(self) -> bytes:
+        """Return the bytes of the file of a receipt that has no checksum yet, with their checksum."""
+        content = self.encoded()
+        return content.removesuffix(_END) + _last_line(_checksum(content))
 
     def is_content_of(self, file: bytes) -> bool:
-        """Return whether a file's bytes are those that were written, as far as it has a hash."""
-        return "checksum" not in self.model_fields_set or (file == self.encoded() and self.checksum == self._hash())
+        """Return whether a file's bytes are those that were written, as far as it has a checksum."""
+        if "checksum" not in self.model_fields_set:
+            return True
+        rest = file.removesuffix(_last_line(self.checksum)) + _END
+        return len(rest) < len(file) and self.checksum == _checksum(rest)
 
-    def _hash(self) -> str:
-        return hashlib.sha256(self._encoded("checksum")).hexdigest()[:_CHECKSUM_DIGITS]
 
-    def _encoded(self, *left_out: str) -> bytes:
-        return self.model_dump_json(indent=1, exclude_unset=True, exclude={*left_out}).encode() + b"\n"
+def _checksum(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:_CHECKSUM_DIGITS]
+
+
+def _last_line(checksum: str) -> bytes:
+    return f',\n "checksum": "{checksum}"'.encode() + _END
 
 
 def leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
