@@ -1,6 +1,6 @@
 """Dispatch: hand tasks to the workers of a dask scheduler, and take their outcomes as they end.
 
-A worker does the tasks of a bundle (`jobs.run.bundles`) one after another. Their outcomes come as messages, which cost
+A worker does the tasks of a bundle (`jobs.plan.bundles`) one after another. Their outcomes come as messages, which cost
 a tenth of a result that dask gathers.
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
+from jobs.plan.bundles import MOST_SECONDS, SECONDS
 from jobs.plan.task import Task
-from jobs.run.bundles import MOST_SECONDS, SECONDS
 from jobs.run.outcome import KILLED, Outcome, one_line, work
 from jobs.run.progress import LOOK, TOPIC
 from jobs.run.receipt import Product

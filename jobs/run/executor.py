@@ -7,7 +7,7 @@ task that fails is tried once more if an input turns out to be damaged. Else a t
 exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
 On this machine one task a core is handed out at a time, and while only shards are made one more: dask, which cannot
 know how long a task takes, would park short ones behind a training. Shards that take a few milliseconds go several at a
-time (`jobs.run.bundles`). A task that measures time runs in a process of its
+time (`jobs.plan.bundles`). A task that measures time runs in a process of its
 own (`jobs.run.alone`) while the workers have nothing to do; with `--scheduler` it runs in a worker, because the
 driver's machine may not be the one to measure.
 """
@@ -22,10 +22,10 @@ from typing import Any, Final, NamedTuple
 
 from rich.console import Console
 
+from jobs.plan.bundles import Bundles
 from jobs.plan.ready import Ready
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.run.alone import run_alone
-from jobs.run.bundles import Bundles
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected, dashboard_of
 from jobs.run.dispatch import Dispatch
 from jobs.run.inputs import Inputs

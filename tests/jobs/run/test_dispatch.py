@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from jobs.run.bundles import Bundles
+from jobs.plan.bundles import Bundles
 from jobs.run.dispatch import Dispatch
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
@@ -39,26 +39,6 @@ def run(tasks, out):
 
 def starts(fake, out):
     return sorted(event["name"] for event in fake.events(out) if event["event"] == "start")
-
-
-@pytest.mark.parametrize(("seconds", "size"), [(0.0, 64), (0.001, 64), (0.0201, 4), (0.04, 2), (0.06, 1), (100.0, 1)])
-def test_a_bundle_takes_a_tenth_of_a_second(fake, seconds, size):
-    bundles, shard = Bundles(), fake.task("shard")
-    assert bundles.size == 1
-    for _ in range(1000):
-        bundles.ended(shard, seconds)
-    assert bundles.size == size
-    bundles.ended(fake.task("net", fake.FakeTraining), 1000.0)  # tells nothing about shards
-    assert bundles.size == size
-    bundles.ended(shard, 1.0)
-    assert bundles.size == 1
-
-
-def test_a_task_that_needs_others_is_in_no_bundle(fake):
-    shard = fake.task("shard")
-    assert Bundles.allows(shard)
-    assert not Bundles.allows(fake.task("net", fake.FakeTraining))
-    assert not Bundles.allows(fake.task("after", needs=[shard]))
 
 
 def test_short_shards_go_together_and_each_has_a_receipt(tmp_path, fake, sizes):
