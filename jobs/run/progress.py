@@ -25,6 +25,7 @@ LOOK: Final = 5.0
 """Seconds between two looks at how long nothing was reported."""
 
 _SILENCE: Final = 60.0  # seconds without a report until the first line says so
+_MOST_NAMED: Final = 5  # tasks in that line
 
 
 class Tally:
@@ -217,7 +218,9 @@ class Board:
         if silence < self._silence:
             return
         self._silence *= 2
-        titles = ", ".join(f"{task.stage} {task.title}" for task in tasks)
+        names = [f"{task.stage} {task.title}" for task in tasks]
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        titles = ", ".join(names[:_MOST_NAMED]) + more
         where = f"{workers} workers" if workers > 1 else "1 process" if workers else "no worker: the scheduler has none"
         self.say(f"nothing reported for {silence:.0f} s; under way: {titles} ({where})")
 

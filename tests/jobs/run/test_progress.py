@@ -34,5 +34,8 @@ def test_silence_is_told_after_a_minute_and_less_and_less_often(fake, monkeypatc
         board.waiting_for([task], workers=0)
         now += 61
         board.waiting_for([task], workers=0)
+        now += 121
+        board.waiting_for([task] * 70, workers=2)
+    assert "generate tweed, generate tweed and 65 more (2 workers)" in out.getvalue()
     assert "under way: generate tweed (2 workers)" in out.getvalue()
     assert out.getvalue().count("no worker: the scheduler has none") == 1
