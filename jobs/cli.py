@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Parameter, Token
 
 from jobs.exits import print_error, run_to_exit
-from weaves.errors import BadInput
+from weaves.errors import BadInput, one_line
 
 if TYPE_CHECKING:
     from jobs.run.cluster import Scheduler
@@ -40,6 +40,19 @@ def _place(type_: object, tokens: Sequence[Token]) -> Path:
     return place(tokens[0].value, tokens[0].keyword or "")
 
 
+def _local(type_: object, tokens: Sequence[Token]) -> Path:
+    """Return the path of a folder or file of this machine; refuse an address of object storage."""
+    name = tokens[0].value
+    if "://" in name:
+        found = _place(type_, tokens)
+        if not isinstance(found, Path):
+            raise ValueError(f"{one_line(name, 80)} is an address; a path of this machine is needed here")
+        return found
+    return Path(name)
+
+
+Local = Annotated[Path, Parameter(converter=_local)]
+"""A path of this machine."""
 Place = Annotated[Any, Parameter(converter=_place)]
 """A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
 Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]
@@ -98,7 +111,7 @@ def list_() -> None:
 def show(
     fabric: FabricName,
     *,
-    out: Annotated[Path | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
+    out: Annotated[Local | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
 ) -> None:
     """Show a fabric: its drawdown and its yarns."""
     from jobs.verbs.show import show as print_fabric
@@ -110,7 +123,7 @@ def show(
 def export(
     fabric: FabricName,
     *,
-    mesh: Annotated[Path, Parameter(help="File to write, ending in .ply.")],
+    mesh: Annotated[Local, Parameter(help="File to write, ending in .ply.")],
     vertices: Annotated[int, Parameter(help="Steps across a yarn, and along it in every cell.")] = 64,
     repeats: Annotated[int, Parameter(help="Copies of the repeat in each direction.")] = 1,
 ) -> None:
@@ -276,10 +289,10 @@ def prune(
 
 @app.command(sort_key=13)
 def merge(
-    a: Annotated[Path, Parameter(help="Folder of products.")],
-    b: Annotated[Path, Parameter(help="Another one, for example of another machine.")],
+    a: Annotated[Local, Parameter(help="Folder of products.")],
+    b: Annotated[Local, Parameter(help="Another one, for example of another machine.")],
     *,
-    out: Annotated[Path, Parameter(help="Folder of all products; created if need be.")],
+    out: Annotated[Local, Parameter(help="Folder of all products; created if need be.")],
 ) -> int:
     """Join two folders of products, such as parts of a data set made on two machines."""
     from jobs.verbs.merge import merge as merged
@@ -289,8 +302,8 @@ def merge(
 
 @app.command(sort_key=14)
 def compare(
-    a: Annotated[Path, Parameter(help="Folder of products, folder of a page, or file of Records.")],
-    b: Annotated[Path, Parameter(help="Another one; the table shows B relative to A.")],
+    a: Annotated[Local, Parameter(help="Folder of products, folder of a page, or file of Records.")],
+    b: Annotated[Local, Parameter(help="Another one; the table shows B relative to A.")],
     *,
     recipe: Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")] = "",
     other_machine: Annotated[bool, Parameter(help="Allow measurements of different machines.")] = False,
@@ -338,8 +351,8 @@ def savings(
 def results(
     recipe: RecipeName,
     *,
-    file: Annotated[Path | None, Parameter(help="Markdown file to write; results.md beside the page.")] = None,
-    readme: Annotated[Path | None, Parameter(help="Markdown file whose generated table is written anew.")] = None,
+    file: Annotated[Local | None, Parameter(help="Markdown file to write; results.md beside the page.")] = None,
+    readme: Annotated[Local | None, Parameter(help="Markdown file whose generated table is written anew.")] = None,
     out: Out = OUT,
 ) -> None:
     """Write the tables of a recipe's page as Markdown."""

@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
+from pipeline.fingerprint import fingerprint
+from pipeline.patience import Failure, patiently
 from weaves.errors import BadInput, WorkFailed, one_line
 
 _ADDRESS: Final = re.compile(r"([a-z][a-z0-9+.-]+)://(.*)", re.DOTALL)
@@ -24,9 +27,12 @@ _ADDRESS: Final = re.compile(r"([a-z][a-z0-9+.-]+)://(.*)", re.DOTALL)
 _OBJECTS: Final = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss"}
 """Protocols whose files appear when all of their bytes have arrived."""
 
-_PATIENT: Final = {"config_kwargs": {"retries": {"mode": "standard", "max_attempts": 16}}}
-_OPTIONS: Final[dict[str, dict[str, Any]]] = {"s3": _PATIENT, "s3a": _PATIENT}
-"""Options of file systems: a request that fails is tried again, with growing pauses."""
+_ONE_TRY: Final = {"config_kwargs": {"retries": {"mode": "standard", "total_max_attempts": 1}}}
+_OPTIONS: Final[dict[str, dict[str, Any]]] = {"s3": _ONE_TRY, "s3a": _ONE_TRY}
+"""Options of file systems: requests are repeated by `pipeline.patience` alone."""
+
+_AT_ONCE: Final = 32  # files that are fetched at the same time
+_AT_MOST_REMOVED: Final = 1000  # files in a request
 
 _LIBRARIES: Final = {"botocore", "aiobotocore", "aiohttp", "s3fs", "gcsfs", "adlfs", "azure", "google", "urllib3"}
 """Packages whose own errors are those of a storage or of the way to it."""
@@ -61,6 +67,8 @@ def place(name: str, where: str = "--out") -> Path:
     from upath import UPath
 
     try:
+        if protocol in ("s3", "s3a"):
+            _register_patient_s3()
         found = UPath(name, use_listings_cache=False, **_OPTIONS.get(protocol, {}))
         found.fs  # noqa: B018, it is made here
     except (ImportError, ValueError) as error:
@@ -92,6 +100,58 @@ def fetch(path: Path, target: Path) -> None:
     remote.fs.get_file(remote.path, str(target))
 
 
+class Stored(NamedTuple):
+    """A file of object storage: its size in bytes, and a version that changes whenever it is written."""
+
+    bytes: int
+    version: str
+
+
+def listing(folder: Path) -> dict[str, Stored]:
+    """Return all files below a folder of object storage, by path relative to it; S3 lists 1000 a request.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the bucket does not exist.
+    """
+    remote: Any = folder
+    root = remote.path.rstrip("/") + "/"
+    found = remote.fs.find(root, detail=True)
+    return {
+        path.removeprefix(root): Stored(int(about["size"]), fingerprint(sorted(map(str, about.items()))))
+        for path, about in found.items()
+        if about["type"] == "file" and path.startswith(root) and path != root
+    }
+
+
+def size_of(path: Path) -> int:
+    """Return the size of a file in bytes; FileNotFoundError if there is none."""
+    remote: Any = path
+    return path.stat().st_size if is_local(path) else int(remote.fs.info(remote.path)["size"])
+
+
+def is_file(path: Path) -> bool:
+    """Return whether there is such a file; an error of the storage is no answer, and raised."""
+    remote: Any = path
+    return path.is_file() if is_local(path) else remote.fs.exists(remote.path)
+
+
+def fetch_all(root: Path, targets: Mapping[str, Path]) -> None:
+    """Copy files of object storage, given by paths relative to `root`, to this machine, many at the same time."""
+    remote: Any = root
+    if targets:
+        sources = [(remote / path).path for path in targets]
+        remote.fs.get(sources, [str(target) for target in targets.values()], batch_size=_AT_ONCE)
+
+
+def remove_all(root: Path, paths: Sequence[str]) -> None:
+    """Remove files of object storage, given by paths relative to `root`, in this order; S3 removes 1000 a request."""
+    remote: Any = root
+    for start in range(0, len(paths), _AT_MOST_REMOVED):
+        remote.fs.rm([(remote / path).path for path in paths[start : start + _AT_MOST_REMOVED]])
+
+
 def store(source: Path, path: Path) -> None:
     """Copy a file of this machine to object storage, where it appears whole or not at all."""
     remote: Any = path
@@ -117,7 +177,7 @@ def explained(error: BaseException) -> BadInput | WorkFailed | None:
     reason = one_line(error, 120)
     if isinstance(error, PermissionError):
         return BadInput("--out", "", "refused", f"credentials of the environment that may read and write ({reason})")
-    if isinstance(error, FileNotFoundError):
+    if isinstance(error, FileNotFoundError) and "bucket" in reason.lower():
         return BadInput("--out", "", "not found", f"an existing bucket is needed ({reason})")
     return WorkFailed(f"--out: the storage fails ({reason}); finished work is kept, and the same command continues")
 
@@ -126,3 +186,36 @@ def _from_library(error: BaseException) -> bool:
     """Return whether an error of Python's own kinds was raised on behalf of a storage library."""
     cause = error.__cause__ or error.__context__
     return cause is not None and type(cause).__module__.split(".")[0] in _LIBRARIES
+
+
+@cache
+def _register_patient_s3() -> None:
+    """Let fsspec use, for S3, a file system that repeats requests which fail."""
+    from fsspec import register_implementation
+    from s3fs import S3FileSystem
+
+    class PatientS3(S3FileSystem):  # type: ignore[misc]
+        """S3 that repeats requests which fail."""
+
+        retries = 2  # of s3fs itself, also within the body of an answer
+
+        async def _call_s3(self, method: str, *options: Any, **arguments: Any) -> Any:
+            return await patiently(lambda: S3FileSystem._call_s3(self, method, *options, **arguments), _kind_of)
+
+    register_implementation("s3", PatientS3, clobber=True)
+    register_implementation("s3a", PatientS3, clobber=True)
+
+
+def _kind_of(error: Exception) -> Failure:
+    """Return whether an error of s3fs is an answer that asks to try again, no answer, or final."""
+    import botocore.exceptions
+    from s3fs.core import S3_RETRYABLE_ERRORS
+
+    response = getattr(error, "response", None) or getattr(error.__cause__, "response", None)
+    if isinstance(response, dict):
+        status = int(response.get("ResponseMetadata", {}).get("HTTPStatusCode", 0))
+        code = str(response.get("Error", {}).get("Code", ""))
+        asks = status >= 500 or status == 429 or code in ("SlowDown", "RequestTimeout")
+        return "answered" if asks and status != 501 else "final"
+    no_answer = isinstance(error, (*S3_RETRYABLE_ERRORS, ConnectionError, botocore.exceptions.ConnectionError))
+    return "unreached" if no_answer else "final"

@@ -20,6 +20,8 @@ from jobs.plan.task import Task
 from jobs.run.child import ONE_THREAD, interrupts_held
 from jobs.run.outcome import KILLED, Outcome, work
 from jobs.run.progress import LOOK, Board
+from pipeline import patience
+from pipeline.storage import place
 
 _TRIES: Final = 3  # a little more than once, as dask does for a task whose worker dies
 
@@ -41,7 +43,7 @@ def run_alone(task: Task, out: Path, inputs: Mapping[str, str], board: Board) ->
     context = multiprocessing.get_context("spawn")
     for _ in range(_TRIES):
         here, there = context.Pipe(duplex=False)
-        process = context.Process(target=_serve, args=(task, out, inputs, there), name=task.title)
+        process = context.Process(target=_serve, args=(task, str(out), inputs, there), name=task.title)
         with interrupts_held(), mock.patch.dict(os.environ, ONE_THREAD):
             process.start()
         there.close()  # so that the end of the process closes the pipe
@@ -68,15 +70,19 @@ def _received(task: Task, pipe: Connection, board: Board) -> Outcome | None:
             return None
         if isinstance(message, Outcome):
             return message
-        board.advance(task.id, message)
+        if isinstance(message, str):
+            board.say_once(message)
+        else:
+            board.advance(task.id, message)
 
 
-def _serve(task: Task, out: Path, inputs: Mapping[str, str], pipe: Connection) -> None:
+def _serve(task: Task, out: str, inputs: Mapping[str, str], pipe: Connection) -> None:
     """Do the task in the new process, which ends with the driver."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-    pipe.send(work(task, out, pipe.send, inputs))
+    patience.tell(pipe.send)
+    pipe.send(work(task, place(out), pipe.send, inputs))
 
 
 def _end_with(sentinel: int) -> None:

@@ -21,6 +21,7 @@ from jobs.run.progress import LOOK, TOPIC
 from jobs.run.receipt import Product
 from jobs.run.software import digest
 from jobs.run.workers import Workers
+from pipeline import patience
 from pipeline.storage import place
 
 _OUTCOMES: Final = "outcomes"  # begins the name of the topic of a run
@@ -152,6 +153,7 @@ def _work(tasks: Sequence[Task], out: str, inputs: Mapping[str, str], topic: str
             worker.log_event(TOPIC, {"task": task.id, "fraction": float(fraction)})
             last = now
 
+    patience.tell(lambda sentence: worker.log_event(TOPIC, {"sentence": sentence}))
     key, outcomes = worker.get_current_task(), dict[str, Any]()
     start = sent = time.monotonic()
     if len(tasks) == 1:

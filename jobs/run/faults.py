@@ -19,6 +19,7 @@ from jobs.run.manifest_file import ManifestFile, entry_of
 from jobs.run.reasons import CHANGED, NEVER, reasons
 from jobs.run.receipt import Product
 from pipeline.fingerprint import file_sha256
+from pipeline.storage import is_local
 from weaves.errors import BadInput
 
 Kind = Literal["missing", "outdated", "cut", "damaged", "odd", "foreign"]
@@ -80,17 +81,17 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
     name = f"{task.stage} {task.title}"
     if receipt is None:
         note = ledger.receipt_path(task)
-        if (ledger.out / note).exists():
+        if ledger.size(note) is not None:
             return [Fault("damaged", note, f"it is no valid receipt of {name}", task)]
-        if not any((ledger.out / path).exists() for path in task.products):
+        if all(ledger.size(path) is None for path in task.products):
             return [Fault("missing", task.products[0], f"it does not exist: {name} was not run", task, never_run=True)]
         if isinstance(task, Page):
             return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
         return [Fault("missing", note, f"it does not exist, but products of {name} do", task)]
-    found = [_product_fault(ledger.out, path, receipt.files.get(Path(path).name), task) for path in task.products]
+    found = [_product_fault(ledger, path, receipt.files.get(Path(path).name), task) for path in task.products]
     wrong = [fault for fault in found if fault]
     if isinstance(task, Page) and task.products[1] not in {fault.path for fault in wrong}:
-        wrong += _page_faults(task, ledger.out)
+        wrong += _page_faults(task, ledger)
     if wrong:
         return wrong
     if isinstance(task, Shard):
@@ -102,39 +103,41 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
     return []
 
 
-def _product_fault(out: Path, path: str, expected: Product | None, task: Task) -> Fault | None:
+def _product_fault(ledger: Ledger, path: str, expected: Product | None, task: Task) -> Fault | None:
     """Return the fault of one product, or None."""
     if expected is None:
         return Fault("outdated", path, "it is not on the receipt of its task", task)
     try:
-        bytes_ = (out / path).stat().st_size
+        bytes_ = ledger.size(path)
+        if bytes_ is None:
+            return Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
         if bytes_ < expected.bytes:
             return Fault("cut", path, f"it has {bytes_:,} of {expected.bytes:,} bytes", task)
         if bytes_ > expected.bytes:
             return Fault("damaged", path, f"it has {bytes_:,} bytes in place of {expected.bytes:,}", task)
-        if file_sha256(out / path) != expected.sha256:
+        if file_sha256(ledger.out / path) != expected.sha256:
             return Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", task)
-    except FileNotFoundError:
-        return Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
     except OSError as error:
+        if not is_local(ledger.out):
+            raise  # it is the storage that fails
         return Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
     return None
 
 
-def _page_faults(page: Page, out: Path) -> Iterator[Fault]:
+def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
     """Yield the faults of the files in a page's folder."""
     from reports.page.files import read_files
 
     try:
-        listed = read_files(out / page.folder)
+        listed = read_files(ledger.out / page.folder)
     except BadInput as error:
         yield Fault("damaged", page.products[1], f"it is {error.value}", page)
         return
     for name, sha256 in listed.items():
         path = f"{page.folder}/{name}"
-        if not (out / path).is_file():
+        if not ledger.is_file(path):
             yield Fault("missing", path, "it does not exist, although the page was written", page)
-        elif file_sha256(out / path) != sha256:
+        elif file_sha256(ledger.out / path) != sha256:
             yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
 
 
@@ -217,12 +220,11 @@ def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
 def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, faulty: Set[str]) -> list[Fault]:
     """Return the files in the recipe's own folders that no task made: data sets, models, pages with a sound list."""
     known = set(own_files(recipe, tasks, ledger.out))
-    folders = {Path(path).parent for task in tasks if task.stage != "bench" for path in task.products}
+    folders = {str(Path(path).parent) for task in tasks if task.stage != "bench" for path in task.products}
     for page in (task for task in tasks if isinstance(task, Page)):
         if not faulty.isdisjoint({page.products[1], ledger.receipt_path(page)}):
-            folders.discard(Path(page.folder))
-    files = [path for folder in folders for path in (ledger.out / folder).rglob("*") if path.is_file()]
-    named = {str(path.relative_to(ledger.out)) for path in files if not is_leftover(path.name)}
+            folders.discard(page.folder)
+    named = {path for path in ledger.paths(folders) if not is_leftover(Path(path).name)}
     foreign = sorted(named - known)
     return [Fault("foreign", path, "no task of this recipe made it") for path in foreign]
 

@@ -2,7 +2,8 @@
 
 A receipt ``ledger/<task id>.json`` lists a task's products with their sizes and hashes; it is written after them,
 whole or not at all. A task is done exactly when its receipt and every product, of the listed size, are there. No other
-state is kept, so nothing has to be repaired after a kill.
+state is kept, so nothing has to be repaired after a kill. In object storage the files are looked up in a snapshot
+(`jobs.run.snapshot`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from filelock import FileLock, Timeout
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
 from jobs.run.receipt import Product, Receipt, leaves, read_receipt
+from jobs.run.snapshot import LEDGER, Snapshot
 from jobs.run.workspace import workspace_of
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
@@ -38,35 +40,57 @@ class Ledger:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.folder = out / "ledger"
+        self.folder = out / LEDGER
+        self._snapshot = None if is_local(out) else Snapshot(out)
         self._synced = -math.inf
+
+    def exists(self) -> bool:
+        """Return whether any run has worked in the folder."""
+        return self.folder.is_dir() if self._snapshot is None else self._snapshot.size(f"{LEDGER}/lock") is not None
 
     def receipts(self, tasks: Iterable[str]) -> Iterator[Receipt]:
         """Yield every valid receipt of the folder but those of some tasks, given by their ids."""
-        others = {path.stem for path in self.folder.glob("[!.]*.json")} - set(tasks)
+        if self._snapshot is None:
+            found = [path.stem for path in self.folder.glob("[!.]*.json")]
+        else:
+            found = list(self._snapshot.ids())
+        others = set(found) - set(tasks)
         for name in sorted(name for name in others if "." not in name):
-            if receipt := read_receipt(self.folder / f"{name}.json", name):
+            if receipt := read_receipt(self._copy(f"{LEDGER}/{name}.json"), name):
                 yield receipt
 
     def state(self, task: Task) -> State:
         """Return the state of a task, from its files."""
         if self.done(task):
             return "done"
-        return "failed" if self._note(task).exists() else "missing"
+        return "failed" if self.size(self._note(task)) is not None else "missing"
+
+    def size(self, path: str) -> int | None:
+        """Return the size of a file in bytes, given by its path relative to the output folder; None if not there."""
+        if self._snapshot is not None:
+            return self._snapshot.size(path)
+        try:
+            return (self.out / path).stat().st_size
+        except OSError:
+            return None
+
+    def is_file(self, path: str) -> bool:
+        """Return whether there is such a file, given by its path relative to the output folder."""
+        return (self.out / path).is_file() if self._snapshot is None else self._snapshot.size(path) is not None
 
     def done(self, task: Task) -> Receipt | None:
         """Return the receipt of a task if it is done: every product is there and has the listed size."""
         receipt = self.receipt(task)
-        return receipt if receipt and all(self._is_whole(self.out / path, receipt) for path in task.products) else None
+        return receipt if receipt and all(self._is_whole(path, receipt) for path in task.products) else None
 
     def is_sound(self, task: Task) -> bool:
         """Return whether a task is done and its products have the bytes that are on its receipt; they are read."""
         receipt = self.receipt(task)
-        return receipt is not None and all(self._is_whole(self.out / path, receipt, True) for path in task.products)
+        return receipt is not None and all(self._is_whole(path, receipt, True) for path in task.products)
 
     def receipt(self, task: Task) -> Receipt | None:
         """Return a task's receipt; None if there is none, or no valid one."""
-        return read_receipt(self._receipt(task), task.id)
+        return read_receipt(self._copy(self.receipt_path(task)), task.id)
 
     def places(self, receipt: Receipt) -> Iterator[str]:
         """Yield the paths of the existing files that a receipt is about, relative to the output folder."""
@@ -77,8 +101,15 @@ class Ledger:
             "report": f"report/{glob.escape(receipt.title.removeprefix('page of '))}",
         }
         for name in receipt.files:
-            for path in sorted(self.out.glob(f"{folders.get(receipt.stage, 'none')}/{glob.escape(name)}")):
-                yield str(path.relative_to(self.out))
+            yield from self._named(folders.get(receipt.stage, "none"), name)
+
+    def paths(self, folders: Iterable[str]) -> Iterator[str]:
+        """Yield the paths of all files in or below some folders."""
+        if self._snapshot is not None:
+            yield from self._snapshot.below(folders)
+            return
+        for folder in folders:
+            yield from (str(path.relative_to(self.out)) for path in (self.out / folder).rglob("*") if path.is_file())
 
     def take(self, receipt: Receipt) -> None:
         """Write a receipt of another folder, after its products."""
@@ -86,7 +117,7 @@ class Ledger:
 
     def receipt_path(self, task: Task) -> str:
         """Return the path of a task's receipt, relative to the output folder."""
-        return str(self._receipt(task).relative_to(self.out))
+        return f"{LEDGER}/{task.id}.json"
 
     def products(self, task: Task) -> dict[str, Product]:
         """Return the products of a done task by file name, as its receipt lists them."""
@@ -100,7 +131,7 @@ class Ledger:
 
     def reason(self, task: Task) -> str:
         """Return why a task failed; empty when it did not."""
-        return str(self._read(self._note(task)).get("reason", ""))
+        return str(self._read(self._copy(self._note(task))).get("reason", ""))
 
     def finish(self, task: Task, files: Mapping[str, Product], seconds: float) -> None:
         """Write a task's receipt and forget that it ever failed.
@@ -112,13 +143,29 @@ class Ledger:
         receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3), identity=identity)
         durable = (now := time.monotonic()) - self._synced >= _SECONDS_BETWEEN_SYNCS
         self._synced = now if durable else self._synced
-        atomic_write(self._receipt(task), receipt.sealed(), durable=durable)
-        self._note(task).unlink(missing_ok=True)
+        content = receipt.sealed()
+        atomic_write(self.out / self.receipt_path(task), content, durable=durable)
+        if self._snapshot is not None:
+            self._snapshot.wrote_copy(self.receipt_path(task), content)
+            for path in task.products:
+                self._snapshot.wrote(path, files[Path(path).name].bytes)
+        self.remove(self._note(task))
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
         """Note why a task failed."""
         note = {**_heading(task), "reason": reason, "traceback": traceback}
-        atomic_write(self._note(task), json.dumps(note, indent=1).encode() + b"\n")
+        content = json.dumps(note, indent=1).encode() + b"\n"
+        atomic_write(self.out / self._note(task), content)
+        if self._snapshot is not None:
+            self._snapshot.wrote_copy(self._note(task), content)
+
+    def remove(self, path: str) -> None:
+        """Remove a file if it is there, given by its path relative to the output folder."""
+        if self._snapshot is None:
+            (self.out / path).unlink(missing_ok=True)
+        elif self._snapshot.size(path) is not None:
+            (self.out / path).unlink(missing_ok=True)
+            self._snapshot.removed(path)
 
     def adopt(self, task: Task) -> bool:
         """Take a task's products from another data set; return whether the task is then done.
@@ -129,21 +176,22 @@ class Ledger:
         receipt = self.receipt(task)
         if receipt is None:
             return False
-        for path in map(Path, task.products):
-            if self._is_whole(self.out / path, receipt):
+        for path in task.products:
+            if self._is_whole(path, receipt):
                 continue
             source = next((file for file in self._copies(path) if self._is_whole(file, receipt, verify=True)), None)
             if source is None:
                 return False
-            link(source, self.out / path)
+            link(self.out / source, self.out / path)
+            if self._snapshot is not None:
+                self._snapshot.wrote(path, receipt.files[Path(path).name].bytes)
         return self.done(task) is not None
 
     def is_elsewhere(self, task: Task) -> bool:
         """Return whether a task that is not done here has products of the right size in other data sets."""
         receipt = self.receipt(task)
         return receipt is not None and all(
-            any(self._is_whole(file, receipt) for file in (self.out / path, *self._copies(path)))
-            for path in map(Path, task.products)
+            any(self._is_whole(file, receipt) for file in (path, *self._copies(path))) for path in task.products
         )
 
     def discard(self, task: Task) -> list[str]:
@@ -152,11 +200,11 @@ class Ledger:
         The task then counts as missing. Damaged copies in other data sets go too: they may be links to the same bytes.
         """
         receipt, removed = self.receipt(task), []
-        for path in map(Path, task.products if receipt else ()):
-            for file in {self.out / path, *self._copies(path)}:
-                if file.is_file() and receipt and not self._is_whole(file, receipt, verify=True):
-                    file.unlink()
-                    removed.append(str(file.relative_to(self.out)))
+        for path in task.products if receipt else ():
+            for file in {path, *self._copies(path)}:
+                if self.is_file(file) and receipt and not self._is_whole(file, receipt, verify=True):
+                    self.remove(file)
+                    removed.append(file)
         return sorted(removed)
 
     @contextmanager
@@ -189,27 +237,36 @@ class Ledger:
         finally:
             lock.release()
 
-    def _copies(self, path: Path) -> list[Path]:
+    def _copies(self, path: str) -> list[str]:
         """Return the files of a shard's name in all data sets; none for the products of other tasks."""
-        return sorted(self.out.glob(f"{DATASETS}/*/{path.name}")) if path.parts[0] == DATASETS else []
+        return self._named(f"{DATASETS}/*", Path(path).name) if path.startswith(f"{DATASETS}/") else []
 
-    def _receipt(self, task: Task) -> Path:
-        return self.folder / f"{task.id}.json"
+    def _named(self, folder: str, name: str) -> list[str]:
+        """Return the paths of all files of a name in the folders of a pattern."""
+        if self._snapshot is not None:
+            return self._snapshot.named(folder, name)
+        found = self.out.glob(f"{folder}/{glob.escape(name)}")
+        return sorted(str(path.relative_to(self.out)) for path in found)
 
-    def _note(self, task: Task) -> Path:
-        return self.folder / f"{task.id}.failed.json"
+    def _copy(self, path: str) -> Path:
+        """Return a file of this machine with the content of a file of the ledger."""
+        return self.out / path if self._snapshot is None else self._snapshot.copy(path)
 
-    @staticmethod
-    def _is_whole(path: Path, receipt: Receipt, verify: bool = False) -> bool:
-        expected = receipt.files.get(path.name)
-        try:
-            return (
-                expected is not None
-                and path.stat().st_size == expected.bytes
-                and (not verify or file_sha256(path) == expected.sha256)
-            )
-        except OSError:
+    def _note(self, task: Task) -> str:
+        return f"{LEDGER}/{task.id}.failed.json"
+
+    def _is_whole(self, path: str, receipt: Receipt, verify: bool = False) -> bool:
+        expected = receipt.files.get(Path(path).name)
+        if expected is None or self.size(path) != expected.bytes:
             return False
+        try:
+            return not verify or file_sha256(self.out / path) == expected.sha256
+        except FileNotFoundError:
+            return False
+        except OSError:
+            if self._snapshot is None:
+                return False
+            raise  # a storage that fails has not lost the file
 
     @staticmethod
     def _read(path: Path) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 from jobs.plan.task import Progress, Task
 from jobs.run.receipt import Product, measure
 from jobs.run.workspace import workspace
+from pipeline.patience import StorageFailed
+from pipeline.storage import explained, is_local
 from weaves.errors import BadInput, WorkFailed
 
 KILLED = "the process that ran it was killed several times over; is there enough memory?"
@@ -35,6 +37,8 @@ class Outcome(NamedTuple):
         Address of the worker; empty if it is not known.
     refused : bool
         True if nothing was computed: the worker's software is not the driver's, or the worker died before.
+    storage_failed : bool
+        True if the storage failed for longer than it is waited for, or refused: no other task can be done either.
     """
 
     files: dict[str, Product]
@@ -43,6 +47,7 @@ class Outcome(NamedTuple):
     traceback: str = ""
     worker: str = ""
     refused: bool = False
+    storage_failed: bool = False
 
 
 def work(task: Task, out: Path, progress: Progress, inputs: Mapping[str, str] = MappingProxyType({})) -> Outcome:
@@ -53,8 +58,11 @@ def work(task: Task, out: Path, progress: Progress, inputs: Mapping[str, str] = 
             task.run(folder, progress)
             files = {Path(path).name: measure(folder / path) for path in task.products}
     except (BadInput, WorkFailed) as error:
-        return Outcome({}, time.perf_counter() - start, str(error))
+        failed = isinstance(error, StorageFailed)
+        return Outcome({}, time.perf_counter() - start, str(error), storage_failed=failed)
     except Exception as error:
+        if not is_local(out) and (found := explained(error)):
+            return Outcome({}, time.perf_counter() - start, str(found), storage_failed=True)
         return Outcome({}, time.perf_counter() - start, one_line(error), traceback.format_exc())
     return Outcome(files, time.perf_counter() - start)
 

@@ -5,18 +5,21 @@ How they are shown is the matter of `jobs.run.progress_forms`.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from threading import Lock
 from types import TracebackType
 from typing import Any, Final, Protocol
 
 from rich.console import Console
 
 from jobs.plan.task import STAGES, Stage, Task
+from pipeline import patience
 
 TOPIC: Final = "progress"
-"""Dask topic on which workers report the progress of a task: {"task": id, "fraction": share done}."""
+"""Dask topic on which workers report the progress of a task, {"task": id, "fraction": share done}, or a sentence."""
 
 KERNELS: Final = "kernels"
 """Dask topic on which workers name each kernel that is compiled or read from the cache."""
@@ -148,13 +151,17 @@ class Board:
         self._tasks = {task.id: task for task in tasks}
         self._shares: dict[str, float] = {}  # of the tasks under way
         self._heard, self._silence = time.monotonic(), _SILENCE
+        self._said: dict[str, float] = {}  # when each sentence was last said
+        self._lock = Lock()
 
     def __enter__(self) -> Board:
+        patience.tell(self.say_once)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        patience.tell(None)
         self._form.end(self.tally)
 
     def start(self, workers: int, dashboard: str | None) -> None:
@@ -171,6 +178,15 @@ class Board:
         """Show a sentence about the run."""
         self._form.say(self.tally, sentence)
 
+    def say_once(self, sentence: str) -> None:
+        """Show a sentence that several processes may say, unless it was said in the last minute."""
+        self._reported()
+        with self._lock:
+            now = time.monotonic()
+            new, self._said[sentence] = now - self._said.get(sentence, -math.inf) >= _SILENCE, now
+        if new:
+            self.say(sentence)
+
     def add(self, task: Task) -> None:
         """Add a task that was done before and is made again."""
         self._tasks[task.id] = task
@@ -184,8 +200,11 @@ class Board:
         self._form.task("begin", self.tally, task)
 
     def hear(self, event: tuple[float, Any]) -> None:
-        """Take a message of a worker about a task under way."""
+        """Take a message of a worker: about a task under way, or a sentence."""
         _, message = event
+        if "sentence" in message:
+            self.say_once(message["sentence"])
+            return
         self.advance(message["task"], float(message["fraction"]))
 
     def advance(self, id: str, share: float) -> None:

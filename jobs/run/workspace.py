@@ -16,7 +16,7 @@ from filelock import FileLock
 
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
-from pipeline import storage
+from pipeline import patience, storage
 from pipeline.fingerprint import file_sha256, fingerprint
 from weaves.errors import BadInput, WorkFailed
 
@@ -44,6 +44,7 @@ def workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Path
         return
     from pipeline.shards.manifest import FILE
 
+    patience.expect()  # the driver was answered
     folder = workspace_of(out)
     for path, sha256 in inputs.items():
         _fetch(out, folder, path, sha256)
@@ -74,7 +75,10 @@ def _fetch(out: Path, folder: Path, path: str, sha256: str) -> None:
         if sha256 and target.is_file() and file_sha256(target) == sha256:
             return
         temporary = target.with_name(f".tmp-{target.name}")
-        storage.fetch(out / path, temporary)
+        try:
+            storage.fetch(out / path, temporary)
+        except FileNotFoundError as error:
+            raise WorkFailed(f"{out / path}: it is not there any more") from error
         if sha256 and file_sha256(temporary) != sha256:
             raise WorkFailed(f"{out / path}: its bytes are not those that were written (SHA-256 differs)")
         temporary.replace(target)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 from jobs.run.cluster import HERE, Scheduler
 from pipeline.fingerprint import file_sha256
+from pipeline.storage import is_file
 from weaves.errors import BadInput, WorkFailed
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ RECORDS: Final = (STABILITY, TRUTH, SAMPLER)
 
 def measured_alone(out: Path) -> dict[str, str]:
     """Return the files of `RECORDS` that exist, each with its hash: they are inputs of a page."""
-    return {path: file_sha256(out / path) for path in RECORDS if (out / path).is_file()}
+    return {path: file_sha256(out / path) for path in RECORDS if is_file(out / path)}
 
 
 def bench_alone(name: str, out: Path, scheduler: Scheduler = HERE, workers: int = 0, progress: str = "auto") -> None:

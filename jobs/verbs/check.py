@@ -18,6 +18,7 @@ from jobs.recipe.recipe import Recipe
 from jobs.terminal import Terminal
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
+from pipeline.storage import is_local, place
 from weaves.errors import BadInput, WorkFailed, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.validation import read_toml
@@ -36,14 +37,17 @@ def resolve(subject: str) -> Path | Recipe | Fabric:
         If nothing or more than one thing has this name, or the file cannot be used.
     """
     presets, recipes = preset_names(), recipe_names()
-    kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", Path(subject).is_dir())]
+    folder = place(subject, WHERE)
+    if not is_local(folder):
+        return folder
+    kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", folder.is_dir())]
     if len(meant := [kind for kind, found in kinds if found]) > 1:
         # A path with a slash is never the name of a preset or a recipe.
         where = f"{'the folder ./' + subject if 'folder' in meant else 'the path of a .toml file'}"
         raise BadInput(WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it")
     match meant:
         case ["folder"]:
-            return Path(subject)
+            return folder
         case ["preset"]:
             return load_fabric(subject)
         case ["recipe"]:

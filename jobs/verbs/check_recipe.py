@@ -57,7 +57,7 @@ def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: P
         If a task failed, or another run is at work in the folder.
     """
     ledger = Ledger(out)
-    if not ledger.folder.is_dir():
+    if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", f"`twillight run {name}` makes them")
     with ledger.held():
         tasks, found = _found(name, out)
@@ -106,10 +106,10 @@ def _remove(fault: Fault, ledger: Ledger) -> None:
     if fault.task is None or fault.kind not in ("cut", "damaged", "missing"):
         return
     if fault.path == ledger.receipt_path(fault.task):
-        (ledger.out / fault.path).unlink(missing_ok=True)
+        ledger.remove(fault.path)
     ledger.discard(fault.task)
     if isinstance(fault.task, Page):  # its other files are not on the receipt
-        (ledger.out / fault.task.products[0]).unlink(missing_ok=True)
+        ledger.remove(fault.task.products[0])
 
 
 def _print(found: Sequence[Fault], out: Path) -> None:

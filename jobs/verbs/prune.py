@@ -7,7 +7,7 @@ reports, the recipes of `twillight require` and the Records of `twillight bench 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,7 @@ from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
+from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
 
 FOLDERS: Final[dict[Stage, str]] = {"generate": DATASETS, "train": "models", "bench": "records", "report": "report"}
@@ -43,16 +44,18 @@ def prune(recipes: Sequence[str], out: Path, delete: bool) -> None:
     ledger, console = Ledger(out), Terminal()
     if not recipes:
         raise BadInput("prune", "recipes", [], "name every recipe whose products are to be kept")
-    if not ledger.folder.is_dir():
+    if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", "--out must name a folder with products of a run")
     with ledger.held():
         needed = _needed(recipes, out)
-        every = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file() or path.is_symlink()}
+        stored = {} if is_local(out) else {path: one.bytes for path, one in listing(out).items()}
+        files = (path for path in out.rglob("*") if path.is_file() or path.is_symlink()) if is_local(out) else ()
+        every = set(stored) | {str(path.relative_to(out)) for path in files}
         made = _made(ledger, every)
         unneeded = sorted(made - needed)
         kept = sorted(every - made - needed - {"ledger/lock"})
         if unneeded:
-            console.print(_table(unneeded, out))
+            console.print(_table(unneeded, out, stored))
         if kept:
             names = ", ".join(kept[:MOST_SENTENCES])
             more = f" and {len(kept) - MOST_SENTENCES:,} more" if len(kept) > MOST_SENTENCES else ""
@@ -79,7 +82,7 @@ def _needed(recipes: Sequence[str], out: Path) -> set[str]:
         ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in shards(one)}
         needed.update(f"ledger/{id}{ending}" for id in ids for ending in (".json", ".failed.json"))
         # What a stopped training goes on from.
-        folders = [task.folder for task in tasks if hasattr(task, "folder")]
+        folders = [task.folder for task in tasks if hasattr(task, "folder")] if is_local(out) else []
         needed.update(
             str(path.relative_to(out))
             for folder in folders
@@ -115,7 +118,7 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
     return made
 
 
-def _table(paths: Sequence[str], out: Path) -> Table:
+def _table(paths: Sequence[str], out: Path, stored: Mapping[str, int]) -> Table:
     """Show numbers and sizes of files by folder."""
     table = table_of("folder", "files", "size", right=("files", "size"))
     groups: dict[str, list[str]] = {}
@@ -123,13 +126,18 @@ def _table(paths: Sequence[str], out: Path) -> Table:
         parts = Path(path).parts
         groups.setdefault("/".join(parts[:2]) if parts[0] == DATASETS else parts[0], []).append(path)
     for folder, members in groups.items():
-        table.add_row(folder, f"{len(members):,}", size(_bytes(members, out)))
-    table.add_row("all", f"{len(paths):,}", size(_bytes(paths, out)))
+        table.add_row(folder, f"{len(members):,}", size(_bytes(members, out, stored)))
+    table.add_row("all", f"{len(paths):,}", size(_bytes(paths, out, stored)))
     return table
 
 
-def _bytes(paths: Iterable[str], out: Path) -> int:
-    """Return the bytes that removing some files frees: a file with another name elsewhere frees none."""
+def _bytes(paths: Iterable[str], out: Path, stored: Mapping[str, int]) -> int:
+    """Return the bytes that removing some files frees: a file with another name elsewhere frees none.
+
+    `stored` has the sizes of files in object storage, where each file has one name.
+    """
+    if not is_local(out):
+        return sum(stored[path] for path in paths)
     found: dict[tuple[int, int], list[int]] = {}
     for path in paths:
         status = (out / path).lstat()
@@ -140,7 +148,11 @@ def _bytes(paths: Iterable[str], out: Path) -> int:
 
 def _delete(paths: Sequence[str], out: Path) -> None:
     """Remove products before their receipts, by which a stopped deletion finds them again; then empty folders."""
-    for path in sorted(paths, key=lambda path: path.startswith("ledger/")):
+    ordered = sorted(paths, key=lambda path: path.startswith("ledger/"))
+    if not is_local(out):
+        remove_all(out, ordered)
+        return
+    for path in ordered:
         (out / path).unlink(missing_ok=True)
     folders = {parent for path in paths for parent in Path(path).parents if parent.parts}
     for folder in sorted(folders, key=lambda folder: -len(folder.parts)):

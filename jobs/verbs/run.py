@@ -74,6 +74,7 @@ def work(
             settle=settle,
             progress=progress,
         )
+    ledger = Ledger(out)  # it has not seen what was written
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:
         console.print(f"nothing to do: {len(chosen)} tasks done")
@@ -96,7 +97,7 @@ def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
     page = next(task for task in tasks if isinstance(task, Page))
     timed = [task for task in tasks if task.alone and task.id in page.needs]
     if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
-        (ledger.out / page.products[0]).unlink()
+        ledger.remove(page.products[0])
 
 
 def _shards(recipe: Recipe, tasks: Sequence[Task]) -> list[Shard]:

@@ -1,0 +1,97 @@
+"""Measure the requests to object storage, and the time, that finished tasks cost a plan, a status and a resumed run.
+
+Command: ``PYTHONPATH=. python tests/scale/measure_requests.py [--tasks 1000]``
+
+An S3 server of the tests (moto, in a thread of this process) holds receipts and short products of a recipe's shards.
+Printed: requests, and seconds of the clock and (in brackets) of processor time, the server's included. A workspace is
+kept from line to line: the first look at the receipts fetches them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+
+from jobs.plan.dataset import Shard
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
+from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import measure
+from jobs.verbs.plan import facts_of
+from jobs.verbs.status import status_table
+from pipeline.storage import place
+from tests.jobs.s3_server import serving
+
+RECIPE = """
+name = "many"
+[dataset]
+seen = ["denim"]
+shard_rows = 64
+[dataset.rows]
+train = {train}
+validation = 64
+test = 64
+[[models]]
+model = "woven"
+"""
+
+
+def fill(tasks: list[Shard], folder: Path, address: str) -> None:
+    """Write short products and receipts of all tasks."""
+    import s3fs
+
+    ledger = Ledger(folder)
+    for task in tasks:
+        for path in task.products:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(task.id)
+        ledger.finish(task, {Path(path).name: measure(folder / path) for path in task.products}, 1.0)
+    storage = s3fs.S3FileSystem()
+    storage.makedirs(address.split("/")[2])
+    storage.put(str(folder) + "/", address + "/", recursive=True)
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--tasks", type=int, default=1000)
+    count = parser.parse_args().tasks
+    with tempfile.TemporaryDirectory() as name, serving() as (server, switch):
+        secret = {"AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret", "AWS_DEFAULT_REGION": "us-east-1"}
+        os.environ |= {"AWS_ENDPOINT_URL": server, "XDG_CACHE_HOME": f"{name}/cache"} | secret
+        (Path(name) / "many.toml").write_text(RECIPE.format(train=(count - 2) * 64))
+        tasks = [task for task in plan(load_recipe(f"{name}/many.toml")) if isinstance(task, Shard)]
+        fill(tasks, Path(name) / "out", "s3://products/many")
+        out = place("s3://products/many")
+
+        def resume() -> None:
+            summary = execute(tasks, out, console=Console(file=io.StringIO()))
+            assert len(summary.before) == len(tasks)
+
+        looks: dict[str, Callable[[], object]] = {
+            "status, first": lambda: status_table(tasks, Ledger(out)),
+            "status": lambda: status_table(tasks, Ledger(out)),
+            "plan": lambda: facts_of(tasks, Ledger(out)),
+            "resume": resume,
+        }
+        print(f"{len(tasks):,} finished tasks")
+        print("| | requests | seconds |")
+        print("|---|---|---|")
+        for what, look in looks.items():
+            switch.paths.clear()
+            wall, cpu = time.perf_counter(), time.process_time()
+            look()
+            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+            print(f"| {what} | {len(switch.paths):,} | {wall:.1f} ({cpu:.1f}) |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
