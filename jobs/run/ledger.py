@@ -3,7 +3,7 @@
 A receipt ``ledger/<task id>.json`` lists a task's products with their sizes and hashes; it is written after them,
 whole or not at all. A task is done exactly when its receipt and every product, of the listed size, are there. No other
 state is kept, so nothing has to be repaired after a kill. In object storage the files are looked up in a snapshot
-(`jobs.run.snapshot`).
+(`jobs.run.workspace`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from filelock import FileLock, Timeout
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
 from jobs.run.receipt import Product, Receipt, leaves, read_receipt
-from jobs.run.snapshot import LEDGER, Snapshot
-from jobs.run.workspace import workspace_of
+from jobs.run.workspace import LEDGER, Snapshot, workspace_of
 from pipeline.atomic import atomic_write, link
 from pipeline.fingerprint import file_sha256
 from pipeline.storage import is_local
