@@ -31,6 +31,7 @@ Split = Literal["train", "validation", "test"]
 FILE = "manifest.json"
 
 _MOST_BYTES: Final = 64 * MIB
+_LINES: Final = json.JSONEncoder(sort_keys=True, separators=(",\n   ", ": "))
 _MOST_FABRICS: Final = 110_000  # a population has at most 100,000
 
 
@@ -93,9 +94,13 @@ class Manifest(BaseModel):
         atomic_write(folder / FILE, self.encoded())
 
     def encoded(self) -> bytes:
-        """Return the bytes of its file; the same contents give the same bytes."""
-        ordered = self.model_copy(update={"shards": sorted(self.shards, key=lambda s: (s.fabric, s.split, s.start))})
-        return json.dumps(ordered.model_dump(mode="json"), indent=1, sort_keys=True).encode() + b"\n"
+        """Return the bytes of its file, JSON with sorted keys; the same contents give the same bytes."""
+        rest = json.dumps(self.model_dump(mode="json", exclude={"shards"}), indent=1, sort_keys=True)
+        # One shard at a time: for the whole with an indent, json keeps a kilobyte and a half for each.
+        ordered = sorted(self.shards, key=lambda shard: (shard.fabric, shard.split, shard.start))
+        shards = ",\n".join(map(_encoded, ordered))
+        text = rest.removesuffix("\n}") + ',\n "shards": [' + (f"\n{shards}\n ]" if shards else "]") + "\n}\n"
+        return text.encode()
 
     def without(self, files: Collection[str]) -> Manifest:
         """Return the manifest without the shards in some files."""
@@ -121,3 +126,8 @@ class Manifest(BaseModel):
             raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
         parts = [read_columns(folder / entry.file, entry.kind) for entry in entries]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _encoded(shard: ShardEntry) -> str:
+    """Return an entry, which has no nested values, as in JSON with an indent."""
+    return f"  {{\n   {_LINES.encode(shard.model_dump())[1:-1]}\n  }}"

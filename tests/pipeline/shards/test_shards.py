@@ -212,3 +212,19 @@ def test_identity_of_extra_rows_follows_their_parameters():
     red = TASK.fabric.model_copy(update={"warp": TASK.fabric.warp.model_copy(update={"diffuse": "#ff0000"})})
     assert tasks[0].model_copy(update={"fabric": red}).identity() == tasks[0].identity()
     assert "version" in tasks[0].identity()
+
+
+def test_a_manifest_is_written_as_json_writes_it():
+    fabric = load_fabric("denim")
+    entries = [
+        ShardEntry(
+            file=f"part-{start}.parquet", fabric='a "cloth" –,\n {}', split="test", start=start, rows=2, sha256=""
+        )
+        for start in (4, 2, 0)
+    ]
+    for shards in ([], entries):
+        manifest = Manifest(
+            name="m", fingerprint="f", roles={"seen": ["denim"]}, fabrics={"denim": fabric}, about={}, shards=shards
+        )
+        expected = manifest.model_copy(update={"shards": shards[::-1]}).model_dump(mode="json")
+        assert manifest.encoded().decode() == json.dumps(expected, indent=1, sort_keys=True) + "\n"
