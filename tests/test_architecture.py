@@ -109,6 +109,11 @@ def test_imports_point_upstream(module):
     assert not wrong, f"{module} imports {wrong}, which come after it"
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_nothing_imports_the_door_of_users(module):
+    assert "twillight" not in {name.split(".")[0] for name in imported(MODULES[module])}
+
+
 TESTS = {
     ".".join(path.relative_to(ROOT / "tests").with_suffix("").parts): path
     for package in ("weaves", "pipeline", "reports")
@@ -187,7 +192,7 @@ def test_rooms_are_small_and_say_what_is_in_them(room):
     assert described and len(described.splitlines()) <= 10, f"{room}: its docstring is missing or too long"
 
 
-SOURCES = [*MODULES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
+SOURCES = [ROOT / "twillight.py", *MODULES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
 """Files whose docstrings and comments may name modules."""
 
 DOTTED = re.compile(r"(?<![\w./-])(?:weaves|pipeline|reports|jobs)(?:\.[A-Za-z_]\w*)+")

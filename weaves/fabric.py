@@ -39,7 +39,16 @@ def _file_name(name: str) -> str:
 
 
 class Fabric(BaseModel):
-    """A woven fabric."""
+    """A woven fabric.
+
+    Examples
+    --------
+    >>> denim = load_fabric("denim")
+    >>> denim.weave.repeat
+    (4, 4)
+    >>> denim.model_copy(update={"name": "thin_denim", "optical_thickness": 0.5}).optical_thickness
+    0.5
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -104,6 +113,11 @@ def load_fabric(name_or_path: str | Path) -> Fabric:
     ------
     BadInput
         If there is no such preset or file, or it does not describe a fabric.
+
+    Examples
+    --------
+    >>> load_fabric("satin_8").weave.repeat
+    (8, 8)
     """
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         path = Path(name_or_path)

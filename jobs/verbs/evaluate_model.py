@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.models.registry import load_model, pretrained_folder, pretrained_names
+from pipeline.models.registry import load_model, model_folder
 from pipeline.shards.evaluate import Answerer
-from pipeline.storage import place
 from pipeline.truth.query import Queries
-from weaves.errors import BadInput, nearest
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.reading import MIB, read_text
 
@@ -41,11 +40,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     BadInput
         If there is no such model, its files are damaged, or it does not cover the fabric.
     """
-    known = pretrained_names()
-    folder = pretrained_folder(model) if model in known else place(model, "--model")
-    if not (folder / "card.json").is_file():
-        allowed = f"the folder of a trained model or a name is needed; {nearest(model, known)}"
-        raise BadInput("evaluate", "--model", model, allowed)
+    folder = model_folder(model, "evaluate", "--model")
     (method,) = load_model(folder)
     if not method.covers(fabric):
         raise BadInput("evaluate", "--model", model, f"this model was not trained on {fabric.name}")

@@ -21,6 +21,7 @@ from torch import Tensor
 from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.method import Method
+from pipeline.storage import place
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
 
@@ -46,6 +47,28 @@ def pretrained_folder(model: str) -> Path:
 def pretrained_names() -> list[str]:
     """Return the names of the models that come with the package, trained."""
     return sorted(path.parents[1].name for path in Path(__file__).parent.glob(f"*/pretrained/{CARD}"))
+
+
+def model_folder(model: str, where: str, key: str) -> Path:
+    """Return the folder of a trained model.
+
+    Parameters
+    ----------
+    model : str
+        Name of one that comes with the package, or path of a folder with ``model.safetensors`` and ``card.json``.
+    where, key : str
+        The function or verb and its argument that name the model, for messages.
+
+    Raises
+    ------
+    BadInput
+        If there is no such model.
+    """
+    known = pretrained_names()
+    folder = pretrained_folder(model) if model in known else place(model, key)
+    if not (folder / CARD).is_file():
+        raise BadInput(where, key, model, f"the folder of a trained model or a name is needed; {nearest(model, known)}")
+    return folder
 
 
 def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:

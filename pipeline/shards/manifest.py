@@ -112,13 +112,14 @@ class Manifest(BaseModel):
 
     def read(self, folder: Path, fabric: str, split: Split) -> tuple[Queries, Answers]:
         """Return all rows of a fabric's split in stream order, checksums verified; BadInput if there are none."""
-        return rows_of(self._columns(folder, fabric, split))
+        return rows_of(self.columns(folder, fabric, split))
 
     def read_extra(self, folder: Path, fabric: str, extra: ExtraRows) -> dict[str, npt.NDArray[Any]]:
         """Return all extra rows of a fabric by column, in stream order, checksums verified; BadInput if none."""
-        return self._columns(folder, fabric, set_name(extra))
+        return self.columns(folder, fabric, set_name(extra))
 
-    def _columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
+    def columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
+        """Return all rows of a fabric's split or set by column, the fabric left out; errors as `read`."""
         entries = sorted(
             (s for s in self.shards if s.fabric == fabric and s.split == split), key=lambda entry: entry.start
         )

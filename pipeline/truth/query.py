@@ -36,6 +36,17 @@ class Queries(NamedTuple):
     curvature : float32 (N,)
         Curvature kappa of the cloth in the viewer's plane, in 1/yarn spacings, 0 <= kappa <= 1; across it lies the axis
         of the cylinder that the cloth is wrapped around.
+
+    Examples
+    --------
+    Light and viewer straight above one yarn and straight above its neighbour:
+
+    >>> up = [[0, 0, 1], [0, 0, 1]]
+    >>> queries = Queries.round(u=[0.5, 1.5], v=[0.5, 0.5], sigma=[0.1, 0.1], wi=up, wo=up)
+    >>> queries.behind.tolist()
+    [False, False]
+    >>> len(queries.take(queries.u > 1).u)
+    1
     """
 
     u: Float32
@@ -50,13 +61,20 @@ class Queries(NamedTuple):
     @classmethod
     def round(
         cls,
-        u: Float32,
-        v: Float32,
-        sigma: Float32,
-        wi: Float32,
-        wo: Float32,
+        u: npt.ArrayLike,
+        v: npt.ArrayLike,
+        sigma: npt.ArrayLike,
+        wi: npt.ArrayLike,
+        wo: npt.ArrayLike,
     ) -> Queries:
-        """Return queries about round footprints of a flat cloth."""
+        """Return queries about round footprints of a flat cloth, from arrays (N,) and directions (N, 3).
+
+        Examples
+        --------
+        >>> Queries.round(u=[0.5], v=[0.5], sigma=[0.1], wi=[[0.6, 0, 0.8]], wo=[[0, 0, 1]]).wi.shape
+        (1, 3)
+        """
+        u, v, sigma, wi, wo = (np.asarray(column, np.float32) for column in (u, v, sigma, wi, wo))
         flat = np.zeros_like(sigma)
         return cls(u, v, sigma, wi, wo, sigma, flat, flat)
 
@@ -106,6 +124,15 @@ STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
 
 
+def _refuse_shapes(queries: Queries, where: str) -> None:
+    """Refuse columns that are not of N rows, or of N directions."""
+    rows = np.shape(queries.u)[:1] or (1,)
+    for name, column in zip(Queries._fields, queries, strict=True):
+        shape = (*rows, 3) if name in ("wi", "wo") else rows
+        if np.shape(column) != shape:
+            raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
+
+
 def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
     """Return the fault of each query that has no answer: row -> (column, value, what is allowed)."""
     found: dict[int, tuple[str, object, str]] = {}
@@ -140,6 +167,7 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
 
 def validate(queries: Queries, where: str = "queries") -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
+    _refuse_shapes(queries, where)
     found = faults(queries)
     if not found:
         return

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from jobs.verbs.evaluate_model import pretrained_names
-from pipeline.models.registry import load_model, pretrained_folder
+from pipeline.models.registry import load_model, pretrained_folder, pretrained_names
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

@@ -1,0 +1,229 @@
+"""The door: `twillight` from Python, as its docstrings, the README and a stranger's folders use it."""
+
+import doctest
+import inspect
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import torch
+
+import twillight
+from pipeline.fingerprint import file_sha256
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.store import write_shard
+from pipeline.truth.query import Answers
+from twillight import BadInput, Dataset, Fabric, Queries, evaluate, load_fabric, load_model, open_dataset, to_rgb
+
+ROOT = Path(__file__).parents[1]
+ROWS = {("denim", "train"): (200, 150), ("denim", "test"): (40,), ("twill_4_4", "test"): (30,)}
+"""Rows of the shards of each fabric and split."""
+
+
+@pytest.fixture
+def dataset(tmp_path, monkeypatch):
+    """A data set where the docstrings expect one; the components of row n of a fabric are n + 1."""
+    folder = tmp_path / "out" / "datasets" / "tiny"
+    folder.mkdir(parents=True)
+    fabrics, shards = {name: load_fabric(name) for name, _ in ROWS}, []
+    for (name, split), counts in ROWS.items():
+        start = 0
+        for rows in counts:
+            queries = draw_queries(QueryOptions(), fabrics[name].weave.repeat, len(name), start, rows)
+            mean = np.repeat(np.arange(start, start + rows, dtype=np.float32)[:, None] + 1, 4, axis=1)
+            file = f"{name}-{split}-{start}.parquet"
+            write_shard(folder / file, name, queries, Answers.opaque(mean, mean, np.ones(rows, np.int32)), {})
+            sha256 = file_sha256(folder / file)
+            shards.append(ShardEntry(file=file, fabric=name, split=split, start=start, rows=rows, sha256=sha256))
+            start += rows
+    roles = {"seen": ["denim"], "population": [], "unseen": ["twill_4_4"]}
+    Manifest(name="tiny", fingerprint="0", roles=roles, fabrics=fabrics, about={}, shards=shards).save(folder)
+    monkeypatch.chdir(tmp_path)
+    return open_dataset(folder)
+
+
+def public():
+    """Yield the functions and classes of the door with their public methods."""
+    for name in twillight.__all__:
+        thing = getattr(twillight, name)
+        if inspect.isfunction(thing) or (inspect.isclass(thing) and thing is not BadInput):
+            yield name, thing
+    for name, method in vars(Dataset).items():
+        if inspect.isfunction(method) and not name.startswith("_"):
+            yield f"Dataset.{name}", method
+
+
+@pytest.mark.parametrize(("name", "thing"), [("twillight", twillight), *public()])
+def test_every_docstring_has_an_example_that_runs(name, thing, dataset):
+    names = {name: getattr(twillight, name) for name in twillight.__all__}
+    (example, *_) = doctest.DocTestFinder(recurse=False).find(thing, name, module=False, globs=names)
+    assert example.examples, f"{name} has no example"
+    found = []
+    doctest.DocTestRunner().run(example, out=found.append)
+    assert not found, "".join(found)
+
+
+def test_the_example_of_the_readme(tmp_path, monkeypatch):
+    """Ten lines as they are printed: the pretrained model is within a tenth of the truth, and there is a picture."""
+    (example,) = re.findall(r"(?:^    .*\n)*^    from twillight import .*\n(?:^    .*\n)*", README, re.M)
+    lines = [line.removeprefix("    ") for line in example.rstrip().splitlines()]
+    assert len([line for line in lines if line]) <= 10
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile("\n".join(lines), "README.md", "exec"), names)
+    plt.close("all")
+    (picture,) = tmp_path.iterdir()
+    pixels = plt.imread(picture)[..., :3]
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000
+    truth, model = names["truth"] @ np.ones(4), names["model"] @ np.ones(4)
+    assert np.sqrt(np.mean((model - truth) ** 2)) < 0.1 * truth.mean()
+
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def run(code, folder, *paths):
+    """Run Python in a folder, whose own packages come first; return its exit code and what it printed."""
+    path = os.pathsep.join(map(str, (*paths, ROOT)))
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_door_opens_without_heavy_libraries(tmp_path):
+    heavy = ["torch", "numba", "pyarrow", "scipy", "pandas", "matplotlib", "mitsuba", "distributed"]
+    code = f"import twillight, sys; print([n for n in {heavy} if n in sys.modules])"
+    assert run(code, tmp_path) == (0, "[]\n")
+
+
+@pytest.mark.parametrize("name", ["weaves", "pipeline", "reports", "jobs"])
+def test_a_package_that_hides_ours_is_named_with_both_paths(name, tmp_path):
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").touch()
+    code, said = run("import twillight", tmp_path)
+    assert code == 1
+    last = said.strip().splitlines()[-1]
+    assert last.startswith("ImportError: ")
+    assert str(tmp_path / name) in last and str(ROOT / name) in last
+
+
+def test_a_module_that_hides_ours_is_named_too(tmp_path):
+    (tmp_path / "jobs.py").touch()
+    code, said = run("import twillight", tmp_path)
+    assert code == 1 and str(tmp_path / "jobs.py") in said.splitlines()[-1]
+
+
+def test_a_folder_without_code_hides_nothing_where_ours_is_on_the_path(tmp_path):
+    (tmp_path / "reports").mkdir()
+    assert run("import twillight", tmp_path) == (0, "")
+
+
+def test_evaluate_takes_lists_and_double_precision():
+    columns = {"u": [0.5, 1.5], "v": [0.5, 0.5], "sigma": [0.3, 0.3], "wi": [[0.6, 0, 0.8]] * 2, "wo": [[0, 0, 1]] * 2}
+    single = Queries.round(**columns)
+    assert {column.dtype for column in single} == {np.dtype(np.float32)}
+    double = Queries(*(np.asarray(column, np.float64) for column in single))
+    denim = load_fabric("denim")
+    assert np.array_equal(evaluate(denim, single).mean, evaluate(denim, double).mean)
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "sentence"),
+    [
+        ({}, {"relative_eror": 0.1}, "relative_eror"),
+        ({}, {"relative_error": -1.0}, "relative_error"),
+        ({}, {"seed": -1}, "seed = -1"),
+        ({"sigma": np.zeros(1, np.float32)}, {}, "sigma[0]"),
+        ({"wi": np.float32([[1, 1, 1]])}, {}, "unit length"),
+        ({"wi": np.float32([0, 0, 1])}, {}, "shape of wi = (3,)"),
+        ({"v": np.zeros(2, np.float32)}, {}, "shape of v = (2,)"),
+    ],
+)
+def test_bad_input_of_evaluate_is_one_sentence(change, options, sentence):
+    queries = Queries.round(u=[0.5], v=[0.5], sigma=[0.3], wi=[[0, 0, 1]], wo=[[0, 0, 1]])._replace(**change)
+    with pytest.raises(BadInput, match=re.escape(sentence)):
+        evaluate(load_fabric("denim"), queries, **options)
+
+
+@pytest.mark.parametrize("name", ["selvege", "no/such/folder"])
+def test_a_model_that_does_not_exist(name):
+    with pytest.raises(BadInput, match="selvage"):
+        load_model(name)
+
+
+def test_transmitted_light_takes_other_colours():
+    text = load_fabric("voile").to_toml()
+    assert "diffuse_transmission" in text, "the example needs a fabric with colours of transmission"
+    queries = Queries.round([0, 0], [0, 0], [1, 1], [[0, 0, 1], [0, 0, -1]], [[0, 0, 1]] * 2)
+    front, behind = to_rgb(load_fabric("voile"), [[0, 0, 1, 0]] * 2, queries)
+    warp = load_fabric("voile").warp
+    assert tuple(front) == warp.diffuse_rgb and tuple(behind) == warp.diffuse_transmission_rgb
+
+
+def test_rows_are_the_same_in_every_form(dataset):
+    queries, answers = dataset.numpy("denim", "train")
+    assert answers.mean[:, 0].tolist() == list(range(1, 351))
+    frame = dataset.pandas("train")
+    assert frame["diffuse_weft"].tolist() == list(range(1, 351))
+    assert np.array_equal(frame[["wi_x", "wi_y", "wi_z"]].to_numpy(), queries.wi)
+    batches = list(dataset.torch("train", rows=64, seed=None))
+    assert [len(batch["u"]) for batch in batches] == [64, 64, 64, 8, 64, 64, 22]
+    assert torch.cat([batch["specular_warp"] for batch in batches]).tolist() == list(range(1, 351))
+
+
+def test_all_fabrics_of_a_split(dataset):
+    frame = dataset.pandas("test")
+    assert frame["fabric"].value_counts().to_dict() == {"denim": 40, "twill_4_4": 30}
+    assert set(frame[frame["fabric"] == "twill_4_4"]["specular_warp"]) == set(range(1, 31))
+    (batch,) = dataset.torch("test", fabrics=["twill_4_4"])
+    assert batch["fabric"].tolist() == [0] * 30
+
+
+def test_the_order_of_a_stream_is_that_of_its_seed(dataset):
+    def order(stream):
+        return [value for batch in stream for value in batch["u"].tolist()]
+
+    stream = dataset.torch("train", rows=50, seed=3)
+    first, second = order(stream), order(stream)
+    assert first != second and sorted(first) == sorted(second)
+    assert order(dataset.torch("train", rows=50, seed=3)) == first
+    assert order(dataset.torch("train", rows=50, seed=4)) != first
+
+
+def test_workers_of_a_data_loader_share_the_rows(dataset):
+    loader = torch.utils.data.DataLoader(dataset.torch("train"), batch_size=None, num_workers=2)
+    found = [value for batch in loader for value in batch["diffuse_warp"].tolist()]
+    assert sorted(found) == list(range(1, 351))
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda data: data.numpy("denin", "test"), "did you mean 'denim'"),
+        (lambda data: data.numpy("twill_4_4", "train"), "no rows"),
+        (lambda data: data.pandas("trian"), "did you mean 'train'"),
+        (lambda data: data.torch("test", rows=0), "rows = 0"),
+        (lambda data: data.torch("test", seed=-1), "seed = -1"),
+        (lambda data: open_dataset("nowhere"), "does not exist"),
+    ],
+)
+def test_bad_input_of_a_dataset_is_one_sentence(call, sentence, dataset):
+    with pytest.raises(BadInput, match=re.escape(sentence)):
+        call(dataset)
+
+
+def test_a_damaged_shard_is_refused(dataset, tmp_path):
+    path = tmp_path / "out" / "datasets" / "tiny" / "denim-test-0.parquet"
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(BadInput, match="not a whole Parquet file"):
+        dataset.pandas("test")
+
+
+def test_fabrics_are_models_of_pydantic():
+    assert Fabric.model_validate(load_fabric("denim").model_dump()) == load_fabric("denim")
