@@ -38,7 +38,7 @@ def _refuse_hidden_packages() -> None:
             spec = find_spec(name)
         except ValueError:  # a module that somebody made by hand
             spec = None
-        folders = [Path(str(found)) for found in spec.submodule_search_locations or [spec.origin]] if spec else []
+        folders = [Path(found) for found in spec.submodule_search_locations or [str(spec.origin)]] if spec else []
         if ours not in [folder.resolve() for folder in folders]:
             found = f"finds {folders[0]}" if folders else "does not find it"
             allowed = "rename that one, or start Python in another folder"
