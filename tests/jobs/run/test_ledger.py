@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jobs.plan.task import Place, Task
@@ -137,6 +137,7 @@ def test_a_receipt_with_an_odd_identity_counts_as_missing(done, value):
     assert done.state(TASK) == "missing"
 
 
+@settings(deadline=None)
 @given(st.data())
 def test_every_flipped_byte_of_a_receipt_is_found(data):
     files = {"y": Product(sha256="ab" * 32, bytes=12)}
