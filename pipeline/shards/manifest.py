@@ -118,14 +118,16 @@ class Manifest(BaseModel):
         """Return all extra rows of a fabric by column, in stream order, checksums verified; BadInput if none."""
         return self.columns(folder, fabric, set_name(extra))
 
-    def columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
-        """Return all rows of a fabric's split or set by column, the fabric left out; errors as `read`."""
-        entries = sorted(
-            (s for s in self.shards if s.fabric == fabric and s.split == split), key=lambda entry: entry.start
-        )
+    def parts(self, folder: Path, fabric: str, split: str) -> list[ShardEntry]:
+        """Return a fabric's shards of a split or set, in stream order; BadInput if there are none."""
+        entries = [shard for shard in self.shards if shard.fabric == fabric and shard.split == split]
         if not entries:
             raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
-        parts = [read_columns(folder / entry.file, entry.kind) for entry in entries]
+        return sorted(entries, key=lambda entry: entry.start)
+
+    def columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
+        """Return all rows of a fabric's split or set by column, the fabric left out; errors as `read`."""
+        parts = [read_columns(folder / entry.file, entry.kind) for entry in self.parts(folder, fabric, split)]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

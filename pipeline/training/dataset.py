@@ -11,7 +11,9 @@ therefore sees the rows it would have seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +22,8 @@ from torch import Tensor
 
 from pipeline.atomic import atomic_path
 from pipeline.models.method import Batch
-from pipeline.shards.manifest import Manifest
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.store import read_shard
 from pipeline.truth.query import Answers, Queries
 
 COLUMNS = 17
@@ -28,6 +31,8 @@ COLUMNS = 17
 
 TARGET = slice(12, 16)
 """The columns of the components."""
+
+_READERS: Final = 4  # shards that are read at the same time
 
 _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
@@ -64,10 +69,15 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
     with atomic_path(cache) as temporary:
         shape = (sum(counts), COLUMNS)
         table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-        start = 0
-        for name, count in zip(fabrics, counts, strict=True):
-            table[start : start + count] = as_table(*manifest.read(folder, name, "train"))
-            start += count
+        parts = [part for name in fabrics for part in manifest.parts(folder, name, "train")]
+        starts = np.cumsum([0, *(part.rows for part in parts)])
+
+        def fill(part: ShardEntry, start: int) -> None:
+            table[start : start + part.rows] = as_table(*read_shard(folder / part.file))
+
+        with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
+            for _ in pool.map(fill, parts, starts):
+                pass
         table.flush()
     return Rows(np.load(cache, mmap_mode="r"), counts)
 

@@ -1,6 +1,9 @@
 """Products in object storage: a real S3 server, failures of it, and the bytes of a run in a folder."""
 
 import hashlib
+import re
+import threading
+import time
 from pathlib import Path
 
 import pyarrow as pa
@@ -10,7 +13,12 @@ import pytest
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import measure
+from jobs.verbs.status import status_table
+from pipeline import patience
 from pipeline.storage import place
+from tests.jobs import fake_stages
 from tests.jobs.s3_server import serving
 
 RECIPE = """
@@ -37,6 +45,22 @@ batch = 32
 checkpoint_every = 2
 device = "cpu"
 """
+BENCH = """
+[[models]]
+model = "point_sampled"
+counts = [2]
+[bench]
+sphere_size = [16, 16]
+plane_size = [16, 16]
+picture_counts = [2]
+frames = 3
+frame_size = [16, 16]
+rows = 64
+timing_rows = 64
+timing_repeats = 20
+latents = false
+truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 128 }
+"""
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +71,7 @@ def server():
 
 @pytest.fixture
 def switch(server, monkeypatch, tmp_path):
+    import fsspec
     import s3fs
 
     address, switch = server
@@ -55,7 +80,9 @@ def switch(server, monkeypatch, tmp_path):
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret-of-the-tests")
     monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    s3fs.S3FileSystem.clear_instance_cache()
+    monkeypatch.setattr(patience, "_state", patience._State())
+    place("s3://products/x")  # which tells fsspec its class
+    fsspec.get_filesystem_class("s3").clear_instance_cache()
     switch.set("")
     s3fs.S3FileSystem().makedirs("products", exist_ok=True)
     yield switch
@@ -161,3 +188,184 @@ def test_an_upload_that_is_cut_is_tried_again_or_leaves_nothing(switch, tmp_path
     switch.set("cut", count=2)
     store(source, target)
     assert target.read_bytes() == source.read_bytes()
+
+
+def counts(table):
+    """Return the numbers of done, failed and missing tasks of the first stage."""
+    return [next(iter(column.cells)) for column in table.columns][1:]
+
+
+def test_finished_tasks_cost_one_request_a_receipt_and_then_none(switch, tmp_path):
+    import s3fs
+
+    tasks = [fake_stages.task(f"shard {index}", folder="datasets/a") for index in range(200)]
+    here = Ledger(tmp_path / "out")
+    for task in tasks:
+        task_file = tmp_path / "out" / task.products[0]
+        task_file.parent.mkdir(parents=True, exist_ok=True)
+        task_file.write_text(task.name)
+        here.finish(task, {task_file.name: measure(task_file)}, 1.0)
+    s3fs.S3FileSystem().put(f"{tmp_path / 'out'}/", "s3://products/many/", recursive=True)
+    there = place("s3://products/many")
+    listings = 2 + 3 * 3  # of five folders; s3fs asks twice more about each that is empty
+    for expected in (len(tasks) + listings, listings):
+        switch.paths.clear()
+        assert counts(status_table(tasks, Ledger(there))) == ["200", "0", "0"]
+        assert len(switch.paths) <= expected
+    # What has changed is seen: a receipt that is gone, one with other content, a product that is cut.
+    (there / here.receipt_path(tasks[0])).unlink()
+    (there / here.receipt_path(tasks[1])).write_bytes(b"{}")
+    (there / tasks[2].products[0]).write_bytes(b"")
+    switch.paths.clear()
+    assert counts(status_table(tasks, Ledger(there))) == ["197", "0", "3"]
+    assert len(switch.paths) <= 1 + listings
+
+
+def test_a_ledger_sees_what_it_has_written(switch, tmp_path):
+    ledger, task = Ledger(place("s3://products/own")), fake_stages.task("a", folder="datasets/a")
+    assert ledger.state(task) == "missing"
+    ledger.fail(task, "the disk was full")
+    assert (ledger.state(task), ledger.reason(task)) == ("failed", "the disk was full")
+    product = ledger.out / task.products[0]
+    product.write_bytes(b"whole")
+    ledger.finish(task, {product.name: measure(product)}, 1.0)
+    for one in (ledger, Ledger(ledger.out)):
+        assert (one.state(task), one.reason(task), one.seconds(task)) == ("done", "", 1.0)
+    twin = fake_stages.task("a", folder="datasets/b")
+    assert twin.id == task.id and ledger.adopt(twin) and ledger.state(twin) == "done"
+    product.write_bytes(b"flaw!")
+    assert ledger.discard(task) == [task.products[0]] and ledger.state(task) == "missing"
+    assert not product.exists()
+
+
+@pytest.mark.parametrize(
+    "tokens",
+    [
+        ["merge", "s3://products/a", "b", "--out", "c"],
+        ["merge", "a", "b", "--out", "s3://products/c"],
+        ["compare", "s3://products/a", "b"],
+        ["show", "denim", "--out", "s3://products/a"],
+        ["export", "denim", "--mesh", "s3://products/a.ply"],
+        ["results", "quick", "--file", "s3://products/a.md"],
+    ],
+)
+def test_verbs_that_need_a_folder_refuse_an_address(switch, tmp_path, monkeypatch, capsys, tokens):
+    monkeypatch.chdir(tmp_path)
+    switch.paths.clear()
+    assert main(tokens) == 2
+    said = capsys.readouterr()
+    assert "is an address; a path of this machine is needed here" in said.err and not said.out
+    assert not switch.paths and not Path("s3:").exists()
+
+
+@pytest.mark.parametrize("verb", ["status", "plan", "check", "run"])
+def test_a_bucket_that_does_not_exist_is_bad_input(switch, tmp_path, capsys, verb):
+    (tmp_path / "stored.toml").write_text(RECIPE)
+    assert main([verb, str(tmp_path / "stored.toml"), "--out", "s3://there-is-none/x"]) == 2
+    assert "an existing bucket is needed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["status", "plan", "check", "generate"])
+def test_a_storage_that_does_not_answer_ends_with_a_sentence(switch, tmp_path, capsys, monkeypatch, verb):
+    import fsspec
+
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    fsspec.get_filesystem_class("s3").clear_instance_cache()
+    monkeypatch.setattr(patience, "UNREACHED_SECONDS", 0.5)
+    (tmp_path / "stored.toml").write_text(RECIPE)
+    assert main([verb, str(tmp_path / "stored.toml"), "--out", "s3://products/x"]) == 1
+    assert "the object storage cannot be reached" in capsys.readouterr().err
+
+
+def test_a_storage_that_fails_for_too_long_loses_nothing(switch, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(patience, "MOST_SECONDS", 2.0)
+    task = fake_stages.task("a", folder="datasets/a")
+    (tmp_path / "file").write_bytes(b"whole")
+    out = place("s3://products/long")
+    (out / task.products[0]).write_bytes(b"whole")
+    Ledger(out).finish(task, {Path(task.products[0]).name: measure(tmp_path / "file")}, 1.0)
+    switch.set("fail")
+    with pytest.raises(patience.StorageFailed, match="failed for 2 s"):
+        Ledger(out).state(task)
+    assert capsys.readouterr().err.count("the object storage fails") == 1
+    switch.set("")
+    assert Ledger(out).state(task) == "done"
+
+
+def after_first_receipt(switch, action):
+    """Call a function, in a thread, as soon as the first receipt is written."""
+    switch.paths.clear()
+
+    def watch():
+        while not any(re.fullmatch(r"PUT .*/ledger/.*\.json", path) for path in list(switch.paths)):
+            time.sleep(0.05)
+        action()
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.mark.slow
+def test_a_run_waits_for_a_storage_that_fails_for_a_minute(switch, tmp_path, capsys):
+    recipe = tmp_path / "stored.toml"
+    recipe.write_text(RECIPE)
+
+    def fail():
+        switch.set("fail")
+        time.sleep(60)
+        switch.set("")
+
+    thread = after_first_receipt(switch, fail)
+    assert main(["generate", str(recipe), "--out", "s3://products/minute", "--workers", "1"]) == 0
+    thread.join()
+    said = capsys.readouterr().err
+    assert said.count("the object storage fails") == 1, said
+    assert main(["check", str(recipe), "--out", "s3://products/minute"]) == 1  # nothing was trained
+    assert "generate" not in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch, tmp_path, capsys, monkeypatch):
+    recipe, tokens = tmp_path / "stored.toml", ["--out", "s3://products/ends", "--workers", "1"]
+    recipe.write_text(RECIPE)
+    monkeypatch.setattr(patience, "MOST_SECONDS", 5.0)  # of the driver; workers would wait for ten minutes
+    thread = after_first_receipt(switch, lambda: switch.set("fail"))
+    assert main(["generate", str(recipe), *tokens]) == 1
+    thread.join()
+    said = capsys.readouterr().err.strip().splitlines()
+    assert "the object storage" in said[-1] and "finished work is kept" in said[-1] and len(said[-1]) <= 300
+    switch.set("")
+    done = len(list(place("s3://products/ends/ledger").glob("*.json")))
+    assert done >= 1
+    assert main(["generate", str(recipe), *tokens]) == 0
+    table = capsys.readouterr().out
+    assert f"generate      4         {4 - done}" in table, table
+
+
+@pytest.mark.slow
+def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, capsys):
+    recipe, address = tmp_path / "stored.toml", "s3://products/run"
+    recipe.write_text(RECIPE + BENCH)
+    assert main(["run", str(recipe), "--out", address, "--workers", "1"]) == 0, capsys.readouterr().err
+    assert f"the page: {address}/report/stored/index.html" in capsys.readouterr().out
+    for verb in ("check", "status", "plan", "bench", "report", "results"):
+        assert main([verb, str(recipe), "--out", address]) == 0, capsys.readouterr().err
+    there = place(address)
+    assert main(["check", f"{address}/datasets/{next(there.glob('datasets/*')).name}"]) == 0
+    # What is gone is made again.
+    weights = next(there.glob("models/*/model.safetensors"))
+    picture = next(there.glob("report/stored/figures/*.png"))
+    whole = weights.read_bytes(), picture.read_bytes()
+    for path in (weights, picture):
+        path.unlink()
+    assert main(["check", str(recipe), "--out", address]) == 1
+    assert main(["check", str(recipe), "--repair", "--out", address, "--workers", "1"]) == 0, capsys.readouterr().err
+    assert weights.read_bytes() == whole[0] and picture.exists()
+    # Another recipe needs none of it.
+    (tmp_path / "other.toml").write_text(RECIPE.replace("stored", "other").replace("[dataset]", "[dataset]\nseed = 9"))
+    capsys.readouterr()
+    assert main(["prune", str(tmp_path / "other.toml"), "--delete", "--out", address]) == 0
+    assert "files removed" in capsys.readouterr().out
+    left = [str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()]
+    assert sorted(left) == ["ledger/lock", "report/stored/results.md"]

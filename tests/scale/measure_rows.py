@@ -1,0 +1,110 @@
+"""Measure generating, checking and reading for training at 10^5, 10^6 and 10^7 rows.
+
+Command: ``PYTHONPATH=. python tests/scale/measure_rows.py [--rows 100000 1000000 10000000] [--workers 2]``
+
+The rows are training rows of one plain fabric, answered by 64 points each, which costs a hundredth of what real rows
+cost, in shards of the default size. Each step is a process of its own: `twillight generate`, `twillight check`, and the
+reading of a training up to its first batch. Printed for each: seconds of the clock and (in brackets) of processor time,
+the peak memory of the largest process (resident set, pages of mapped files included), and the most files that one
+process had open; for the reading, the seconds from the start of the reading to the first batch, imports left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+
+ROOT = Path(__file__).parents[2]
+START = "import sys; from jobs.entry import main; sys.exit(main())"
+RECIPE = """
+name = "rows"
+[dataset]
+seen = ["polyester_lining"]
+[dataset.rows]
+train = {rows}
+validation = 64
+test = 64
+[dataset.truth]
+estimator = "owen"
+relative_error = 0.5
+min_count = 64
+max_count = 64
+[[models]]
+model = "neumip"
+"""
+SECONDS_BETWEEN_LOOKS = 0.2
+
+
+def read(folder: Path) -> None:
+    """Read a data set as a training does, and print the seconds to the first batch."""
+    import torch
+
+    from pipeline.shards.manifest import Manifest
+    from pipeline.training.dataset import Batches, Order, load_rows
+
+    start = time.perf_counter()
+    rows = load_rows(Manifest.load(folder), folder, ["polyester_lining"], folder.parents[1] / "rows.npy")
+    batch = Batches(rows, Order(rows.counts, 4096, 1, 0), torch.device("cpu")).step(0)
+    assert batch.u.shape == (1, 4096)
+    print(json.dumps(time.perf_counter() - start))
+
+
+def watched(command: list[str]) -> tuple[list[str], str]:
+    """Run a command; return cells of the table, and what it printed last."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    start, memory, files = time.perf_counter(), 0, 0
+    with tempfile.TemporaryFile("w+") as out:
+        process = psutil.Popen(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT)
+        while process.poll() is None:
+            try:
+                for one in (process, *process.children(recursive=True)):
+                    memory, files = max(memory, one.memory_info().rss), max(files, one.num_fds())
+            except psutil.Error:
+                pass  # it has just ended
+            time.sleep(SECONDS_BETWEEN_LOOKS)
+        out.seek(0)
+        said = out.read()
+    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    if process.returncode not in (0, 1):  # check: nothing was trained
+        sys.exit(said)
+    return [f"{wall:.0f} ({cpu:.0f})", f"{memory / 2**20:.0f} MiB", str(files)], said.strip().splitlines()[-1]
+
+
+def main() -> None:
+    """Measure each number of rows and print a table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--rows", type=int, nargs="+", default=[10**5, 10**6, 10**7])
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--read", type=Path, help="read this data set in this process")
+    options = parser.parse_args()
+    if options.read:
+        read(options.read)
+        return
+    print("| rows | step | seconds | memory | files | first batch |")
+    print("|---|---|---|---|---|---|")
+    for rows in options.rows:
+        with tempfile.TemporaryDirectory() as name:
+            recipe, out = Path(name) / "rows.toml", Path(name) / "out"
+            recipe.write_text(RECIPE.format(rows=rows))
+            for step in ("generate", "check", "read"):
+                command = [sys.executable, "-c", START, step, str(recipe), "--out", str(out)]
+                if step == "generate":
+                    command += ["--workers", str(options.workers)]
+                if step == "read":
+                    command = [sys.executable, __file__, "--read", str(next(out.glob("datasets/*")))]
+                cells, said = watched(command)
+                first = f"{float(said):.1f} s" if step == "read" else ""
+                print(f"| {rows:,} | {step} | {' | '.join(cells)} | {first} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
