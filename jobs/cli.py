@@ -31,6 +31,11 @@ app = App(
 
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
+Add = Annotated[
+    list[str],
+    Parameter(help="Method from outside: MODULE:CLASS, FILE.py:CLASS, or the name of an installed one; runs its code."),
+]
+NOTHING: list[str] = []
 
 
 def _place(type_: object, tokens: Sequence[Token]) -> Path:
@@ -140,21 +145,22 @@ def export(
 def plan(
     recipe: RecipeName,
     *,
+    add: Add = NOTHING,
     out: Out = OUT,
     workers: Annotated[int, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
 ) -> None:
     """Show what would run and why, with rows, bytes and time; nothing is computed."""
     from jobs.verbs.plan import print_plan
 
-    print_plan(recipe, out, workers)
+    print_plan(recipe, out, workers, add)
 
 
 @app.command(sort_key=4)
-def generate(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
+def generate(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Compute the ground truth: the shards of a recipe's data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["generate"], out, on.connection(), on.workers, on.progress)
+    work(recipe, ["generate"], out, on.connection(), on.workers, on.progress, add)
 
 
 @app.command(sort_key=5)
@@ -190,6 +196,7 @@ def check(
     subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")],
     *,
     repair: Annotated[bool, Parameter(help="Make the damaged and missing files of a recipe again.")] = False,
+    add: Add = NOTHING,
     out: Out = OUT,
     on: On = WorkerFlags(),
 ) -> int:
@@ -198,14 +205,14 @@ def check(
     from jobs.verbs.check import check_dataset, check_fabric, resolve
     from weaves.fabric import Fabric
 
-    found = resolve(subject)
+    found = resolve(subject, add)
     if isinstance(found, Recipe):
         from jobs.verbs.check_recipe import check_recipe
         from jobs.verbs.check_recipe import repair as repaired
 
         if repair:
-            return repaired(subject, out, on.connection(), on.workers, on.progress)
-        return check_recipe(subject, out)
+            return repaired(subject, out, on.connection(), on.workers, on.progress, add)
+        return check_recipe(subject, out, add)
     if repair:
         raise BadInput("check", "--repair", subject, "only the files of a recipe can be made again; name a recipe")
     if isinstance(found, Fabric):
@@ -218,11 +225,11 @@ def check(
 
 
 @app.command(sort_key=7)
-def train(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
+def train(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Train the models of a recipe on its data set."""
     from jobs.verbs.run import work
 
-    work(recipe, ["train"], out, on.connection(), on.workers, on.progress)
+    work(recipe, ["train"], out, on.connection(), on.workers, on.progress, add)
 
 
 @app.command(sort_key=8)
@@ -235,6 +242,7 @@ def bench(
         ),
     ],
     *,
+    add: Add = NOTHING,
     out: Out = OUT,
     on: On = WorkerFlags(),
 ) -> None:
@@ -242,36 +250,38 @@ def bench(
     from jobs.verbs.bench import BENCHES, bench_alone
 
     if recipe in BENCHES:
+        if add:
+            raise BadInput(f"bench {recipe}", "--add", add[0], "leave it out: only the truth is measured")
         bench_alone(recipe, out, on.connection(), on.workers, on.progress)
         return
     from jobs.verbs.run import work
 
-    work(recipe, ["bench"], out, on.connection(), on.workers, on.progress)
+    work(recipe, ["bench"], out, on.connection(), on.workers, on.progress, add)
 
 
 @app.command(sort_key=9)
-def report(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
+def report(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Write the page: pictures, tables and plots of all measurements."""
     from jobs.verbs.run import work
 
-    work(recipe, ["report"], out, on.connection(), on.workers, on.progress)
+    work(recipe, ["report"], out, on.connection(), on.workers, on.progress, add)
 
 
 @app.command(sort_key=10)
-def run(recipe: RecipeName, *, out: Out = OUT, on: On = WorkerFlags()) -> None:
+def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = WorkerFlags()) -> None:
     """Generate, train, bench and report; finished tasks are skipped."""
     from jobs.plan.task import STAGES
     from jobs.verbs.run import work
 
-    work(recipe, STAGES, out, on.connection(), on.workers, on.progress)
+    work(recipe, STAGES, out, on.connection(), on.workers, on.progress, add)
 
 
 @app.command(sort_key=11)
-def status(recipe: RecipeName, *, out: Out = OUT) -> None:
+def status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> None:
     """Show which tasks are done, failed (with the reason) or missing."""
     from jobs.verbs.status import print_status
 
-    print_status(recipe, out)
+    print_status(recipe, out, add)
 
 
 @app.command(sort_key=12)
@@ -279,12 +289,13 @@ def prune(
     recipes: Annotated[list[str], Parameter(help="Recipes whose products are kept, by name or path.")],
     *,
     delete: Annotated[bool, Parameter(help="Remove what is listed.")] = False,
+    add: Add = NOTHING,
     out: Out = OUT,
 ) -> None:
     """List, or remove, the products that none of some recipes needs."""
     from jobs.verbs.prune import prune as pruned
 
-    pruned(recipes, out, delete)
+    pruned(recipes, out, delete, add)
 
 
 @app.command(sort_key=13)
@@ -353,12 +364,13 @@ def results(
     *,
     file: Annotated[Local | None, Parameter(help="Markdown file to write; results.md beside the page.")] = None,
     readme: Annotated[Local | None, Parameter(help="Markdown file whose generated table is written anew.")] = None,
+    add: Add = NOTHING,
     out: Out = OUT,
 ) -> None:
     """Write the tables of a recipe's page as Markdown."""
     from jobs.verbs.results import results as written
 
-    written(recipe, out, file, readme)
+    written(recipe, out, file, readme, add)
 
 
 def main(tokens: Sequence[str] | None = None) -> int:

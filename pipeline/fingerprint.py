@@ -9,7 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+IDENTITY: Final = "identity"
+"""Context of a pydantic dump that leaves out what decides no result, such as where files lie."""
 
 
 def canonical(specification: Any) -> bytes:

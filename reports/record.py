@@ -77,6 +77,8 @@ class Provenance(BaseModel):
     """Fingerprint of the data set."""
     model: str = ""
     """Fingerprint of the trained model; empty where nothing is trained."""
+    origin: str = ""
+    """Of a method from outside the package: distribution or file, its version, and the SHA-256 of its code."""
     version: int = versions.BENCH
     """Version of the measurements (`pipeline.versions.BENCH`)."""
 
@@ -137,6 +139,10 @@ class Record(BaseModel):
         number = {"metric": metric, "value": value, "count": count, "unit": METRICS[metric].unit}
         bounds = {"standard_error": standard_error, "low": low, "high": high, "curve": curve, "samples": samples}
         return Record.model_validate(self.model_dump() | number | bounds)
+
+    def made_by(self, origin: str) -> Record:
+        """Return the Record with the origin of a method from outside the package."""
+        return self.model_copy(update={"provenance": self.provenance.model_copy(update={"origin": origin})})
 
     def of_error(self, error: Error) -> list[Record]:
         """Return the three numbers of a mean squared error."""

@@ -15,6 +15,7 @@ from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
+from pipeline.models.added.added_method import AddedMethod
 from reports.options import BenchOptions, Role
 from reports.page.model_note import ModelNote
 from weaves.fabric import Fabric
@@ -150,6 +151,8 @@ def _note(
     """Return the page's note on a model."""
     options, training = model.options, model.training
     about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
+    if isinstance(options, AddedMethod):
+        about = f"from outside this package: {options.origin}"
     if trainings:
         first = next(iter(trainings.values()))
         what = "each fabric by itself" if model.of_one_material else f"{len(first.fabrics)} fabrics at once"

@@ -21,7 +21,7 @@ from pydantic import (
     model_serializer,
 )
 
-from pipeline.fingerprint import fingerprint
+from pipeline.fingerprint import IDENTITY, fingerprint
 from weaves.fabric import Fabric
 
 Stage = Literal["generate", "train", "bench", "report"]
@@ -31,8 +31,6 @@ STAGES: Final[tuple[Stage, ...]] = ("generate", "train", "bench", "report")
 
 Progress = Callable[[float], None]
 """Function that receives the finished share of a task."""
-
-_IDENTITY: Final = "identity"  # context of a dump
 
 PLACE: Final = "place"
 """Marks a field that only says where things lie: `Annotated[..., PLACE]`. It is no part of an identity."""
@@ -51,7 +49,7 @@ class Part(BaseModel):
     @model_serializer(mode="wrap")
     def _without_places(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
         content: dict[str, Any] = dump(self)
-        if info.context == _IDENTITY:
+        if info.context == IDENTITY:
             for name, field in type(self).model_fields.items():
                 if PLACE in field.metadata:
                     del content[name]
@@ -125,7 +123,7 @@ class Task(Part):
 
     def identity(self) -> dict[str, Any]:
         """Return everything that the products' bytes depend on, JSON-able."""
-        return {"versions": self.versions(), **self.model_dump(mode="json", context=_IDENTITY)}
+        return {"versions": self.versions(), **self.model_dump(mode="json", context=IDENTITY)}
 
     @cached_property
     def id(self) -> str:
@@ -153,12 +151,12 @@ def urgencies(tasks: Sequence[Task]) -> dict[str, float]:
 
 def _optics(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
     """Return the fabric; in an identity its optics, and its name, which seeds random points."""
-    return {"name": fabric.name, "optics": fabric.optics()} if info.context == _IDENTITY else dump(fabric)
+    return {"name": fabric.name, "optics": fabric.optics()} if info.context == IDENTITY else dump(fabric)
 
 
 def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:
     """Return the fabric; in an identity its optics, its colours and its name."""
-    if info.context != _IDENTITY:
+    if info.context != IDENTITY:
         return dump(fabric)
     shown = {"specular", "diffuse", "diffuse_transmission"}
     colours = fabric.model_dump(mode="json", include={"warp": shown, "weft": shown})

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
+from jobs.recipe.added import Added
 from jobs.recipe.recipe import Recipe, RecipeFile
 from jobs.recipe.trained_by import check_trained_by, with_trained_by
 from jobs.recipe.validation import validate_recipe
@@ -29,18 +30,20 @@ def recipe_names() -> list[str]:
     return sorted(path.stem for path in RECIPES.glob("*.toml"))
 
 
-def load_recipe(name_or_path: str | Path) -> Recipe:
+def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
     """Read a recipe.
 
     Parameters
     ----------
     name_or_path : str or Path
         Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
+    add : sequence of str
+        Methods from outside the package (`jobs.recipe.added`).
 
     Raises
     ------
     BadInput
-        If there is no such recipe, or anything in it or in its fabrics cannot be used.
+        If there is no such recipe, or anything in it, in its fabrics or among `add` cannot be used.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -48,10 +51,10 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
             allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
             raise BadInput("recipe", "name", str(name_or_path), allowed)
         path = RECIPES / f"{name_or_path}.toml"
-    return _load(path, (), {})
+    return _load(path, (), {}, Added(add))
 
 
-def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe]) -> Recipe:
+def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: Added) -> Recipe:
     """Read a recipe; `chain` has the recipes that led to it, each named in the one before, `read` those loaded."""
     where = str(path)
 
@@ -65,11 +68,11 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe]) -> Reci
             raise BadInput(where, key, name, f"recipes must not wait for one another: {circle}")
         if len(chain) + len(read) >= MOST_RECIPES:
             raise BadInput(where, key, name, f"at most {MOST_RECIPES} recipes may be named, directly or through others")
-        read[real] = _load(found, named[:-1], read)
+        read[real] = _load(found, named[:-1], read, added)
         return read[real]
 
     content, trained_by = with_trained_by(read_toml(path), where, load)
-    file = validated(RecipeFile, content, where)
+    file = validated(RecipeFile, added.entered(content, where, all_given=not chain), where)
     dataset = file.dataset
     recipe = Recipe(
         file.name,

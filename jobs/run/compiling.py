@@ -96,7 +96,7 @@ def _models(task: Task) -> Iterator[Options]:
     for options in _held(task, Options):
         if options.model == "selvage":  # corrects soft_nodes
             yield CLASSES["soft_nodes"]()
-        elif not options.learns:
+        elif not options.learns and options.model != "added":  # code from outside runs in a process of its own
             yield options.single()[0]
 
 

@@ -26,10 +26,11 @@ from weaves.validation import read_toml
 WHERE = "check"
 
 
-def resolve(subject: str) -> Path | Recipe | Fabric:
+def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
     """Return the subject of a name: the folder of a data set, a recipe, or a fabric.
 
-    A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is.
+    A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is. `add` has
+    the methods from outside that a recipe may name.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def resolve(subject: str) -> Path | Recipe | Fabric:
         case ["preset"]:
             return load_fabric(subject)
         case ["recipe"]:
-            return load_recipe(subject)
+            return load_recipe(subject, add)
     if not subject.endswith(".toml"):
         allowed = "a recipe, a folder of a data set or a fabric is needed"
         raise BadInput(WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
@@ -59,7 +60,7 @@ def resolve(subject: str) -> Path | Recipe | Fabric:
     if len(tables) != 1:
         found = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"
         raise BadInput(subject, "", found, "a recipe has the one, a fabric the other")
-    return load_fabric(subject) if "draft" in tables else load_recipe(subject)
+    return load_fabric(subject) if "draft" in tables else load_recipe(subject, add)
 
 
 def check_dataset(folder: Path) -> list[str]:

@@ -30,9 +30,9 @@ from weaves.errors import BadInput, WorkFailed
 _HARMLESS: Final = ("missing", "outdated")
 
 
-def check_recipe(name: str, out: Path) -> int:
+def check_recipe(name: str, out: Path, add: Sequence[str] = ()) -> int:
     """Compare the files of a recipe with what its plan needs, print a sentence a fault, and return the exit code."""
-    tasks, found = _found(name, out)
+    tasks, found = _found(name, out, add)
     _print(found, out)
     if not found:
         _print_sound(name, tasks)
@@ -43,7 +43,14 @@ def check_recipe(name: str, out: Path) -> int:
     return exit_code(found)
 
 
-def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: ProgressForm = "auto") -> int:
+def repair(
+    name: str,
+    out: Path,
+    scheduler: Scheduler,
+    workers: int,
+    progress: ProgressForm = "auto",
+    add: Sequence[str] = (),
+) -> int:
     """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
 
     Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
@@ -60,7 +67,7 @@ def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: P
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", f"`twillight run {name}` makes them")
     with ledger.held():
-        tasks, found = _found(name, out)
+        tasks, found = _found(name, out, add)
         _print(found, out)
         for fault in found:
             _remove(fault, ledger)
@@ -69,8 +76,8 @@ def repair(name: str, out: Path, scheduler: Scheduler, workers: int, progress: P
     never = {stage for stage in never if _never(stage, found) == planned[stage]}
     if any(fault.kind != "foreign" for fault in found):
         if stages := [stage for stage in STAGES if stage not in never]:
-            work(name, stages, out, scheduler, workers, progress)
-        found = _found(name, out)[1]
+            work(name, stages, out, scheduler, workers, progress, add)
+        found = _found(name, out, add)[1]
         if found:
             print_line("what is left:")
             _print(found, out)
@@ -86,9 +93,9 @@ def exit_code(found: Sequence[Fault]) -> int:
     return WorkFailed.exit_code if found else 0
 
 
-def _found(name: str, out: Path) -> tuple[list[Task], list[Fault]]:
+def _found(name: str, out: Path, add: Sequence[str]) -> tuple[list[Task], list[Fault]]:
     """Return the plan of a recipe and the faults of its files."""
-    recipe = load_recipe(name)
+    recipe = load_recipe(name, add)
     tasks = plan(recipe, measured_alone(out))
     console = Terminal(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:

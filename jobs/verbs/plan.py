@@ -50,8 +50,8 @@ class Facts(NamedTuple):
         return [task for task in tasks if self.why.get(task.id, ELSEWHERE) != ELSEWHERE]
 
 
-def print_plan(recipe: str, out: Path, workers: int = 0) -> None:
-    """Print the plan of a recipe; nothing is computed.
+def print_plan(recipe: str, out: Path, workers: int = 0, add: Sequence[str] = ()) -> None:
+    """Print the plan of a recipe, with methods from outside in `add`; nothing is computed.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def print_plan(recipe: str, out: Path, workers: int = 0) -> None:
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 1 to {MOST_WORKERS}")
-    tasks = plan(load_recipe(recipe), measured_alone(out))
+    tasks = plan(load_recipe(recipe, add), measured_alone(out))
     facts = facts_of(tasks, Ledger(out))
     console = Terminal()
     console.print(plan_table(tasks, facts))

@@ -31,8 +31,8 @@ FOLDERS: Final[dict[Stage, str]] = {"generate": DATASETS, "train": "models", "be
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
 
 
-def prune(recipes: Sequence[str], out: Path, delete: bool) -> None:
-    """List the files that no recipe needs, and with `delete` remove them.
+def prune(recipes: Sequence[str], out: Path, delete: bool, add: Sequence[str] = ()) -> None:
+    """List the files that no recipe needs, with methods from outside in `add`; with `delete` remove them.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def prune(recipes: Sequence[str], out: Path, delete: bool) -> None:
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", "--out must name a folder with products of a run")
     with ledger.held():
-        needed = _needed(recipes, out)
+        needed = _needed(recipes, out, add)
         stored = {} if is_local(out) else {path: one.bytes for path, one in listing(out).items()}
         files = (path for path in out.rglob("*") if path.is_file() or path.is_symlink()) if is_local(out) else ()
         every = set(stored) | {str(path.relative_to(out)) for path in files}
@@ -72,11 +72,11 @@ def prune(recipes: Sequence[str], out: Path, delete: bool) -> None:
     console.print(f"{out}: {said}", soft_wrap=True)
 
 
-def _needed(recipes: Sequence[str], out: Path) -> set[str]:
+def _needed(recipes: Sequence[str], out: Path, add: Sequence[str]) -> set[str]:
     """Return the paths of all files that recipes need, receipts and notes of failures too."""
     needed, alone = set[str](), measured_alone(out)
     for name in recipes:
-        recipe = load_recipe(name)
+        recipe = load_recipe(name, add)
         tasks = plan(recipe, alone)
         needed.update(own_files(recipe, tasks, out))
         ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in shards(one)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from jobs.recipe.load import load_recipe
@@ -12,7 +13,7 @@ from weaves.errors import BadInput
 from weaves.reading import MIB, read_text
 
 
-def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> None:
+def results(recipe: str, out: Path, file: Path | None, readme: Path | None, add: Sequence[str] = ()) -> None:
     """Write all tables of a recipe's page to `file`, or six rows of them into the block of `readme`.
 
     Raises
@@ -25,7 +26,7 @@ def results(recipe: str, out: Path, file: Path | None, readme: Path | None) -> N
     from reports.tables.readme import BLOCK, readme_block
     from reports.tables.results import results_page
 
-    name = load_recipe(recipe).name
+    name = load_recipe(recipe, add).name
     source = records_file(out, name)
     records, machine = read_records([source]), read_machine(source)
     if readme is not None:

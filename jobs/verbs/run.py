@@ -34,8 +34,9 @@ def work(
     scheduler: Scheduler,
     workers: int,
     progress: ProgressForm = "auto",
+    add: Sequence[str] = (),
 ) -> None:
-    """Run the unfinished tasks of some stages of a recipe and print a summary.
+    """Run the unfinished tasks of some stages of a recipe and print a summary; `add`: methods from outside.
 
     Raises
     ------
@@ -44,7 +45,7 @@ def work(
     WorkFailed
         If any task failed; the others were done nevertheless.
     """
-    recipe = load_recipe(recipe_name)
+    recipe = load_recipe(recipe_name, add)
     tasks = plan(recipe, measured_alone(out))
     console = Terminal()
     ledger = Ledger(out)
@@ -87,9 +88,12 @@ def work(
         console.print(f"\nthe page: {(out / page.products[0]).resolve()}", soft_wrap=True)
     if summary.failed:
         first, *others = summary.failed
+        flags = "".join(f" --add {one}" for one in add)
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
-        raise WorkFailed(f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}`")
+        raise WorkFailed(
+            f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}{flags}`"
+        )
 
 
 def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:

@@ -16,9 +16,9 @@ from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
 
 
-def print_status(recipe: str, out: Path) -> None:
-    """Print the states of a recipe's tasks."""
-    Terminal().print(status_table(plan(load_recipe(recipe), measured_alone(out)), Ledger(out)))
+def print_status(recipe: str, out: Path, add: Sequence[str] = ()) -> None:
+    """Print the states of a recipe's tasks, with methods from outside in `add`."""
+    Terminal().print(status_table(plan(load_recipe(recipe, add), measured_alone(out)), Ledger(out)))
 
 
 def status_table(tasks: Sequence[Task], ledger: Ledger) -> Table:

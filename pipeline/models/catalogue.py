@@ -2,7 +2,8 @@
 
 Options are data: they enter the fingerprint of a trained model, and a recipe's ``[[models]]`` table is validated by
 `ModelOptions`, the union distinguished by ``model``. Nothing heavy is imported here, so that plans can be made without
-torch. A new model is a new folder; nothing else names it.
+torch. A new model is a new folder; nothing else names it. Methods from outside the package are one more member of the
+union, `AddedMethod`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, cast
 
 from pydantic import Field
 
+from pipeline.models.added.added_method import AddedMethod
 from pipeline.models.options import Options
 
 
@@ -30,10 +32,10 @@ def _options_of(model: str) -> type[Options]:
 CLASSES: dict[str, type[Options]] = {
     folder.parent.name: _options_of(folder.parent.name) for folder in sorted(Path(__file__).parent.glob("*/options.py"))
 }
-"""The options' class of every model, by the name of its folder."""
+"""The options' class of every model of the package, by the name of its folder."""
 
 if TYPE_CHECKING:
     ModelOptions = Options
 else:
-    ModelOptions = Annotated[Union[tuple(CLASSES.values())], Field(discriminator="model")]  # noqa: UP007
+    ModelOptions = Annotated[Union[(*CLASSES.values(), AddedMethod)], Field(discriminator="model")]
 """Any model's options, distinguished by `model`."""

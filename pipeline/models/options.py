@@ -86,6 +86,11 @@ class Options(BaseModel):
         """
         return tuple(getattr(self, self.parameter)) if self.parameter else ()
 
+    @property
+    def variant(self) -> str:
+        """Setting of the only method of a model without settings."""
+        return ""
+
     def single(self) -> list[Self]:
         """Return options with one setting each: one for every k, or these if the model has no settings."""
         if not self.parameter:

@@ -18,6 +18,7 @@ from pydantic import BaseModel
 from safetensors import SafetensorError
 from torch import Tensor
 
+from pipeline.models.added.added_method import AddedMethod
 from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
 from pipeline.models.method import Method
@@ -90,7 +91,13 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     ------
     BadInput
         If a folder holds no model, a damaged one, or one of another design or version.
+    MethodFailed
+        If the code of a method from outside is not the planned one, or fails.
     """
+    if isinstance(options, AddedMethod):
+        from pipeline.models.added.guarded import load_added
+
+        return [load_added(options)]
     trained = [_read(folder, options) for folder in folders]
     try:
         methods: list[Method] = module_of(options.model).restore(options, trained)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.models.added.added_method import ADDED
 from pipeline.models.catalogue import CLASSES
 
 
@@ -20,10 +21,10 @@ class ModelNote:
     per_material: bool = False
     """True if one model is trained for each fabric."""
     kind: str = ""
-    """Kind of model, a key of `pipeline.models.catalogue.CLASSES`; empty: its name."""
+    """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED`; empty: its name."""
 
     @property
     def learns(self) -> bool:
         """True if there is anything to train."""
         model = CLASSES.get(self.kind or self.name)
-        return model is None or model.learns
+        return self.kind != ADDED and (model is None or model.learns)

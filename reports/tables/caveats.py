@@ -47,15 +47,17 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
 
 
 def lacking(records: Sequence[Record]) -> list[str]:
-    """Return a sentence for each way of running methods that the machine lacked, with the reason."""
+    """Return a sentence for each way of running methods that was not measured or timed, with the reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for record in records:
         if record.metric == "not_run":
-            reasons.setdefault((record.setting, record.note), []).append(display(record.method))
+            scene = f" in the scene {record.scene}" if record.scene else ""
+            how = f" by {record.setting} {{}} not measured" if record.setting else f" {{}} not timed{scene}"
+            reasons.setdefault((how, record.note), []).append(display(record.method))
     return [
-        f"{listed(list(dict.fromkeys(methods)))} by {runtime} {'was' if len(set(methods)) == 1 else 'were'} "
-        f"not measured ({reason.rstrip('.')})."
-        for (runtime, reason), methods in reasons.items()
+        f"{listed(list(dict.fromkeys(methods)))}{how.format('was' if len(set(methods)) == 1 else 'were')} "
+        f"({reason.rstrip('.')})."
+        for (how, reason), methods in reasons.items()
     ]
 
 

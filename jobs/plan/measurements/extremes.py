@@ -61,6 +61,11 @@ class Extremes(Measurement):
         return f"extremes-{self.model.options.name}"
 
     @property
+    def trained(self) -> tuple[Trained, ...]:
+        """The model."""
+        return (self.model,)
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """The trainings."""
         return self.model.needs
@@ -81,6 +86,7 @@ class Extremes(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure all methods side by side."""
+        from pipeline.models.added.guarded import unchecked
         from pipeline.models.runtimes import runs
         from reports.measure.extremes import lustrous, measure_extremes
 
@@ -88,5 +94,5 @@ class Extremes(Measurement):
         if not self.model.options.of_one_material:
             fabrics.append((lustrous(fabrics[0][0]), "unseen"))
         precisions = EXTREME_PRECISIONS if self.model.networks else ()
-        families = [[one, *runs(one, precisions)] for one in self.model.methods(out)]
+        families = [[unchecked(one), *runs(one, precisions)] for one in self.model.methods(out)]
         return measure_extremes(families, fabrics, self.model.provenance(), self.truth)

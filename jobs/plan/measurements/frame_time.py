@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.scene_shot import SceneShot
@@ -65,6 +65,20 @@ class FrameTime(Measurement):
     def name(self) -> str:
         """Beginning of the names of its files."""
         return f"timing-{self.scene}"
+
+    @property
+    def of_scene(self) -> str:
+        """The scene."""
+        return self.scene
+
+    @property
+    def trained(self) -> tuple[Trained, ...]:
+        """The models."""
+        return self.models
+
+    def without(self, names: Sequence[str]) -> Self:
+        """Return the measurement of the other models."""
+        return self.model_copy(update={"models": tuple(one for one in self.models if one.options.name not in names)})
 
     @property
     def needs(self) -> tuple[str, ...]:

@@ -105,6 +105,11 @@ class OnFabric(Measurement):
         return "-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr"
 
     @property
+    def trained(self) -> tuple[Trained, ...]:
+        """The model."""
+        return (self.model,)
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """Test rows, the truth's pictures, networks."""
         edge = [self.edge.task] if self.edge else []

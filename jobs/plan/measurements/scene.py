@@ -81,6 +81,11 @@ class OnScene(Measurement):
         return "-".join(filter(None, (self.stem, setting.replace(" = ", "")))) + ".exr"
 
     @property
+    def trained(self) -> tuple[Trained, ...]:
+        """The model."""
+        return (self.model,)
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """The frames and the networks."""
         return (self.shot.task, *self.model.needs)

@@ -55,7 +55,7 @@ class Trained(Part):
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
         """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
         settings = self.options.settings
-        return tuple(f"k = {k}" for k in settings if k in counts) if settings else ("",)
+        return tuple(f"k = {k}" for k in settings if k in counts) if settings else (self.options.variant,)
 
     def provenance(self, dataset: str = "") -> Provenance:
         """Return the provenance of Records of this model."""

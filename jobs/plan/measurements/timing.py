@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Dataset, Subjects, Trained
@@ -76,6 +76,16 @@ class Timing(Measurement):
     def name(self) -> str:
         """Beginning of the names of its files."""
         return "timing"
+
+    @property
+    def trained(self) -> tuple[Trained, ...]:
+        """The models."""
+        return tuple(one.model for one in self.models)
+
+    def without(self, names: Sequence[str]) -> Self:
+        """Return the measurement of the other models."""
+        left = tuple(one for one in self.models if one.model.options.name not in names)
+        return self.model_copy(update={"models": left})
 
     @property
     def needs(self) -> tuple[str, ...]:

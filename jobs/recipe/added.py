@@ -1,0 +1,103 @@
+"""Methods from outside in a recipe: given with `--add`, or installed and named by the recipe.
+
+A recipe names such a method as it names any other, ``[[models]] model = "its_name"``; the keys beside are its options.
+`--add` enters it with its defaults if the recipe does not name it. A recipe alone never runs code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import entry_points
+from typing import Any, Final
+
+from pipeline.models.added.added_method import ADDED, GROUP, AddedMethod
+from pipeline.models.added.describe import describe
+from pipeline.models.added.source import WHERE
+from pipeline.models.catalogue import CLASSES
+from weaves.errors import BadInput, nearest
+from weaves.renamed import replacement
+
+_BESIDE: Final = ("model", "name", "version", "limit", "training", "runtimes")
+"""Keys of a recipe's entry that are no options of the method."""
+
+
+class Added:
+    """The methods from outside that a recipe may name.
+
+    Parameters
+    ----------
+    given : sequence of str
+        Values of `--add`: ``module:name``, ``file.py:name``, or the name of an installed method.
+
+    Raises
+    ------
+    BadInput
+        If one cannot be used, is given twice, or has the name of a method of the package.
+    """
+
+    def __init__(self, given: Sequence[str] = ()) -> None:
+        self._given: dict[str, AddedMethod] = {}
+        for text in given:
+            source = text if ":" in text else _installed().get(text)
+            if source is None:
+                known = f"installed: {', '.join(sorted(_installed()))}" if _installed() else "none is installed"
+                raise BadInput(WHERE, "", text, f"no method of this name; {known}; MODULE:CLASS or FILE.py:CLASS?")
+            method = describe(source, {}, {})
+            if method.name in CLASSES or method.name == ADDED:
+                raise BadInput(WHERE, "", text, f"its name {method.name!r} is that of a method of the package")
+            if method.name in self._given:
+                raise BadInput(WHERE, "", text, f"a method {method.name!r} is given twice")
+            self._given[method.name] = method
+
+    def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
+        """Return a recipe's file in which entries of methods from outside have all that the code says of them.
+
+        Parameters
+        ----------
+        content : mapping
+            The file.
+        where : str
+            Its path, for error messages.
+        all_given : bool
+            Enter the methods of `--add` that it does not name.
+
+        Raises
+        ------
+        BadInput
+            If an entry names a method that is neither of the package, nor given, nor installed, or that cannot be used.
+        """
+        entries = content.get("models", [])
+        if not isinstance(entries, list):
+            return dict(content)
+        models = [self._entry(entry, f"models.{index}", where) for index, entry in enumerate(entries)]
+        if all_given:
+            named = {entry.get("model") for entry in entries if isinstance(entry, Mapping)}
+            models += [method.model_dump() for name, method in self._given.items() if name not in named]
+        return {**content, "models": models} if models else dict(content)
+
+    def _entry(self, entry: Any, key: str, where: str) -> Any:
+        """Return an entry of a recipe's models, written out if the method is from outside."""
+        if not isinstance(entry, Mapping) or not isinstance(model := entry.get("model"), str) or model in CLASSES:
+            return entry
+        given, installed = self._given.get(model), _installed().get(model)
+        if given is None and installed is None:
+            raise BadInput(where, f"{key}.model", model, _unknown(model, [*CLASSES, *self._given, *_installed()]))
+        own = {name: value for name, value in entry.items() if name not in _BESIDE}
+        name = entry.get("name", model)
+        source = f"{given.source}" if given else str(installed)
+        method = describe(source, own, {"name": name, **({"limit": entry["limit"]} if "limit" in entry else {})})
+        if "version" in entry and str(entry["version"]) != method.stated:
+            raise BadInput(where, f"{key}.version", entry["version"], f"the method given has version {method.stated}")
+        rest = {name: entry[name] for name in ("training", "runtimes") if name in entry}
+        return method.model_dump() | rest
+
+
+def _installed() -> dict[str, str]:
+    """Return the methods of installed packages: their source by name."""
+    return {one.name: one.value.replace(" ", "") for one in entry_points(group=GROUP)}
+
+
+def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:
+    """Return what is allowed in place of an unknown name."""
+    names = nearest(model, known, "model")
+    return names if replacement("model", model) else f"{names}; code of your own is given with --add FILE.py:CLASS"

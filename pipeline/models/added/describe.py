@@ -1,0 +1,124 @@
+"""Description of a method from outside, read from its code in a process of its own."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Final, get_args
+
+from pipeline.models.added.added_method import AddedMethod, Kind
+from pipeline.models.added.apart import run_apart
+from pipeline.models.added.guarded import MethodFailed, faults_of
+from pipeline.models.added.source import WHERE, locate
+from weaves.errors import BadInput, brief, nearest
+from weaves.validation import validated
+
+LOADING: Final = 60.0
+"""Seconds that importing a method's code, and making the method, may take."""
+
+_FUNCTIONS: Final = ("covers", "prepare", "predict", "bytes_stored")
+"""Functions of `pipeline.models.method.Method`."""
+
+_TRAINED: Final = ("build", "loss", "start_at", "schedule", "parameter_groups", "architecture")
+"""Functions of models that are trained (`pipeline.models.method.Network`)."""
+
+_STATED: Final = ("name", "setting", "version", "kinds")
+"""Attributes; the last may be missing."""
+
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+
+def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> AddedMethod:
+    """Return the options of a method from outside.
+
+    Parameters
+    ----------
+    text : str
+        ``module:name`` or ``file.py:name``.
+    own : mapping
+        The method's own options; others have their defaults.
+    more : mapping
+        Name in tables, if it is not the method's own, and the limit of a call.
+
+    Raises
+    ------
+    BadInput
+        If there is no such code, it cannot be imported, the method cannot be made, or it lacks what a method needs.
+    """
+    try:
+        json.dumps(own)
+    except TypeError as error:
+        raise BadInput(WHERE, "", text, f"its options must be numbers, texts, lists and tables ({error})") from error
+    try:
+        fields = run_apart(_described, text, dict(own))
+    except MethodFailed as failure:
+        raise BadInput(WHERE, "", text, failure.reason) from failure
+    return validated(AddedMethod, {**fields, **more}, WHERE)
+
+
+def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]) -> dict[str, Any]:
+    """Return the fields of the options; runs in a process of its own."""
+    source = locate(text)
+    sha256 = source.sha256()
+    with faults_of(source.name, "import", LOADING, source.root):
+        module = source.imported()
+    make = source.of(module)
+    if not callable(make):
+        raise BadInput(WHERE, "", text, "is no class and no function that makes a method")
+    _check_options(make, own, text)
+    with faults_of(source.name, "__init__", LOADING, source.root):
+        method = make(**own)
+    with faults_of(source.name, "its attributes", LOADING, source.root):
+        has = {name: getattr(method, name) for name in (*_STATED, *_FUNCTIONS, *_TRAINED) if hasattr(method, name)}
+        if not isinstance(has.get("kinds", ""), str):
+            has["kinds"] = list(has["kinds"])
+    return {
+        **_stated(has, text),
+        "source": source.text,
+        "folder": source.folder,
+        "sha256": sha256,
+        "distribution": source.distribution(),
+        "own": own,
+    }
+
+
+def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) -> None:
+    """Refuse options that the method does not take, or a method that needs more."""
+    try:
+        parameters = inspect.signature(make).parameters.values()
+    except (TypeError, ValueError):
+        return  # compiled code may have no signature
+    named = [p for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    names = [p.name for p in named]
+    if not any(p.kind == p.VAR_KEYWORD for p in parameters):
+        for key in own:
+            if key not in names:
+                known = nearest(key, names) if names else "it has no options"
+                raise BadInput(WHERE, "", text, f"has no option {brief(key)}; {known}")
+    for parameter in named:
+        if parameter.default is parameter.empty and parameter.name not in own:
+            raise BadInput(WHERE, "", text, f"its option {parameter.name!r} has no default and is in no recipe")
+
+
+def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
+    """Return what a method says of itself, from its attributes; BadInput if one is missing or cannot be used."""
+    if taught := [name for name in _TRAINED if callable(has.get(name))]:
+        allowed = f"has {taught[0]!r}: a network cannot be trained from outside yet; load trained weights in __init__"
+        raise BadInput(WHERE, "", text, allowed)
+    if lacks := [name for name in _FUNCTIONS if not callable(has.get(name))]:
+        raise BadInput(WHERE, "", text, f"lacks the function {lacks[0]!r} of pipeline.models.method.Method")
+    if lacks := [name for name in _STATED[:-1] if name not in has]:
+        raise BadInput(WHERE, "", text, f"lacks the attribute {lacks[0]!r}")
+    name, setting, version = has["name"], has["setting"], has["version"]
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise BadInput(WHERE, "", text, f"name = {brief(name)} must be letters, digits, - and _, 64 at most")
+    if not isinstance(setting, str) or len(setting) > 40 or not setting.isprintable():
+        raise BadInput(WHERE, "", text, f"setting = {brief(setting)} must be a text of at most 40 letters")
+    if isinstance(version, bool) or not isinstance(version, int | str) or not 0 < len(str(version)) <= 64:
+        raise BadInput(WHERE, "", text, f"version = {brief(version)} must be an integer or a short text")
+    kinds, known = has.get("kinds", []), get_args(Kind)
+    if isinstance(kinds, str) or not all(kind in known for kind in kinds):
+        raise BadInput(WHERE, "", text, f"kinds = {brief(kinds)} must be some of {', '.join(known)}")
+    return {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}

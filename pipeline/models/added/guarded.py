@@ -1,0 +1,254 @@
+"""A method from outside behind a guard: every fault of its code becomes a sentence.
+
+`Guarded` checks what each call returns. It marks each call in a few shared bytes, so that the parent process can end
+a call that takes too long (`pipeline.models.added.apart`).
+"""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.source import locate
+from weaves.errors import WorkFailed, one_line
+
+if TYPE_CHECKING:
+    from pipeline.compiled.arrays import Float32
+    from pipeline.models.domain import Domain
+    from pipeline.models.method import Method
+    from pipeline.truth.query import Queries
+    from weaves.fabric import Fabric
+
+_STATE: Final = struct.Struct("<ddi64s16s")
+
+STATE_BYTES: Final = _STATE.size
+"""Size of the shared bytes."""
+
+
+class MethodFailed(WorkFailed):
+    """A fault in the code of a method from outside.
+
+    Parameters
+    ----------
+    name : str
+        Name of the method.
+    reason : str
+        The fault.
+    """
+
+    def __init__(self, name: str, reason: str) -> None:
+        self.name, self.reason = name, reason
+        super().__init__(one_line(f"{name}: {reason}"))
+
+    def __reduce__(self) -> tuple[type[MethodFailed], tuple[str, str]]:
+        return type(self), (self.name, self.reason)
+
+
+class Call(NamedTuple):
+    """Calls of a method that are under way.
+
+    Attributes
+    ----------
+    since : float
+        Time of the last call's begin or end, by the monotonic clock.
+    limit : float
+        Seconds that a call may take.
+    running : int
+        Number of calls, one a thread at most.
+    name, function : str
+        The method, and its function.
+    """
+
+    since: float
+    limit: float
+    running: int
+    name: str
+    function: str
+
+    @classmethod
+    def read(cls, shared: Any) -> Call:
+        """Read the shared bytes."""
+        since, limit, running, name, function = _STATE.unpack_from(shared)
+        return cls(since, limit, running, *(text.rstrip(b"\0").decode(errors="replace") for text in (name, function)))
+
+    @property
+    def late(self) -> bool:
+        """True if a call takes longer than it may."""
+        return self.running > 0 and time.monotonic() - self.since > self.limit
+
+
+class Watch:
+    """Writes the calls that are under way into shared bytes, if there are any."""
+
+    def __init__(self) -> None:
+        self._shared: Any = None
+        self._running, self._lock = 0, threading.Lock()
+
+    def attach(self, shared: Any) -> None:
+        """Write to these bytes from now on."""
+        self._shared = shared
+
+    def begin(self, name: bytes, function: bytes, limit: float) -> None:
+        """Note the begin of a call."""
+        if self._shared is not None:
+            with self._lock:
+                self._running += 1
+                _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
+
+    def end(self, name: bytes, function: bytes, limit: float) -> None:
+        """Note the end of a call."""
+        if self._shared is not None:
+            with self._lock:
+                self._running -= 1
+                _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
+
+
+WATCH: Final = Watch()
+"""The calls of this process."""
+
+
+@contextmanager
+def faults_of(name: str, function: str, limit: float, root: Path) -> Iterator[None]:
+    """Turn any exception in the block into a `MethodFailed`, and mark the block as a call.
+
+    Parameters
+    ----------
+    name, function : str
+        The method, and its function that is called.
+    limit : float
+        Seconds that it may take.
+    root : Path
+        The method's file, or the folder of its package.
+    """
+    call = name.encode()[:64], function.encode()[:16], limit
+    WATCH.begin(*call)
+    try:
+        yield
+    except MethodFailed:
+        raise
+    except BaseException as error:  # SystemExit too: the method must not end the work of others
+        raise MethodFailed(name, f"{function}: {described(error, root)}") from error
+    finally:
+        WATCH.end(*call)
+
+
+def described(error: BaseException, root: Path) -> str:
+    """Return an exception in one line, with the line of the method's own code that raised it."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [f for f in frames if Path(f.filename) == root or root in Path(f.filename).parents]
+    where = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+    if isinstance(error, SyntaxError):
+        where = f" ({Path(error.filename or root).name}, line {error.lineno})"
+        return one_line(f"SyntaxError: {error.msg}{where}", 200)
+    if isinstance(error, WorkFailed):
+        return one_line(f"{error}{where}", 200)
+    return one_line(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__, 160) + where
+
+
+class Guarded:
+    """A method from outside with the interface of `pipeline.models.method.Method`.
+
+    Parameters
+    ----------
+    method : object
+        The method.
+    options : AddedMethod
+        Its options; its name in tables is theirs.
+    root : Path
+        Its file, or the folder of its package.
+    values : bool
+        Refuse answers that are negative or not finite. Without it, only their form is checked.
+    """
+
+    def __init__(self, method: Method, options: AddedMethod, root: Path, values: bool = True) -> None:
+        self.name, self.setting = options.name, options.setting
+        self._method, self._options, self._root, self._values = method, options, root, values
+        self._first = True
+        self.domain: Domain | None = None
+
+    def unchecked(self) -> Guarded:
+        """Return the method with answers of any value, for measurements that count wrong ones."""
+        return Guarded(self._method, self._options, self._root, values=False)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return whether the method covers a fabric."""
+        with self._call("covers"):
+            return bool(self._method.covers(fabric))
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Prepare a fabric."""
+        with self._call("prepare"):
+            self._method.prepare(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Return the components of N queries, float32 (N, 4), finite and >= 0; MethodFailed if they are not."""
+        before = [column.copy() for column in queries] if self._first else None
+        with self._call("predict"):
+            answers = self._method.predict(fabric, queries, seed)
+        if fault := self._fault(answers, len(queries.u)):
+            raise MethodFailed(self.name, f"predict returned {fault}, for the fabric {fabric.name}")
+        if before is not None:
+            self._first = False
+            if not all(np.array_equal(old, new) for old, new in zip(before, queries, strict=True)):
+                raise MethodFailed(self.name, "predict changed the arrays of its queries; it must copy them first")
+        return answers
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes that a renderer stores for a fabric; MethodFailed unless it is an integer >= 0."""
+        with self._call("bytes_stored"):
+            found: object = self._method.bytes_stored(fabric)
+        if isinstance(found, bool) or not isinstance(found, int | np.integer) or found < 0:
+            raise MethodFailed(self.name, f"bytes_stored returned {found!r}; an integer from 0 on is needed")
+        return int(found)
+
+    def _call(self, function: str) -> Any:
+        return faults_of(self.name, function, self._options.limit, self._root)
+
+    def _fault(self, answers: object, rows: int) -> str:
+        """Return what is wrong with answers; empty if nothing is."""
+        if not isinstance(answers, np.ndarray):
+            return f"{type(answers).__name__}; a NumPy array is needed"
+        if answers.shape != (rows, 4) or answers.dtype != np.float32:
+            return f"{answers.dtype} {answers.shape}; float32 ({rows}, 4) is needed"
+        # The least is NaN if any is; two passes cost about a nanosecond a query.
+        if not self._values or not rows or (answers.min() >= 0.0 and answers.max() < np.inf):
+            return ""
+        for wrong, name in ((~np.isfinite(answers), "not finite"), (answers < 0.0, "negative")):
+            if (found := np.flatnonzero(wrong.any(axis=1))).size:
+                row = int(found[0])
+                return f"{found.size} of {rows} rows with values that are {name} (first row {row}: {answers[row]})"
+        return ""
+
+
+def unchecked(method: Method) -> Method:
+    """Return a method whose answers may have any value: one from outside without that check, others as they are."""
+    return method.unchecked() if isinstance(method, Guarded) else method
+
+
+def load_added(options: AddedMethod) -> Guarded:
+    """Import the code of a method from outside and make it.
+
+    Raises
+    ------
+    WorkFailed
+        If the code is not the planned one.
+    MethodFailed
+        If it cannot be imported, or the method cannot be made.
+    """
+    source = locate(options.source, options.folder)
+    source.verify(options.sha256)
+    with faults_of(options.name, "import", options.limit, source.root):
+        module = source.imported()
+    make = source.of(module)
+    with faults_of(options.name, "__init__", options.limit, source.root):
+        method = make(**options.own)
+    return Guarded(method, options, source.root)

@@ -1,0 +1,115 @@
+"""Methods from outside in recipes; the tests of what their code may be are in tests/pipeline/models/added."""
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from jobs.plan.plan import plan
+from jobs.recipe import added
+from jobs.recipe.load import load_recipe
+from pipeline.models.added.added_method import GROUP
+from weaves.errors import BadInput
+
+METHOD = """
+class Theirs:
+    name, version, setting = "theirs", 3, ""
+
+    def __init__(self, rows=8):
+        pass
+
+    def covers(self, fabric):
+        return True
+
+    prepare = predict = bytes_stored = covers
+"""
+
+HERE = '\n[[models]]\nmodel = "theirs"\n'
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    (tmp_path / "theirs.py").write_text(METHOD)
+    return f"{tmp_path / 'theirs.py'}:Theirs"
+
+
+def ids(recipe):
+    return {f"{task.stage} {task.title}": task.id for task in plan(recipe)}
+
+
+def test_a_given_method_is_one_more_model(files, theirs):
+    path = files.write()
+    before, after = ids(load_recipe(path)), ids(load_recipe(path, [theirs]))
+    new = after.keys() - before.keys()
+    assert new == {f"bench theirs on {name}" for name in ("denim", "own", "twill_4_4")} | {"bench extremes of theirs"}
+    changed = {title for title in before if after[title] != before[title]}
+    assert changed == {"bench timing of all methods", "report page of tiny"}
+
+
+def test_a_changed_file_is_measured_again_and_nothing_else(files, theirs, tmp_path):
+    path = files.write()
+    before = ids(load_recipe(path, [theirs]))
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "theirs.py").write_text(METHOD)
+    assert ids(load_recipe(path, [theirs.replace("theirs.py", "elsewhere/theirs.py")])) == before
+    (tmp_path / "theirs.py").write_text(METHOD + "\n")
+    after = ids(load_recipe(path, [theirs]))
+    changed = {title for title in before if after[title] != before[title]}
+    assert changed == {title for title in before if "theirs" in title or "timing" in title or "page" in title}
+
+
+def test_a_recipe_has_its_options_and_its_name(files, theirs):
+    files.text += HERE + 'name = "other"\nrows = 9\nlimit = 5\nversion = "3"\n'
+    path = files.write()
+    (found,) = [model.options for model in load_recipe(path, [theirs]).models if model.options.model == "added"]
+    assert (found.name, found.own, found.limit, found.stated) == ("other", {"rows": 9}, 5.0, "3")
+    first = ids(load_recipe(path, [theirs]))
+    files.exchange("limit = 5", "limit = 50").write()
+    assert ids(load_recipe(path, [theirs])) == first
+    files.exchange("rows = 9", "rows = 10").write()
+    assert ids(load_recipe(path, [theirs]))["bench other on denim"] != first["bench other on denim"]
+
+
+@pytest.mark.parametrize("model", ["theirs", "added", "theirs:Theirs"])
+def test_a_recipe_alone_runs_no_code(files, model, theirs, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    files.text += HERE.replace("theirs", model) + f'source = "{theirs}"\n'
+    monkeypatch.setattr(added, "describe", None)
+    with pytest.raises(BadInput, match=r"models.3.model = .*code of your own is given with --add FILE.py:CLASS"):
+        load_recipe(files.write())
+
+
+def test_an_installed_method_enters_if_the_recipe_names_it(files, theirs, monkeypatch):
+    point = EntryPoint("theirs", theirs, GROUP)
+    monkeypatch.setattr(added, "entry_points", lambda group: [point] if group == GROUP else [])
+    assert not any("theirs" in title for title in ids(load_recipe(files.write())))
+    assert any("theirs" in title for title in ids(load_recipe(files.write(), ["theirs"])))
+    files.text += HERE
+    assert any("theirs" in title for title in ids(load_recipe(files.write())))
+
+
+@pytest.mark.parametrize(
+    ("name", "add", "more", "sentence"),
+    [
+        ("woven", 1, "", "its name 'woven' is that of a method of the package"),
+        ("added", 1, "", "its name 'added' is that of a method of the package"),
+        ("theirs", 2, "", "a method 'theirs' is given twice"),
+        ("truth", 1, "", "must be another name"),
+        ("theirs", 1, HERE + "version = 4\n", "models.3.version = 4: the method given has version 3"),
+        ("theirs", 1, HERE + "row = 4\n", "has no option 'row'; did you mean 'rows'?"),
+        ("theirs", 1, HERE + "limit = 0\n", "limit = 0: Input should be greater than 0"),
+        ("theirs", 1, HERE + "rows = 2026-01-01\n", "its options must be numbers, texts, lists and tables"),
+        ("theirs", 1, HERE + 'name = "woven"\n', "names must differ"),
+        ("theirs", 1, HERE + "[models.training]\nsteps = 5\n", "has nothing to train"),
+    ],
+)
+def test_what_cannot_be_entered_is_refused(files, theirs, tmp_path, name, add, more, sentence):
+    (tmp_path / "theirs.py").write_text(METHOD.replace('"theirs"', f'"{name}"'))
+    files.text += more
+    with pytest.raises(BadInput) as refusal:
+        load_recipe(files.write(), [theirs] * add)
+    assert sentence in str(refusal.value), refusal.value
+
+
+def test_a_name_that_is_not_installed_is_refused(files):
+    with pytest.raises(BadInput, match=r"--add: theirs: no method of this name; none is installed"):
+        load_recipe(files.write(), ["theirs"])

@@ -1,0 +1,122 @@
+import pytest
+
+from pipeline.models.added.describe import describe
+from weaves.errors import BadInput
+
+METHOD = """
+class Theirs:
+    name, version, setting, kinds = "theirs", "2.1", "", {"stretch"}
+
+    def __init__(self, rows=8):
+        assert rows < 100, "too many rows"
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        return None
+
+    def bytes_stored(self, fabric):
+        return 0
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "theirs.py"
+    path.write_text(METHOD)
+    return path
+
+
+def test_a_file_says_what_it_holds(path):
+    found = describe(f"{path}:Theirs", {"rows": 9}, {"limit": 5.0})
+    assert (found.name, found.stated, found.setting, found.kinds) == ("theirs", "2.1", "", {"stretch"})
+    assert (found.own, found.limit, found.source) == ({"rows": 9}, 5.0, f"{path}:Theirs")
+    assert found.origin == f"theirs.py, version 2.1, SHA-256 {found.sha256}"
+    assert not list(path.parent.glob("__pycache__"))
+
+
+def test_a_module_of_the_current_folder_is_its_file(path, monkeypatch):
+    monkeypatch.chdir(path.parent)
+    assert describe("theirs:Theirs", {}, {}) == describe(f"{path}:Theirs", {}, {})
+
+
+def test_every_file_of_a_package_counts(tmp_path, monkeypatch):
+    package = tmp_path / "their_package"
+    package.mkdir()
+    (package / "__init__.py").write_text("from their_package.inner import Theirs\n")
+    (package / "inner.py").write_text(METHOD)
+    (package / "weights.bin").write_bytes(b"1")
+    monkeypatch.chdir(tmp_path)
+    first = describe("their_package:Theirs", {}, {})
+    assert (first.source, first.folder, first.distribution) == ("their_package:Theirs", str(tmp_path), "")
+    (package / "weights.bin").write_bytes(b"2")
+    assert describe("their_package:Theirs", {}, {}).sha256 != first.sha256
+
+
+def test_an_installed_module_has_its_distribution():
+    with pytest.raises(BadInput, match="lacks the function 'covers'"):
+        describe("filelock:FileLock", {"lock_file": "x"}, {})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("class Theirs", "import nothing_of_this_name\nclass Theirs", "ModuleNotFoundError: No module named"),
+        ("class Theirs", "class Theirs(", "(theirs.py, line 2)"),
+        ("class Theirs", "raise SystemExit\nclass Theirs", "import: SystemExit (theirs.py, line 2)"),
+        ("class Theirs", "import os; os._exit(0)\nclass Theirs", "import ended its process (exit code 0)"),
+        ("class Theirs", "class Other", "no such name; did you mean 'Other'? known: Other"),
+        ("class Theirs:", "Theirs = 5\nclass Other:", "is no class"),
+        ("def covers", "def cover", "lacks the function 'covers'"),
+        ("def predict", "predict = 5\n    def forecast", "lacks the function 'predict'"),
+        ('"2.1", ""', '2.1, ""', "version = 2.1 must be an integer or a short text"),
+        (
+            'name, version, setting, kinds = "theirs", "2.1"',
+            'name, setting, kinds = "theirs"',
+            "lacks the attribute 'version'",
+        ),
+        ('"theirs", "2.1"', '"../theirs", "2.1"', "name = '../theirs' must be letters"),
+        ('{"stretch"}', '{"sideways"}', "kinds = ['sideways'] must be some of behind, stretch, curvature"),
+        ("def prepare", "def loss(self): ...\n    def prepare", "a network cannot be trained from outside yet"),
+        ("rows=8", "rows", "its option 'rows' has no default and is in no recipe"),
+        ("rows=8", "rows=800", "__init__: AssertionError: too many rows (theirs.py, line 6)"),
+    ],
+)
+def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
+    assert METHOD.count(old) == 1
+    path.write_text(METHOD.replace(old, new))
+    with pytest.raises(BadInput) as refusal:
+        describe(f"{path}:Theirs", {}, {})
+    assert sentence in str(refusal.value), refusal.value
+    assert str(refusal.value).startswith("--add: ")
+
+
+def test_options_that_it_does_not_have_are_refused(path):
+    with pytest.raises(BadInput, match="has no option 'row'; did you mean 'rows'"):
+        describe(f"{path}:Theirs", {"row": 5}, {})
+    with pytest.raises(BadInput, match="too many rows"):
+        describe(f"{path}:Theirs", {"rows": 500}, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("theirs", "must be MODULE:CLASS"),
+        (":Theirs", "must be MODULE:CLASS"),
+        ("theirs:", "must be MODULE:CLASS"),
+        ("nothing_of_this_name:Theirs", "there is no module nothing_of_this_name"),
+        ("nothing.py:Theirs", "there is no file nothing.py"),
+        ("a-b:Theirs", "a-b is no name of a module"),
+        ("sys:path", "sys is part of Python"),
+        ("weaves.fabric:Fabric", "is part of this package"),
+    ],
+)
+def test_a_source_of_another_form_is_refused(text, sentence, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput) as refusal:
+        describe(text, {}, {})
+    assert sentence in str(refusal.value), refusal.value

@@ -1,0 +1,132 @@
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.guarded import Guarded, MethodFailed, load_added, unchecked
+from pipeline.models.method import Method
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput, WorkFailed
+from weaves.fabric import load_fabric
+
+OPTIONS = AddedMethod(name="theirs", source="/theirs.py:Theirs", sha256="0" * 64, stated="1", setting="k = 2")
+DENIM = load_fabric("denim")
+
+
+class Theirs:
+    name, setting = "class", ""
+
+    def __init__(self, answers):
+        self.answers = answers
+
+    def covers(self, fabric):
+        return 1
+
+    def prepare(self, fabric):
+        raise RuntimeError("no table\nof two lines")
+
+    def predict(self, fabric, queries, seed=0):
+        return self.answers(queries)
+
+    def bytes_stored(self, fabric):
+        return self.answers(None)
+
+
+def rows(count=3):
+    u = np.zeros(count, np.float32)
+    up = np.tile(np.float32([0, 0, 1]), (count, 1))
+    return Queries.round(u, u.copy(), u + 1, up, up.copy())
+
+
+def guarded(answers):
+    return Guarded(Theirs(answers), OPTIONS, Path("/theirs.py"))
+
+
+def some(value, row=1):
+    answers = np.ones((3, 4), np.float32)
+    answers[row, 2] = value
+    return answers
+
+
+def changed(queries):
+    queries.u[0] = 5
+    return some(1)
+
+
+def raises(error):
+    def answers(queries):
+        raise error
+
+    return answers
+
+
+@pytest.mark.parametrize(
+    ("answers", "sentence"),
+    [
+        (lambda q: [[0, 0, 0, 0]] * 3, "list; a NumPy array is needed"),
+        (lambda q: some(1)[:, :3], "float32 (3, 3); float32 (3, 4) is needed"),
+        (lambda q: some(1)[:2], "float32 (2, 4); float32 (3, 4) is needed"),
+        (lambda q: some(1).astype(np.float64), "float64 (3, 4); float32 (3, 4) is needed"),
+        (lambda q: some(np.nan), "1 of 3 rows with values that are not finite (first row 1: [ 1. 1. nan 1.])"),
+        (lambda q: some(np.inf, 2), "1 of 3 rows with values that are not finite (first row 2"),
+        (lambda q: some(-1e-9), "1 of 3 rows with values that are negative (first row 1"),
+        (changed, "changed the arrays of its queries"),
+        (raises(ValueError("no such cloth")), "predict: ValueError: no such cloth"),
+        (raises(SystemExit(0)), "predict: SystemExit"),
+        (raises(MemoryError()), "predict: MemoryError"),
+        (raises(BadInput("queries", "wi", 1, "too steep")), "predict: BadInput: queries: wi = 1: too steep"),
+    ],
+)
+def test_a_fault_of_predict_is_a_sentence_with_the_name(answers, sentence):
+    with pytest.raises(MethodFailed) as failure:
+        guarded(answers).predict(DENIM, rows())
+    assert str(failure.value).startswith("theirs: predict") and sentence in str(failure.value)
+    assert "\n" not in str(failure.value)
+
+
+def test_sound_answers_are_those_of_the_method():
+    answers = some(0)
+    method = guarded(lambda queries: answers)
+    assert method.predict(DENIM, rows()) is answers
+    assert isinstance(method, Method) and (method.name, method.setting) == ("theirs", "k = 2")
+    assert method.covers(DENIM) is True
+    assert guarded(lambda queries: some(1)[:0]).predict(DENIM, rows(0)).shape == (0, 4)
+
+
+def test_a_measurement_that_counts_wrong_values_gets_them():
+    method = unchecked(guarded(lambda queries: some(np.nan)))
+    assert np.isnan(method.predict(DENIM, rows())).sum() == 1
+    with pytest.raises(MethodFailed, match="is needed"):
+        unchecked(guarded(lambda queries: some(1)[:2])).predict(DENIM, rows())
+    other = Theirs(None)
+    assert unchecked(other) is other
+
+
+def test_a_fault_of_another_function_names_it():
+    with pytest.raises(MethodFailed, match=r"^theirs: prepare: RuntimeError: no table of two lines$"):
+        guarded(None).prepare(DENIM)
+
+
+@pytest.mark.parametrize("wrong", [-1, 2.5, True, None, "8"])
+def test_bytes_are_an_integer(wrong):
+    with pytest.raises(MethodFailed, match="an integer from 0 on is needed"):
+        guarded(lambda _: wrong).bytes_stored(DENIM)
+
+
+def test_bytes_of_numpy_are_integers():
+    assert guarded(lambda _: np.int64(12)).bytes_stored(DENIM) == 12
+
+
+def test_a_failure_crosses_processes():
+    failure = pickle.loads(pickle.dumps(MethodFailed("theirs", "too late")))
+    assert (failure.name, failure.reason, str(failure)) == ("theirs", "too late", "theirs: too late")
+
+
+def test_code_that_is_not_the_planned_one_is_refused(tmp_path):
+    path = tmp_path / "theirs.py"
+    path.write_text("raise RuntimeError('this must not run')")
+    options = OPTIONS.model_copy(update={"source": f"{path}:Theirs"})
+    with pytest.raises(WorkFailed, match=r"SHA-256 is .* on this machine, and 000000000000… was planned"):
+        load_added(options)
