@@ -312,6 +312,20 @@ def merge(
 
 
 @app.command(sort_key=14)
+def publish(
+    dataset: Annotated[Path, Parameter(help="Folder of a data set, out/datasets/NAME-FINGERPRINT.")],
+    *,
+    to: Annotated[Path | None, Parameter(help="Folder to write; empty or not there.")] = None,
+    licence: Annotated[str | None, Parameter(help="SPDX identifier of the data's licence, such as CC-BY-4.0.")] = None,
+    author: Annotated[list[str], Parameter(help="Author for the citation; may be given several times.")] = [],  # noqa: B006
+) -> None:
+    """Write a data set as a folder that others can read without this package, and cite."""
+    from jobs.verbs.publish.publish import publish as published
+
+    published(dataset, to, licence, author)
+
+
+@app.command(sort_key=15)
 def compare(
     a: Annotated[Local, Parameter(help="Folder of products, folder of a page, or file of Records.")],
     b: Annotated[Local, Parameter(help="Another one; the table shows B relative to A.")],
@@ -325,7 +339,7 @@ def compare(
     compared(a, b, recipe, other_machine)
 
 
-@app.command(sort_key=15)
+@app.command(sort_key=16)
 def require(
     scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
     *,
@@ -345,7 +359,7 @@ def require(
     required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
 
 
-@app.command(sort_key=16)
+@app.command(sort_key=17)
 def savings(
     recipe: RecipeName,
     scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, are finished.")],
@@ -358,7 +372,7 @@ def savings(
     saved(scenes, out, recipe)
 
 
-@app.command(sort_key=17)
+@app.command(sort_key=18)
 def results(
     recipe: RecipeName,
     *,

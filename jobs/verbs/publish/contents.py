@@ -1,0 +1,72 @@
+"""Files of a published data set: which shards are joined in which file.
+
+A file holds whole fabrics of one role and one split. Research repositories take about a hundred files, so fabrics share
+a file if there are many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from pipeline.shards.manifest import Manifest, Role, ShardEntry
+
+MOST_FILES: Final = 90
+"""Most Parquet files, if each role and split has one at least."""
+
+ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen")
+SPLITS: Final = ("train", "validation", "test")
+
+
+class Part(NamedTuple):
+    """A file of rows.
+
+    Attributes
+    ----------
+    file : str
+        Path within the folder.
+    role, split : str
+        Role of its fabrics, and split of its rows.
+    fabrics : tuple of str
+        Names of its fabrics, in the order of their rows.
+    shards : tuple of ShardEntry
+        Its shards, in the order of their rows.
+    """
+
+    file: str
+    role: Role
+    split: str
+    fabrics: tuple[str, ...]
+    shards: tuple[ShardEntry, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(shard.rows for shard in self.shards)
+
+
+def own_shards(manifest: Manifest) -> list[ShardEntry]:
+    """Return the shards that every model may read; extra rows of single models are no part of the data set."""
+    return [shard for shard in manifest.shards if shard.kind == "components"]
+
+
+def parts_of(manifest: Manifest) -> list[Part]:
+    """Return the files of a data set, by role, split and fabric."""
+    shards: dict[tuple[str, str], list[ShardEntry]] = {}
+    for shard in sorted(own_shards(manifest), key=lambda shard: shard.start):
+        shards.setdefault((shard.fabric, shard.split), []).append(shard)
+    found = []
+    for role in ROLES:
+        for split in SPLITS:
+            names = [name for name in manifest.names(role) if (name, split) in shards]
+            files = min(len(names), max(1, MOST_FILES * len(names) // len(shards)))
+            for number, group in enumerate(_cut(names, files)):
+                parts = tuple(shard for name in group for shard in shards[name, split])
+                found.append(Part(f"data/{role}/{split}-{number:02}.parquet", role, split, tuple(group), parts))
+    return found
+
+
+def _cut(names: list[str], groups: int) -> Iterator[list[str]]:
+    """Yield names in groups of almost equal number."""
+    for group in range(groups):
+        yield names[len(names) * group // groups : len(names) * (group + 1) // groups]

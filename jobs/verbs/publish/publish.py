@@ -1,0 +1,193 @@
+"""`twillight publish`: a data set as a self-contained folder that others can read and cite.
+
+The folder is written under a temporary name beside its place and renamed when it is whole. A run that was stopped is
+continued by the same command, which keeps finished files of rows. The same data set gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from filelock import FileLock, Timeout
+from rich.progress import track
+
+from jobs.console import size
+from jobs.terminal import Terminal
+from jobs.verbs.publish.about import About
+from jobs.verbs.publish.card import LOADER, card
+from jobs.verbs.publish.citation import citation
+from jobs.verbs.publish.contents import Part, own_shards, parts_of
+from jobs.verbs.publish.croissant import croissant
+from jobs.verbs.publish.licence import licence_id
+from jobs.verbs.publish.recipe import FILE as RECIPE
+from jobs.verbs.publish.recipe import write_fabrics, write_recipe
+from pipeline.atomic import atomic_write
+from pipeline.fingerprint import file_sha256, fingerprint
+from pipeline.shards.check import check_shard
+from pipeline.shards.joined import join_shards
+from pipeline.shards.manifest import FILE as MANIFEST
+from pipeline.shards.manifest import Manifest
+from pipeline.shards.store import read_about
+from weaves.errors import BadInput, WorkFailed
+
+AUTHORS: Final = ("The Twillight authors",)
+"""Authors of a data set if none are named."""
+
+_LOCK: Final = ".lock"
+
+
+def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequence[str]) -> None:
+    """Write a data set as a folder for others.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the data set.
+    to : Path or None
+        Folder to write; it may exist if it is empty.
+    licence : str or None
+        SPDX identifier of the licence of the data.
+    authors : sequence of str
+        Names for the citation; `AUTHORS` if empty.
+
+    Raises
+    ------
+    BadInput
+        If the licence is missing or unknown, the folder to write is not empty, or the data set is not whole.
+    WorkFailed
+        If another process writes the same folder.
+    """
+    identifier = licence_id(licence)
+    target = _free(to, folder)
+    manifest = Manifest.load(folder)
+    _refuse_unfinished(folder, manifest)
+    first = own_shards(manifest)[0]
+    truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
+    about = About(manifest, parts_of(manifest), identifier, tuple(authors) or AUTHORS, truth)
+    staging = target.with_name(f".tmp-{target.name}")
+    try:
+        staging.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(str(target.parent), "", error.strerror, "a folder that can be written is needed") from error
+    lock = FileLock(staging / _LOCK)
+    try:
+        with lock.acquire(timeout=0):
+            files = _write(about, folder, staging)
+            _remove_others(staging, {*files, MANIFEST, _LOCK})
+            (staging / _LOCK).unlink()
+            if target.exists():
+                target.rmdir()
+            staging.rename(target)
+    except Timeout as error:
+        raise WorkFailed(f"{target}: another process is writing it") from error
+    written = sum(path.stat().st_size for path in target.rglob("*") if path.is_file())
+    said = f"{target}: {about.rows:,} rows in {len(about.parts)} Parquet files, {size(written)}, licence {identifier}"
+    Terminal().print(said, soft_wrap=True)
+
+
+def _free(to: Path | None, folder: Path) -> Path:
+    """Return the folder to write if nothing is in it."""
+    if to is None:
+        raise BadInput("publish", "--to", to, "the folder to write is needed")
+    if to.is_dir():
+        if any(to.iterdir()):
+            raise BadInput("publish", "--to", str(to), "is not empty; name another folder, or empty it")
+    elif to.exists() or to.is_symlink():
+        raise BadInput("publish", "--to", str(to), "is no folder; name another place")
+    if to.resolve().is_relative_to(folder.resolve()):
+        raise BadInput("publish", "--to", str(to), "is inside the data set; name another place")
+    return to.resolve()
+
+
+def _refuse_unfinished(folder: Path, manifest: Manifest) -> None:
+    """Refuse a data set with missing or damaged shards.
+
+    Raises
+    ------
+    BadInput
+        With the first fault, and the number of the others.
+    """
+    shards = own_shards(manifest)
+    listed = fingerprint(sorted(Path(shard.file).stem.removeprefix("part-") for shard in shards))
+    if not shards or listed != manifest.fingerprint:
+        allowed = f"run `twillight generate {manifest.name}` to its end"
+        raise BadInput(str(folder), "", f"is not whole: {len(shards):,} of its shards are finished, not all", allowed)
+    console = Terminal(stderr=True)
+    shown = track(shards, "checking", console=console, disable=not console.is_terminal, transient=True)
+    faults = [fault for shard in shown for fault in check_shard(folder, shard, manifest)]
+    if faults:
+        more = f" ({len(faults) - 1:,} more faults)" if len(faults) > 1 else ""
+        reason = faults[0].removeprefix(f"{folder}/")
+        raise BadInput(str(folder), "", "is not whole", f"{reason}{more}")
+
+
+def _write(about: About, folder: Path, staging: Path) -> list[str]:
+    """Write all files and return their paths within the folder; the manifest is the last one."""
+    manifest, console = about.manifest, Terminal(stderr=True)
+    files = write_fabrics(manifest, staging)
+    write_recipe(manifest, staging)
+    texts = {
+        "README.md": card(about),
+        "croissant.json": croissant(about),
+        "CITATION.cff": citation(about),
+        "load.py": LOADER,
+    }
+    for name, text in texts.items():
+        atomic_write(staging / name, text.encode())
+    for part in track(about.parts, "joining", console=console, disable=not console.is_terminal, transient=True):
+        join_shards(staging / part.file, [folder / shard.file for shard in part.shards], _facts(about, part))
+    files += [RECIPE, *texts, *(part.file for part in about.parts)]
+    atomic_write(staging / MANIFEST, _listing(about, staging, files))
+    return files
+
+
+def _facts(about: About, part: Part) -> dict[str, Any]:
+    """Return the metadata of a file of rows, from which it is known again."""
+    return {
+        "schema_version": about.manifest.schema_version,
+        "truth_version": about.truth_version,
+        "dataset": about.manifest.fingerprint,
+        "role": part.role,
+        "split": part.split,
+        "fabrics": {name: about.manifest.fabrics[name].model_dump(mode="json") for name in part.fabrics},
+        "options": about.manifest.about,
+        "shards": [shard.sha256 for shard in part.shards],
+    }
+
+
+def _listing(about: About, staging: Path, files: Sequence[str]) -> bytes:
+    """Return the manifest: every other file with its size and hash, and what is in the files of rows."""
+    parts = {part.file: part for part in about.parts}
+    listed = []
+    for file in sorted(files):
+        path = staging / file
+        entry: dict[str, Any] = {"file": file, "bytes": path.stat().st_size, "sha256": file_sha256(path)}
+        if part := parts.get(file):
+            entry |= {"role": part.role, "split": part.split, "rows": part.rows, "fabrics": list(part.fabrics)}
+        listed.append(entry)
+    content = {
+        "name": about.manifest.name,
+        "version": about.version,
+        "fingerprint": about.manifest.fingerprint,
+        "schema_version": about.manifest.schema_version,
+        "truth_version": about.truth_version,
+        "licence": about.licence,
+        "rows": about.rows,
+        "roles": about.manifest.roles,
+        "options": about.manifest.about,
+        "files": listed,
+    }
+    return json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
+
+
+def _remove_others(staging: Path, wanted: set[str]) -> None:
+    """Remove what an earlier run of another data set left."""
+    for path in sorted(staging.rglob("*"), reverse=True):
+        if path.is_dir():
+            if not any(path.iterdir()):
+                path.rmdir()
+        elif str(path.relative_to(staging)) not in wanted:
+            path.unlink()

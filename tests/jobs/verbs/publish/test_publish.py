@@ -1,0 +1,284 @@
+"""Published data sets, read by tools that know nothing of this package; stopped, continued and refused."""
+
+import hashlib
+import json
+import subprocess
+import sys
+
+import duckdb
+import mlcroissant
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from jobs.cli import main
+from jobs.plan.dataset import fingerprint_of, folder_of, shards
+from jobs.recipe.load import load_recipe
+from jobs.verbs.publish import publish as verb
+from pipeline.fingerprint import file_sha256
+from pipeline.shards.manifest import Manifest
+from pipeline.shards.schema import SCHEMA
+from tests.jobs import made_up
+from weaves.fabric import load_fabric
+
+RECIPE = """
+name = "wide"
+[dataset]
+seen = ["denim", "own.toml"]
+unseen = ["twill_4_4"]
+shard_rows = 64
+[dataset.rows]
+train = 160
+population = 96
+validation = 32
+test = 64
+[dataset.population]
+count = 3
+exclude = ["twill 4/4"]
+[[models]]
+model = "woven"
+{more}
+[bench]
+views = ["plane"]
+"""
+ROWS = {
+    ("seen", "train"): 320,
+    ("seen", "validation"): 64,
+    ("seen", "test"): 128,
+    ("population", "train"): 288,
+    ("unseen", "test"): 64,
+}
+
+
+def write_dataset(folder, more=""):
+    """Write the shards of the recipe, with made-up answers, and return the folder of the data set."""
+    folder.mkdir(exist_ok=True)
+    own = load_fabric("satin_8").model_copy(update={"name": "own"}).to_toml()
+    (folder / "own.toml").write_text(own, encoding="utf-8")
+    (folder / "wide.toml").write_text(RECIPE.format(more=more), encoding="utf-8")
+    made_up.finished(folder / "wide.toml", folder / "out", ["generate"])
+    return folder / "out" / folder_of(shards(load_recipe(folder / "wide.toml")))
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    return write_dataset(tmp_path_factory.mktemp("made"))
+
+
+@pytest.fixture(scope="module")
+def published(dataset, tmp_path_factory):
+    target = tmp_path_factory.mktemp("shelf") / "wide"
+    assert main(["publish", str(dataset), "--to", str(target), "--licence", "cc-by-4.0"]) == 0
+    return target
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_folder_holds_what_it_should_and_its_hashes(published):
+    manifest = json.loads((published / "manifest.json").read_text())
+    found = contents(published)
+    listed = {entry["file"]: entry for entry in manifest["files"]}
+    assert listed.keys() == found.keys() - {"manifest.json"}
+    for file, entry in listed.items():
+        assert entry["sha256"] == hashlib.sha256(found[file]).hexdigest() and entry["bytes"] == len(found[file])
+    assert {"README.md", "croissant.json", "CITATION.cff", "recipe.toml", "load.py"} < listed.keys()
+    assert {"fabrics/denim.toml", "fabrics/own.toml", "fabrics/twill_4_4.toml", "population.toml"} < listed.keys()
+    rows = {}
+    for entry in manifest["files"]:
+        if "rows" in entry:
+            rows[entry["role"], entry["split"]] = rows.get((entry["role"], entry["split"]), 0) + entry["rows"]
+    assert rows == ROWS and manifest["rows"] == sum(ROWS.values())
+    assert not [name for name in found if ".tmp" in name or "lock" in name]
+
+
+def test_no_row_is_lost_or_changed(published, dataset):
+    def rows(frame):
+        return frame.sort_values(list(frame.columns)).reset_index(drop=True)
+
+    before = pd.concat([pq.read_table(path).to_pandas() for path in dataset.glob("*.parquet")])
+    after = pd.concat([pq.read_table(path).to_pandas() for path in published.rglob("*.parquet")])
+    before["fabric"] = before["fabric"].astype(str)
+    pd.testing.assert_frame_equal(rows(before), rows(after.astype({"fabric": str})), check_dtype=False)
+
+
+def test_pandas_and_the_loader_read_it(published):
+    code = (
+        "from load import load; assert 'twillight' not in __import__('sys').modules\n"
+        "print(len(load('seen', 'train')), len(load('seen', 'test', 'denim')))\n"
+        "print(load('population', 'train').fabric.nunique())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-IB", "-c", f"import sys; sys.path.insert(0, '.')\n{code}"],
+        cwd=published,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == ["320", "64", "3"], done.stderr
+    lines = (published / "load.py").read_text().splitlines()
+    assert len([line for line in lines if line.strip()]) <= 11  # and a docstring
+
+
+def test_duckdb_reads_it(published):
+    found = duckdb.sql(
+        f"SELECT fabric, count(*), avg(diffuse_warp) FROM '{published}/data/*/test-*.parquet' GROUP BY 1"
+    )
+    rows = {name: (count, round(mean, 6)) for name, count, mean in found.fetchall()}
+    assert rows == {"denim": (64, 0.1), "own": (64, 0.1), "twill_4_4": (64, 0.1)}
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the libraries that it uses
+def test_croissant_reads_the_rows(published):
+    described = mlcroissant.Dataset(jsonld=str(published / "croissant.json"))
+    assert not described.metadata.ctx.issues.errors
+    sets = {one.name: one for one in described.metadata.record_sets}
+    assert set(sets) == {f"{role}-{split}" for role, split in ROWS}
+    for role, split in ROWS:
+        found = list(described.records(record_set=f"{role}-{split}"))
+        assert len(found) == ROWS[role, split]
+        values = {key.rpartition("/")[2]: value for key, value in found[0].items()}
+        assert list(values) == SCHEMA.names and values["diffuse_warp"] == pytest.approx(0.1)
+    meanings = [field.description for field in sets["seen-test"].fields]
+    assert meanings == [field.metadata[b"meaning"].decode() for field in SCHEMA]
+
+
+def test_the_card_has_the_header_of_data_hubs(published):
+    _, header, text = (published / "README.md").read_text(encoding="utf-8").split("---\n", 2)
+    found = yaml.safe_load(header)
+    assert found["license"] == "cc-by-4.0" and found["size_categories"] == ["n<1K"]
+    paths = {
+        (config["config_name"], entry["split"]): entry["path"]
+        for config in found["configs"]
+        for entry in config["data_files"]
+    }
+    assert paths.keys() == ROWS.keys()
+    for key, pattern in paths.items():
+        assert sum(pq.read_metadata(path).num_rows for path in published.glob(pattern)) == ROWS[key]
+    assert [config["config_name"] for config in found["configs"] if config.get("default")] == ["seen"]
+    assert all(f"| `{name}` |" in text for name in SCHEMA.names)
+    assert "{" not in text.replace("{{", "")
+
+
+def test_the_citation_has_what_the_format_requires(published):
+    found = yaml.safe_load((published / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= found.keys()
+    assert found["type"] == "dataset" and found["license"] == "CC-BY-4.0"
+
+
+@pytest.mark.parametrize("more", ["", '[[models]]\nmodel = "neumip"'], ids=["", "rows of unseen fabrics too"])
+def test_the_recipe_generates_the_same_rows(more, tmp_path):
+    folder = write_dataset(tmp_path / "made", more)
+    assert main(["publish", str(folder), "--to", str(tmp_path / "shelf"), "--licence", "CC0-1.0"]) == 0
+    again = shards(load_recipe(tmp_path / "shelf" / "recipe.toml"))
+    assert fingerprint_of(again) == Manifest.load(folder).fingerprint
+
+
+def test_fabrics_are_those_of_the_data_set(published, dataset):
+    assert load_fabric(published / "fabrics" / "own.toml") == Manifest.load(dataset).fabrics["own"]
+
+
+def test_the_same_data_set_gives_the_same_bytes(published, dataset, tmp_path):
+    (tmp_path / "wide").mkdir()  # an empty folder may be there
+    assert main(["publish", str(dataset), "--to", str(tmp_path / "wide"), "--licence", "CC-BY-4.0"]) == 0
+    assert contents(tmp_path / "wide") == contents(published)
+
+
+def test_many_fabrics_share_files(published, dataset, tmp_path, monkeypatch):
+    monkeypatch.setattr("jobs.verbs.publish.contents.MOST_FILES", 4)
+    assert main(["publish", str(dataset), "--to", str(tmp_path / "few"), "--licence", "CC-BY-4.0"]) == 0
+    assert len(list((tmp_path / "few").rglob("*.parquet"))) == 5 < len(list(published.rglob("*.parquet")))
+    assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/few/data/*/*.parquet'").fetchall() == [(sum(ROWS.values()),)]
+
+
+def test_a_stopped_run_leaves_nothing_and_is_continued(published, dataset, tmp_path, monkeypatch):
+    target, done = tmp_path / "wide", []
+
+    def stopped(path, *rest):
+        if len(done) == 3:
+            raise KeyboardInterrupt
+        done.append(path)
+        joined(path, *rest)
+
+    joined = verb.join_shards
+    monkeypatch.setattr(verb, "join_shards", stopped)
+    tokens = ["publish", str(dataset), "--to", str(target), "--licence", "CC-BY-4.0"]
+    assert main(tokens) == 130
+    assert not target.exists()
+    kept = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in done[1:]}
+    done[0].write_bytes(done[0].read_bytes()[:-50] + bytes(50))  # damaged meanwhile
+    (done[0].parent / "odd.parquet").touch()
+    monkeypatch.undo()
+    assert main(tokens) == 0
+    assert contents(target) == contents(published)
+    moved = [target / path.relative_to(tmp_path / ".tmp-wide") for path in kept]
+    assert [(path.stat().st_mtime_ns, path.stat().st_ino) for path in moved] == list(kept.values())
+    assert [path.name for path in tmp_path.iterdir()] == ["wide"]
+
+
+@pytest.mark.parametrize(
+    ("tokens", "sentence"),
+    [
+        (["--to", "new"], "--licence = None: an SPDX identifier such as CC-BY-4.0 is needed"),
+        (["--to", "new", "--licence", "CC-BY-4"], "did you mean 'CC-BY-4.0'?"),
+        (["--to", "new", "--licence", "MIT OR Apache-2.0"], "the SPDX identifier of one licence is needed"),
+        (["--to", "new", "--licence", "LicenseRef-mine"], "the SPDX identifier of one licence is needed"),
+        (["--licence", "MIT"], "--to = None: the folder to write is needed"),
+        (["--to", "full", "--licence", "MIT"], "is not empty"),
+        (["--to", "file", "--licence", "MIT"], "is no folder"),
+        (["--to", "file/new", "--licence", "MIT"], "a folder that can be written is needed"),
+        (["--to", "{dataset}/new", "--licence", "MIT"], "is inside the data set"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_written(tokens, sentence, dataset, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "x").touch()
+    (tmp_path / "file").touch()
+    before, rows = sorted(tmp_path.rglob("*")), sorted(dataset.iterdir())
+    assert main(["publish", str(dataset), *(token.format(dataset=dataset) for token in tokens)]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error and error.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before and sorted(dataset.iterdir()) == rows
+
+
+def refused(dataset, tmp_path, capsys):
+    assert main(["publish", str(dataset), "--to", str(tmp_path / "new"), "--licence", "MIT"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and [path.name for path in tmp_path.iterdir()] == ["made"]
+    return error
+
+
+def test_a_data_set_that_is_not_whole_is_refused(tmp_path, capsys):
+    folder = write_dataset(tmp_path / "made")
+    manifest = Manifest.load(folder)
+    first, second = manifest.shards[:2]
+
+    # Not finished: the manifest lists what is there.
+    manifest.without({first.file}).save(folder)
+    error = refused(folder, tmp_path, capsys)
+    assert "is not whole" in error and "twillight generate wide" in error
+
+    # Damaged and missing files.
+    manifest.save(folder)
+    whole = (folder / first.file).read_bytes()
+    (folder / first.file).write_bytes(whole[:-40] + bytes(40))
+    assert "is not whole" in refused(folder, tmp_path, capsys)
+    (folder / first.file).unlink()
+    assert "does not exist" in refused(folder, tmp_path, capsys)
+    (folder / first.file).write_bytes((folder / second.file).read_bytes())
+    assert file_sha256(folder / first.file) == second.sha256
+    assert "SHA-256" in refused(folder, tmp_path, capsys)
+    (folder / "manifest.json").unlink()
+    assert "generate the data set first" in refused(folder, tmp_path, capsys)
+
+
+def test_a_licence_that_hubs_do_not_know_has_a_name_and_an_address(dataset, tmp_path):
+    chosen = ["--licence", "EUPL-1.2", "--author", "A. Weaver"]
+    assert main(["publish", str(dataset), "--to", str(tmp_path / "x"), *chosen]) == 0
+    header = yaml.safe_load((tmp_path / "x" / "README.md").read_text(encoding="utf-8").split("---\n")[1])
+    assert (header["license"], header["license_name"]) == ("other", "eupl-1.2")
+    assert header["license_link"] == "https://spdx.org/licenses/EUPL-1.2.html"
+    cited = yaml.safe_load((tmp_path / "x" / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["authors"] == [{"name": "A. Weaver"}]
