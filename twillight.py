@@ -192,19 +192,21 @@ def open_dataset(folder: str | Path) -> Dataset:
     Parameters
     ----------
     folder : str or Path
-        A folder that `twillight generate` wrote, ``out/datasets/NAME-FINGERPRINT``.
+        A folder that `twillight generate` wrote, ``out/datasets/NAME-FINGERPRINT``, or its address in object storage.
 
     Raises
     ------
     BadInput
-        If the folder has no manifest, or its manifest is damaged.
+        If the folder has no manifest, its manifest is damaged, or it is that of a published data set.
 
     Examples
     --------
     >>> open_dataset("out/datasets/tiny").roles["unseen"]
     ['twill_4_4']
     """
-    return Dataset(Path(folder))
+    from pipeline.storage import place
+
+    return Dataset(place(str(folder), "folder"))
 
 
 class Dataset:
@@ -227,6 +229,10 @@ class Dataset:
     def __init__(self, folder: Path) -> None:
         from pipeline.shards.manifest import Manifest
 
+        if (folder / "croissant.json").exists():
+            raise BadInput(
+                str(folder), "", "is a published data set", "read it with its load.py, or any Parquet reader"
+            )
         self._folder, self._manifest = folder, Manifest.load(folder)
         self.fabrics: dict[str, Fabric] = dict(self._manifest.fabrics)
         self.roles: dict[Role, list[str]] = dict(self._manifest.roles)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import fsspec
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -175,6 +176,21 @@ def test_rows_are_the_same_in_every_form(dataset):
     batches = list(dataset.torch("train", rows=64, seed=None))
     assert [len(batch["u"]) for batch in batches] == [64, 64, 64, 8, 64, 64, 22]
     assert torch.cat([batch["specular_warp"] for batch in batches]).tolist() == list(range(1, 351))
+
+
+def test_rows_are_read_from_object_storage(dataset, tmp_path):
+    remote = fsspec.filesystem("memory")
+    remote.put(str(tmp_path / "out" / "datasets" / "tiny"), "/bucket/tiny", recursive=True)
+    there = open_dataset("memory://bucket/tiny")
+    assert there.pandas("train").equals(dataset.pandas("train"))
+    assert len(list(there.torch("train", rows=200))) == 2
+
+
+def test_a_published_data_set_is_refused_with_its_loader(dataset, tmp_path):
+    folder = tmp_path / "out" / "datasets" / "tiny"
+    (folder / "croissant.json").touch()
+    with pytest.raises(BadInput, match=r"read it with its load\.py"):
+        open_dataset(folder)
 
 
 def test_all_fabrics_of_a_split(dataset):
