@@ -79,7 +79,8 @@ def read_table(path: Path, kind: Kind = "components") -> pa.Table:
     refuse_irregular(path, "a shard")
     try:
         with local_copy(path) as file:
-            table = pq.read_table(file, page_checksum_verification=True, memory_map=False)
+            # Shards are small: threads within one cost more than they save.
+            table = pq.read_table(file, page_checksum_verification=True, memory_map=False, use_threads=False)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "generate it again with `twillight generate`") from error
     except (pa.ArrowException, OSError) as error:
