@@ -201,23 +201,6 @@ def test_all_fabrics_of_a_split(dataset):
     assert batch["fabric"].tolist() == [0] * 30
 
 
-def test_the_order_of_a_stream_is_that_of_its_seed(dataset):
-    def order(stream):
-        return [value for batch in stream for value in batch["u"].tolist()]
-
-    stream = dataset.torch("train", rows=50, seed=3)
-    first, second = order(stream), order(stream)
-    assert first != second and sorted(first) == sorted(second)
-    assert order(dataset.torch("train", rows=50, seed=3)) == first
-    assert order(dataset.torch("train", rows=50, seed=4)) != first
-
-
-def test_workers_of_a_data_loader_share_the_rows(dataset):
-    loader = torch.utils.data.DataLoader(dataset.torch("train"), batch_size=None, num_workers=2)
-    found = [value for batch in loader for value in batch["diffuse_warp"].tolist()]
-    assert sorted(found) == list(range(1, 351))
-
-
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [

@@ -22,8 +22,7 @@ from jobs.verbs.publish.citation import citation
 from jobs.verbs.publish.contents import Part, own_shards, parts_of
 from jobs.verbs.publish.croissant import croissant
 from jobs.verbs.publish.licence import licence_id
-from jobs.verbs.publish.recipe import FILE as RECIPE
-from jobs.verbs.publish.recipe import write_fabrics, write_recipe
+from jobs.verbs.publish.recipe import recipe_files
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.shards.check import check_shard
@@ -64,7 +63,7 @@ def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequenc
     target = _free(to, folder)
     manifest = Manifest.load(folder)
     _refuse_unfinished(folder, manifest)
-    first = own_shards(manifest)[0]
+    recipe, first = recipe_files(manifest, folder), own_shards(manifest)[0]
     truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
     about = About(manifest, parts_of(manifest), identifier, tuple(authors) or AUTHORS, truth)
     staging = target.with_name(f".tmp-{target.name}")
@@ -75,7 +74,7 @@ def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequenc
     lock = FileLock(staging / _LOCK)
     try:
         with lock.acquire(timeout=0):
-            files = _write(about, folder, staging)
+            files = _write(about, recipe, folder, staging)
             _remove_others(staging, {*files, MANIFEST, _LOCK})
             (staging / _LOCK).unlink()
             if target.exists():
@@ -124,12 +123,11 @@ def _refuse_unfinished(folder: Path, manifest: Manifest) -> None:
         raise BadInput(str(folder), "", "is not whole", f"{reason}{more}")
 
 
-def _write(about: About, folder: Path, staging: Path) -> list[str]:
-    """Write all files and return their paths within the folder; the manifest is the last one."""
-    manifest, console = about.manifest, Terminal(stderr=True)
-    files = write_fabrics(manifest, staging)
-    write_recipe(manifest, staging)
+def _write(about: About, texts: dict[str, str], folder: Path, staging: Path) -> list[str]:
+    """Write all files, `texts` among them, and return their paths within the folder; the manifest is the last one."""
+    console = Terminal(stderr=True)
     texts = {
+        **texts,
         "README.md": card(about),
         "croissant.json": croissant(about),
         "CITATION.cff": citation(about),
@@ -139,7 +137,7 @@ def _write(about: About, folder: Path, staging: Path) -> list[str]:
         atomic_write(staging / name, text.encode())
     for part in track(about.parts, "joining", console=console, disable=not console.is_terminal, transient=True):
         join_shards(staging / part.file, [folder / shard.file for shard in part.shards], _facts(about, part))
-    files += [RECIPE, *texts, *(part.file for part in about.parts)]
+    files = [*texts, *(part.file for part in about.parts)]
     atomic_write(staging / MANIFEST, _listing(about, staging, files))
     return files
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ from jobs.recipe.load import load_recipe
 from jobs.verbs.publish.contents import own_shards
 from pipeline.atomic import atomic_write
 from pipeline.shards.manifest import Manifest
-from weaves.errors import BadInput
+from weaves.errors import BadInput, brief
 
 FILE: Final = "recipe.toml"
 
@@ -21,49 +22,56 @@ _MODELS: Final = ((), ("neumip",), ("curved",), ("point_sampled",))
 """Models whose presence decides which splits a recipe has: those of one material need rows of unseen fabrics."""
 
 
-def write_fabrics(manifest: Manifest, folder: Path) -> list[str]:
-    """Write the named fabrics to a file each and the population to one, and return the paths within the folder."""
-    files = {f"fabrics/{name}.toml": manifest.fabrics[name].to_toml() for name in manifest.names("seen", "unseen")}
-    if population := manifest.names("population"):
-        tables = {name: manifest.fabrics[name].model_dump(mode="json", exclude_none=True) for name in population}
-        files["population.toml"] = tomli_w.dumps(tables)
-    for path, text in files.items():
-        atomic_write(folder / path, text.encode())
-    return list(files)
+def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
+    """Return the recipe that generates a data set and the files of its fabrics, by their paths.
 
-
-def write_recipe(manifest: Manifest, folder: Path) -> None:
-    """Write the recipe that generates a data set beside its fabrics.
+    `folder` is that of the data set, for messages.
 
     Raises
     ------
     BadInput
-        If no recipe has the rows of the data set, because some are missing.
+        If no recipe of this version has the rows of the data set.
     """
+    fabrics = _fabric_files(manifest)
     present = {(shard.fabric, shard.split, shard.start, shard.rows) for shard in own_shards(manifest)}
-    for text in _candidates(manifest):
-        atomic_write(folder / FILE, text.encode())
-        try:
-            planned = shards(load_recipe(folder / FILE))
-        except BadInput:  # a model that does not know these queries
-            continue
-        parts = [part.shard for part in planned if not part.is_extra]
-        if {(part.fabric.name, part.split, part.start, part.rows) for part in parts} == present:
-            return
-    raise BadInput(manifest.name, "", "its rows are not those of its recipe", "generate the data set again")
+    with tempfile.TemporaryDirectory(prefix="twillight-") as name:
+        for path, text in fabrics.items():
+            atomic_write(Path(name) / path, text.encode(), durable=False)
+        for models in _MODELS:
+            text = _recipe(manifest, models)
+            atomic_write(Path(name) / FILE, text.encode(), durable=False)
+            try:
+                planned = shards(load_recipe(Path(name) / FILE))
+            except BadInput as error:
+                if models:  # which do not know these queries
+                    continue
+                key = f"{error.key} = {brief(error.value)}" if error.key else "its fabrics"
+                raise BadInput(str(folder), "", f"is of another version ({key})", "generate it again") from error
+            parts = [part.shard for part in planned if not part.is_extra]
+            if {(part.fabric.name, part.split, part.start, part.rows) for part in parts} == present:
+                return {**fabrics, FILE: text}
+    raise BadInput(str(folder), "", "its rows are not those of a recipe of this version", "generate it again")
 
 
-def _candidates(manifest: Manifest) -> Iterator[str]:
-    """Yield recipes for the data set alone, with few models."""
+def _fabric_files(manifest: Manifest) -> dict[str, str]:
+    """Return a file for each named fabric, and one for the population."""
+    files = {f"fabrics/{name}.toml": manifest.fabrics[name].to_toml() for name in manifest.names("seen", "unseen")}
+    if population := manifest.names("population"):
+        tables = {name: manifest.fabrics[name].model_dump(mode="json", exclude_none=True) for name in population}
+        files["population.toml"] = tomli_w.dumps(tables)
+    return files
+
+
+def _recipe(manifest: Manifest, models: Sequence[str]) -> str:
+    """Return a recipe for the data set, with models that decide which splits it has."""
     named = {role: [f"fabrics/{name}.toml" for name in manifest.names(role)] for role in ("seen", "unseen")}
-    for models in _MODELS:
-        recipe = {
-            "name": manifest.name,
-            "about": "Generates the rows of this data set.",
-            "dataset": _without_none(manifest.about) | named,
-            "models": [{"model": model} for model in models],
-        }
-        yield tomli_w.dumps(recipe)
+    recipe = {
+        "name": manifest.name,
+        "about": "Generates the rows of this data set.",
+        "dataset": _without_none(manifest.about) | named,
+        "models": [{"model": model} for model in models],
+    }
+    return tomli_w.dumps(recipe)
 
 
 def _without_none(value: Any) -> Any:

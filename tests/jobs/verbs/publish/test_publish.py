@@ -274,6 +274,16 @@ def test_a_data_set_that_is_not_whole_is_refused(tmp_path, capsys):
     assert "generate the data set first" in refused(folder, tmp_path, capsys)
 
 
+def test_a_data_set_of_an_earlier_version_is_refused(tmp_path, capsys):
+    folder = write_dataset(tmp_path / "made")
+    manifest = Manifest.load(folder)
+    truth = manifest.about["truth"] | {"geometry": "torus"}
+    manifest.model_copy(update={"about": manifest.about | {"truth": truth}}).save(folder)
+    assert "is of another version (dataset.truth.geometry = 'torus')" in refused(folder, tmp_path, capsys)
+    manifest.model_copy(update={"about": manifest.about | {"shard_rows": 128}}).save(folder)
+    assert "its rows are not those of a recipe" in refused(folder, tmp_path, capsys)
+
+
 def test_a_licence_that_hubs_do_not_know_has_a_name_and_an_address(dataset, tmp_path):
     chosen = ["--licence", "EUPL-1.2", "--author", "A. Weaver"]
     assert main(["publish", str(dataset), "--to", str(tmp_path / "x"), *chosen]) == 0
