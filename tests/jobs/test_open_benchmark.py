@@ -1,0 +1,120 @@
+"""A method from outside, entered as pipeline/models/README.md says, from the text alone; then methods that fail."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from reports.record import read_records
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
+SECTION = TEXT.partition("\n## A method of your own\n")[2].partition("\n## ")[0]
+
+FAILING = """
+import time
+
+from nowhere import NOTHING
+"""
+
+LATE = """
+import numpy as np
+
+
+class Late:
+    name, version, setting = "late", 1, ""
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        if "edit" in fabric.name:
+            raise KeyError("a fabric that was edited")
+
+    def predict(self, fabric, queries, seed=0):
+        return np.ones((len(queries.u), 4), np.float32)
+
+    def bytes_stored(self, fabric):
+        return 0
+"""
+
+HANGS = (
+    LATE.replace("Late", "Hangs")
+    .replace('"late"', '"hangs"')
+    .replace("return np.ones", "import time; time.sleep(600)\n        return np.ones")
+)
+
+SCENE = """
+[bench.scenes]
+names = ["plane"]
+size = [16, 16]
+frames = 3
+options = { environment_directions = 4 }
+truth = { relative_error = 0.2, min_count = 64, max_count = 64 }
+frame_truth = { relative_error = 0.2, min_count = 64, max_count = 64 }
+image = { block = 4, resamples = 100 }
+"""
+
+
+def run(command, folder):
+    """Run a line of the text in a folder, as a user with the package installed would."""
+    program, *arguments = shlex.split(command)
+    assert program == "twillight"
+    return subprocess.run(
+        [sys.executable, "-m", "jobs.cli", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"},
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_the_text_is_enough_and_faults_of_others_are_sentences(tmp_path):
+    files = dict(re.findall(r"^`(\S+)`:\n\n```\w+\n(.*?)^```$", SECTION, re.M | re.S))
+    assert list(files) == ["nearest_table.py", "mine.toml"]
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    (command,) = re.findall(r"^```sh\n(.*)\n```$", SECTION, re.M)
+    done = run(command, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {*files, "out"}
+
+    page = tmp_path / "out" / "report" / "mine"
+    html = (page / "index.html").read_text(encoding="utf-8")
+    records = [one for one in read_records([page / "records.json"]) if one.method == "nearest_table"]
+    assert {one.metric for one in records} >= {"mse", "flicker", "time", "prepare_time", "size_colour", "extreme_error"}
+    (origin,) = {one.provenance.origin for one in records}
+    assert re.fullmatch(r"nearest_table\.py, version 1, SHA-256 [0-9a-f]{64}", origin) and origin in html
+    assert len(re.findall(r"<tr[^>]*>\s*<t[hd][^>]*>(?:<[^>]*>|\s)*nearest[ _]table", html)) > 3, "a row in each table"
+
+    # The same command finds nothing to do.
+    assert "nothing to do" in run(command, tmp_path).stdout
+
+    # Methods that fail: one in a measurement of times alone, one in every call, and one that is no code.
+    (tmp_path / "late.py").write_text(LATE)
+    (tmp_path / "hangs.py").write_text(HANGS)
+    (tmp_path / "failing.py").write_text(FAILING)
+    assert run(f"{command} --add failing.py:Nothing", tmp_path).returncode == 2
+    recipe = files["mine.toml"] + SCENE + '\n[[models]]\nmodel = "hangs"\nlimit = 5\n'
+    (tmp_path / "mine.toml").write_text(recipe, encoding="utf-8")
+    adds = "--add late.py:Late --add hangs.py:Hangs"
+    done = run(f"{command} {adds}", tmp_path)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "hangs: predict took longer than 5 s, its limit" in last and adds in last
+
+    timing = {path.name: read_records([path]) for path in (tmp_path / "out" / "records").glob("timing-*[0-9a-f].json")}
+    (times,) = [
+        found for name, found in timing.items() if "plane" not in name and any(r.method == "late" for r in found)
+    ]
+    (frame,) = [found for name, found in timing.items() if "plane" in name]
+    assert {one.method for one in times if one.metric == "time"} == {"truth", "point_sampled", "nearest_table"}
+    assert {one.method for one in frame if one.metric == "frame_time"} == {"point_sampled", "nearest_table", "late"}
+    notes = {one.method: one.note for one in times if one.metric == "not_run"}
+    assert notes["hangs"] == "predict took longer than 5 s, its limit"
+    assert notes["late"] == "prepare: KeyError: 'a fabric that was edited' (late.py, line 13)"
+    failed = [json.loads(path.read_text())["title"] for path in (tmp_path / "out" / "ledger").glob("*.failed.json")]
+    assert sorted(failed) == ["extremes of hangs", "hangs on denim", "hangs on the scene plane"]
