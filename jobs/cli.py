@@ -311,6 +311,23 @@ def merge(
     return merged([a, b], out)
 
 
+records = App(name="records", help="Join Records of several machines.", sort_key=14)
+app.command(records)
+
+
+@records.command(name="merge")
+def merge_records(
+    files: Annotated[list[Local], Parameter(help="Files of Records, folders of pages, or folders of products.")],
+    *,
+    recipe: Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")] = "",
+    out: Annotated[Local, Parameter(help="File of Records to write, ending in .json.")],
+) -> None:
+    """Join Records of several machines in one file; times of each stay apart."""
+    from jobs.verbs.merge import merge_records as merged
+
+    merged(files, recipe, out)
+
+
 @app.command(sort_key=14)
 def publish(
     dataset: Annotated[Path, Parameter(help="Folder of a data set, out/datasets/NAME-FINGERPRINT.")],

@@ -45,6 +45,8 @@ class MetricRow(NamedTuple):
     """How tables print a value."""
     table: str = OTHER
     """Table that shows it."""
+    of_machine: bool = False
+    """True if its values are those of one machine: times, rates, memory."""
 
 
 METRICS: Final[dict[str, MetricRow]] = {
@@ -121,8 +123,9 @@ METRICS: Final[dict[str, MetricRow]] = {
             unit="ns/query",
             format="grouped",
             table="timing",
+            of_machine=True,
         ),
-        MetricRow("waited", "share of waiting", format="percent", table="timing"),
+        MetricRow("waited", "share of waiting", format="percent", table="timing", of_machine=True),
         MetricRow(
             "bytes_stored",
             "bytes stored",
@@ -139,6 +142,7 @@ METRICS: Final[dict[str, MetricRow]] = {
             unit="B",
             format="bytes",
             table="timing",
+            of_machine=True,
         ),
         MetricRow(
             "prepare_time",
@@ -147,17 +151,20 @@ METRICS: Final[dict[str, MetricRow]] = {
             "queries. None where every fabric is trained by itself.",
             unit="ms",
             table="timing",
+            of_machine=True,
         ),
-        MetricRow("not_run", "not run", better="", table="timing"),
+        MetricRow("not_run", "not run", better="", table="timing", of_machine=True),
         # By the size of footprints.
         MetricRow("size_colour", "colour, by size", format="percent", table="by_size"),
         MetricRow("size_specular", "specular, by size", format="percent", table="by_size"),
         MetricRow("size_diffuse", "diffuse, by size", format="percent", table="by_size"),
-        MetricRow("size_time", "ns a query, by size", unit="ns/query", format="grouped", table="by_size"),
+        MetricRow(
+            "size_time", "ns a query, by size", unit="ns/query", format="grouped", table="by_size", of_machine=True
+        ),
         # Between fabrics.
         MetricRow("path_error", "latents blended", format="percent", table="between"),
         MetricRow("reencode_error", "encoded anew", format="percent", table="between"),
-        MetricRow("encode_time", "time of an edit", unit="ms", table="between"),
+        MetricRow("encode_time", "time of an edit", unit="ms", table="between", of_machine=True),
         # Silhouettes.
         MetricRow("silhouette_coverage", "coverage, RMSE", format="three decimals", table="silhouettes"),
         MetricRow(
@@ -242,6 +249,7 @@ METRICS: Final[dict[str, MetricRow]] = {
             "Of a scene, the time of its first frame; elsewhere the time of 1920 × 1080 queries, one a pixel.",
             unit="ms/frame",
             table="scenes",
+            of_machine=True,
         ),
         # Extremes of methods.
         MetricRow("extreme_error", "error by footprint", format="percent", table="extremes"),
@@ -258,7 +266,7 @@ METRICS: Final[dict[str, MetricRow]] = {
         MetricRow("not_finite", "not finite", format="grouped", table="stability"),
         MetricRow("negative", "negative", format="grouped", table="stability"),
         MetricRow("naive_not_finite", "not finite by the textbook's", format="grouped", table="stability"),
-        MetricRow("rate", "rate", better="higher", table="rates"),
+        MetricRow("rate", "rate", better="higher", table="rates", of_machine=True),
         MetricRow("true_rmse", "RMSE", format="percent", table="truth_accuracy"),
         MetricRow("true_error", "median error", format="percent", table="truth_accuracy"),
         MetricRow("stated_error", "median stated error", format="percent", table="truth_accuracy"),
@@ -270,15 +278,18 @@ METRICS: Final[dict[str, MetricRow]] = {
             better="higher",
             format="grouped",
             table="truth_accuracy",
+            of_machine=True,
         ),
         MetricRow("points_saved", "fewer points", better="higher", table="truth_accuracy"),
         MetricRow("reference_error", "error of the reference", format="percent", table="truth_accuracy"),
         MetricRow("bias", "bias", better="near 0", format="percent", table="truth_bias"),
         MetricRow("kind_share", "share of the queries", better="", format="percent", table="truth_effort"),
         MetricRow("kind_points", "points a query", unit="points/query", format="grouped", table="truth_effort"),
-        MetricRow("kind_time", "time of a query", unit="s/query", table="truth_effort"),
+        MetricRow("kind_time", "time of a query", unit="s/query", table="truth_effort", of_machine=True),
         MetricRow("variance_saved", "variance of the cosine over its own", better="higher", table="sampler"),
-        MetricRow("sample_time", "ns a direction", unit="ns/direction", format="grouped", table="sampler"),
+        MetricRow(
+            "sample_time", "ns a direction", unit="ns/direction", format="grouped", table="sampler", of_machine=True
+        ),
     )
 }
 """All metrics by name."""

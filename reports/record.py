@@ -79,6 +79,8 @@ class Provenance(BaseModel):
     """Fingerprint of the trained model; empty where nothing is trained."""
     origin: str = ""
     """Of a method from outside the package: distribution or file, its version, and the SHA-256 of its code."""
+    machine: str = ""
+    """Machine, where Records of several are in one file (`reports.machines`)."""
     version: int = versions.BENCH
     """Version of the measurements (`pipeline.versions.BENCH`)."""
 

@@ -27,6 +27,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
         If one has no Records or no machine, the machines differ without `other_machine`, or no measurement is shared.
     """
     from jobs.terminal import Terminal
+    from reports.machines import refuse_several
     from reports.record import read_machine, read_records
     from reports.tables.compare import LEVEL, refuse_other_machine
     from reports.tables.compare import compare as differences
@@ -34,6 +35,8 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
 
     files = [records_file(path, recipe) for path in (a, b)]
     first, second = (read_records([file]) for file in files)
+    for file, records in zip(files, (first, second), strict=True):
+        refuse_several(records, str(file))
     machine_a, machine_b = (read_machine(file) for file in files)
     unlike = refuse_other_machine(machine_a, machine_b, other_machine)
     found = differences(first, second)

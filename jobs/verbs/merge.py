@@ -1,5 +1,7 @@
 """`twillight merge`: two folders of products become one, such as parts of a data set made on two machines.
 
+`twillight records merge` joins the Records of machines alone, with the times of each machine apart.
+
 Shards, models and Records are compared with their receipts and linked, or copied where there are no links. Pages are
 left out: the next run writes them from what is there then.
 """
@@ -11,17 +13,23 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from jobs.console import MOST_SENTENCES, print_line
+from jobs.console import MOST_SENTENCES, number, print_line, table_of
 from jobs.plan.dataset import DATASETS
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product, Receipt
 from jobs.terminal import Terminal
+from jobs.verbs.compare import records_file
 from pipeline.atomic import link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pipeline.shards.manifest import Manifest
+    from reports.record import Record
+
+_RECORDS = "records merge"
 
 
 class Part(NamedTuple):
@@ -123,3 +131,65 @@ def _manifests(ledgers: Sequence[Ledger], out: Path) -> dict[Path, Manifest]:
                 raise BadInput(str(path), "", f"is of another data set than {folder / FILE}", "they cannot be joined")
             found[folder] = before.model_copy(update={"shards": list(every.values())})
     return found
+
+
+def merge_records(sources: Sequence[Path], recipe: str, out: Path) -> None:
+    """Join Records, write them to `out`, and print the time of a query of each method on each machine.
+
+    Raises
+    ------
+    BadInput
+        If fewer than two sources are given, one has no Records or no machine or holds several machines, or `out` is
+        one of them, no name of a .json file, or in no folder.
+    """
+    from reports.machines import join, names_of
+    from reports.record import read_machine, read_records, write_records
+
+    if len(sources) < 2:
+        raise BadInput(_RECORDS, "files", [str(path) for path in sources], "two files of Records or more are needed")
+    files = [records_file(path, recipe) for path in sources]
+    if out.suffix != ".json" or not out.parent.is_dir():
+        raise BadInput(_RECORDS, "--out", str(out), "must be a file in a folder that exists, ending in .json")
+    if out.resolve() in [file.resolve() for file in files]:
+        raise BadInput(_RECORDS, "--out", str(out), "is one of the files to join; another name is needed")
+    machines = [read_machine(file) for file in files]
+    names = names_of(machines)
+    joined = join(dict(zip(names, (read_records([file]) for file in files), strict=True)))
+    first = machines[0]
+    packages = {
+        name: version
+        for name, version in first.packages.items()
+        if all(machine.packages.get(name) == version for machine in machines)
+    }
+    together = first.model_copy(update={"cpu": "; ".join(names), "packages": packages})
+    write_records(out, joined.records, together)
+    console = Terminal()
+    console.print(_times(joined.records, names))
+    for index, name in enumerate(names):
+        console.print(f"{_letter(index)}: {name}, {machines[index].date}", soft_wrap=True)
+    said = f"{len(joined.records):,} Records of {len(names)} machines; {joined.shared:,} are alike and kept once"
+    console.print(f"{out}: {said}", soft_wrap=True)
+    if joined.unlike:
+        a, b = joined.unlike[0]
+        what = " ".join(filter(None, (a.metric, "of", a.method, a.setting, a.fabric or a.scene)))
+        console.print(
+            f"{len(joined.unlike):,} numbers differ and both are kept, such as {what}: {a.value:g} and {b.value:g}",
+            soft_wrap=True,
+        )
+
+
+def _times(records: Sequence[Record], names: Sequence[str]) -> Table:
+    """Show the time of a query on one thread: a row a method, a column a machine."""
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for record in records:
+        if record.metric == "time" and record.threads in (0, 1):
+            found.setdefault((record.method, record.setting), {})[record.provenance.machine] = record.value
+    columns = [f"{_letter(index)}, ns a query" for index in range(len(names))]
+    table = table_of("method", *columns, right=columns)
+    for (method, setting), times in found.items():
+        table.add_row(f"{method} {setting}".strip(), *(number(times.get(name, float("nan"))) for name in names))
+    return table
+
+
+def _letter(index: int) -> str:
+    return chr(ord("A") + index) if index < 26 else str(index + 1)

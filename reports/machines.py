@@ -1,0 +1,91 @@
+"""Records of several machines in one file.
+
+Numbers that a machine decides (times, rates, memory: `of_machine` of `reports.catalogue.MetricRow`) are kept of each
+machine, whose name is then part of their provenance. Other numbers are kept once where all machines have the same one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from reports.catalogue import METRICS
+from reports.record import Machine, Record
+from weaves.errors import BadInput
+
+
+class Joined(NamedTuple):
+    """Records of several machines.
+
+    Attributes
+    ----------
+    records : list of Record
+        All of them.
+    shared : int
+        Numbers that several machines have alike, and that are kept once.
+    unlike : list of tuple of Record
+        Pairs of one number that two machines have differently; both are kept.
+    """
+
+    records: list[Record]
+    shared: int
+    unlike: list[tuple[Record, Record]]
+
+
+def name_of(machine: Machine) -> str:
+    """Return a machine in a few words."""
+    threads = f"{machine.threads} thread{'' if machine.threads == 1 else 's'}"
+    return f"{machine.cpu}, {machine.cores} cores, {threads}, {machine.system}"
+
+
+def names_of(machines: Sequence[Machine]) -> list[str]:
+    """Return a name for each machine; those of equal machines end in their number."""
+    names = [name_of(machine) for machine in machines]
+    return [f"{name} ({names[:i].count(name) + 1})" if names.count(name) > 1 else name for i, name in enumerate(names)]
+
+
+def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
+    """Join the Records of machines, given by the names of the machines.
+
+    Raises
+    ------
+    BadInput
+        If Records of one machine hold several machines already.
+    """
+    records: list[Record] = []
+    known: dict[tuple[object, ...], Record] = {}
+    shared, unlike = 0, []
+    for name, part in parts.items():
+        refuse_several(part, name)
+        for record in part:
+            one = record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": name})})
+            if METRICS[record.metric].of_machine:
+                records.append(one)
+                continue
+            key = _subject(record)
+            first = known.setdefault(key, record)
+            if first is record:
+                records.append(record)
+            elif _number(first) == _number(record):
+                shared += 1
+            else:
+                records.append(one)
+                unlike.append((first, record))
+    return Joined(records, shared, unlike)
+
+
+def refuse_several(records: Sequence[Record], where: str) -> None:
+    """Raise BadInput if Records hold the numbers of several machines."""
+    if any(record.provenance.machine for record in records):
+        raise BadInput(where, "", "holds Records of several machines", "the Records of one machine are needed")
+
+
+def _subject(record: Record) -> tuple[object, ...]:
+    """Return what a number is of, whatever the name of the recipe."""
+    about = record.provenance
+    own = (record.method, record.setting, record.fabric, record.role, record.scene, record.metric, record.threads)
+    return (*own, record.note, about.dataset, about.model, about.origin, about.version)
+
+
+def _number(record: Record) -> tuple[object, ...]:
+    return record.value, record.standard_error, record.low, record.high, record.count, record.curve

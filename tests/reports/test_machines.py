@@ -1,0 +1,49 @@
+import pytest
+
+from reports.machines import join, names_of, refuse_several
+from reports.record import Provenance, Record, this_machine
+from weaves.errors import BadInput
+
+MSE = Record(method="woven", metric="mse", value=2.0, provenance=Provenance(recipe="one", dataset="d"))
+TIME = Record(method="woven", metric="time", value=50.0, unit="ns/query", threads=1, samples=(49.0, 50.0, 51.0))
+
+
+def of(machine, record):
+    return record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": machine})})
+
+
+def test_times_stay_apart_and_equal_numbers_are_kept_once():
+    other = MSE.model_copy(update={"provenance": Provenance(recipe="two", dataset="d")})
+    joined = join({"A": [MSE, TIME], "B": [other, TIME], "C": [TIME]})
+    assert joined.records == [MSE, of("A", TIME), of("B", TIME), of("C", TIME)]
+    assert (joined.shared, joined.unlike) == (1, [])
+
+
+def test_numbers_that_differ_are_both_kept_and_named():
+    other = MSE.model_copy(update={"value": 2.5})
+    joined = join({"A": [MSE], "B": [other]})
+    assert joined.records == [MSE, of("B", other)]
+    assert joined.unlike == [(MSE, other)]
+
+
+@pytest.mark.parametrize(
+    "change", [{"fabric": "denim"}, {"setting": "k = 2"}, {"provenance": Provenance(dataset="e")}, {"threads": 2}]
+)
+def test_numbers_of_other_subjects_are_no_pair(change):
+    other = MSE.model_copy(update=change)
+    assert join({"A": [MSE], "B": [other]}).records == [MSE, other]
+
+
+def test_equal_machines_are_numbered():
+    machine = this_machine(1)
+    names = names_of([machine, machine.model_copy(update={"cores": machine.cores + 1}), machine])
+    assert len(set(names)) == 3 and names[0].endswith("(1)") and names[2].endswith("(2)")
+    assert machine.cpu in names[1] and f"{machine.cores + 1} cores" in names[1]
+
+
+def test_records_of_several_machines_are_not_joined_again():
+    joined = join({"A": [MSE, TIME], "B": [TIME]})
+    with pytest.raises(BadInput, match=r"^file: holds Records of several machines"):
+        refuse_several(joined.records, "file")
+    with pytest.raises(BadInput, match=r"^C: holds"):
+        join({"C": joined.records})
