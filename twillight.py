@@ -49,7 +49,7 @@ _refuse_hidden_packages()
 
 from pipeline.truth.conventions import COMPONENTS  # noqa: E402, nothing of ours before the check
 from pipeline.truth.query import Queries  # noqa: E402
-from weaves.errors import BadInput, nearest  # noqa: E402
+from weaves.errors import BadInput  # noqa: E402
 from weaves.fabric import Fabric, load_fabric  # noqa: E402
 
 if TYPE_CHECKING:
@@ -192,12 +192,13 @@ def open_dataset(folder: str | Path) -> Dataset:
     Parameters
     ----------
     folder : str or Path
-        A folder that `twillight generate` wrote, ``out/datasets/NAME-FINGERPRINT``, or its address in object storage.
+        A folder that `twillight generate` or `twillight publish` wrote, such as ``out/datasets/NAME-FINGERPRINT``, or
+        its address in object storage.
 
     Raises
     ------
     BadInput
-        If the folder has no manifest, its manifest is damaged, or it is that of a published data set.
+        If the folder has no manifest, its manifest is damaged, or of another version.
 
     Examples
     --------
@@ -227,15 +228,11 @@ class Dataset:
     """
 
     def __init__(self, folder: Path) -> None:
-        from pipeline.shards.manifest import Manifest
+        from pipeline.shards.pieces import DatasetRows
 
-        if (folder / "croissant.json").exists():
-            raise BadInput(
-                str(folder), "", "is a published data set", "read it with its load.py, or any Parquet reader"
-            )
-        self._folder, self._manifest = folder, Manifest.load(folder)
-        self.fabrics: dict[str, Fabric] = dict(self._manifest.fabrics)
-        self.roles: dict[Role, list[str]] = dict(self._manifest.roles)
+        self._rows = DatasetRows.load(folder)
+        self.fabrics: dict[str, Fabric] = self._rows.fabrics
+        self.roles: dict[Role, list[str]] = self._rows.roles
 
     def numpy(self, fabric: str, split: Split) -> tuple[Queries, Answers]:
         """Return the rows of a fabric's split (train, validation or test) as arrays.
@@ -251,8 +248,10 @@ class Dataset:
         >>> answers.mean.shape == (len(queries.u), 4)
         True
         """
-        self._refuse_unknown(fabric)
-        return self._manifest.read(self._folder, fabric, split)
+        from pipeline.shards.store import rows_of
+
+        frame = self.pandas(split, [fabric])
+        return rows_of({name: frame[name].to_numpy() for name in frame.columns[1:]})
 
     def pandas(self, split: Split, fabrics: list[str] | None = None) -> pd.DataFrame:
         """Return the rows of a split as a frame: one column for the fabric, and one for each number of a row.
@@ -269,10 +268,9 @@ class Dataset:
         """
         import pandas as pd
 
-        names = self._with_rows(split, fabrics)
-        parts = [pd.DataFrame(self._manifest.columns(self._folder, name, split)) for name in names]
-        rows = pd.concat(parts, keys=names, names=["fabric", "row"]).reset_index("fabric")
-        return rows.astype({"fabric": "category"}).reset_index(drop=True)
+        pieces = self._rows.of(split, fabrics)
+        parts = [pd.DataFrame({"fabric": piece.fabric, **piece.read()}) for piece in pieces]
+        return pd.concat(parts, ignore_index=True).astype({"fabric": "category"})
 
     def torch(
         self, split: Split, rows: int = 4096, fabrics: list[str] | None = None, seed: int | None = 0
@@ -304,19 +302,4 @@ class Dataset:
         """
         from pipeline.training.stream import RowStream
 
-        return RowStream(self._manifest, self._folder, split, self._with_rows(split, fabrics), rows, seed)
-
-    def _with_rows(self, split: Split, fabrics: list[str] | None) -> list[str]:
-        """Return the fabrics that are named, or all that have rows in a split."""
-        there = {shard.fabric for shard in self._manifest.shards if shard.split == split}
-        for name in fabrics or ():
-            self._refuse_unknown(name)
-        found = list(fabrics) if fabrics else [name for name in self.fabrics if name in there]
-        if not found:
-            splits = {shard.split for shard in self._manifest.shards}
-            raise BadInput(str(self._folder), "split", split, nearest(split, splits))
-        return found
-
-    def _refuse_unknown(self, fabric: str) -> None:
-        if fabric not in self.fabrics:
-            raise BadInput(str(self._folder), "fabric", fabric, nearest(fabric, self.fabrics))
+        return RowStream(self._rows.of(split, fabrics), rows, seed)

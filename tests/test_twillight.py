@@ -186,13 +186,6 @@ def test_rows_are_read_from_object_storage(dataset, tmp_path):
     assert len(list(there.torch("train", rows=200))) == 2
 
 
-def test_a_published_data_set_is_refused_with_its_loader(dataset, tmp_path):
-    folder = tmp_path / "out" / "datasets" / "tiny"
-    (folder / "croissant.json").touch()
-    with pytest.raises(BadInput, match=r"read it with its load\.py"):
-        open_dataset(folder)
-
-
 def test_all_fabrics_of_a_split(dataset):
     frame = dataset.pandas("test")
     assert frame["fabric"].value_counts().to_dict() == {"denim": 40, "twill_4_4": 30}
@@ -205,8 +198,9 @@ def test_all_fabrics_of_a_split(dataset):
     ("call", "sentence"),
     [
         (lambda data: data.numpy("denin", "test"), "did you mean 'denim'"),
-        (lambda data: data.numpy("twill_4_4", "train"), "no rows"),
+        (lambda data: data.numpy("twill_4_4", "train"), "twill_4_4 has no such rows"),
         (lambda data: data.pandas("trian"), "did you mean 'train'"),
+        (lambda data: data.pandas("validation"), "no fabric has such rows"),
         (lambda data: data.torch("test", rows=0), "rows = 0"),
         (lambda data: data.torch("test", seed=-1), "seed = -1"),
         (lambda data: open_dataset("nowhere"), "does not exist"),

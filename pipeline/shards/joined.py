@@ -11,13 +11,17 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
 from pipeline.shards.query_file import ROW_GROUP
-from pipeline.shards.schema import SCHEMA
+from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION
 from pipeline.shards.store import read_table
+from pipeline.storage import local_copy
+from weaves.errors import BadInput
+from weaves.reading import refuse_irregular
 
 JOINED: Final = SCHEMA.set(0, SCHEMA.field(0).with_type(pa.string()))
 """Arrow schema of a joined file of kind `components`."""
@@ -54,6 +58,29 @@ def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> No
     with atomic_path(path) as temporary, _writer(temporary, schema) as writer:
         for table in _row_groups(shards):
             writer.write_table(table.cast(schema))
+
+
+def read_fabric(path: Path, fabric: str) -> dict[str, npt.NDArray[Any]]:
+    """Return a fabric's rows of a joined file by column, the fabric left out, with their checksums verified.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or damaged, or has other columns.
+    """
+    refuse_irregular(path, "a file of rows")
+    try:
+        with local_copy(path) as file:
+            table = pq.read_table(file, filters=[("fabric", "==", fabric)], page_checksum_verification=True)
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "does not exist", "get the whole data set") from error
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).splitlines()[0].rstrip(".")
+        raise BadInput(str(path), "", f"not a whole Parquet file ({reason})", "get the data set again") from error
+    if table.schema.names != JOINED.names:
+        odd = ", ".join(sorted(set(table.schema.names) ^ set(JOINED.names)))
+        raise BadInput(str(path), "schema", f"columns {odd} differ", f"must be schema version {SCHEMA_VERSION}")
+    return {name: table.column(name).to_numpy() for name in JOINED.names[1:]}
 
 
 def _row_groups(shards: Sequence[Path]) -> Iterator[pa.Table]:

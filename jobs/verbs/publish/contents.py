@@ -7,7 +7,7 @@ a file if there are many.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pipeline.shards.manifest import Manifest, Role, ShardEntry
 
@@ -43,6 +43,11 @@ class Part(NamedTuple):
     def rows(self) -> int:
         """Number of rows."""
         return sum(shard.rows for shard in self.shards)
+
+    def entry(self) -> dict[str, Any]:
+        """Return what the manifest says of it: role, split, and the rows of each fabric."""
+        rows = {name: sum(shard.rows for shard in self.shards if shard.fabric == name) for name in self.fabrics}
+        return {"role": self.role, "split": self.split, "rows": rows}
 
 
 def own_shards(manifest: Manifest) -> list[ShardEntry]:

@@ -6,7 +6,6 @@ continued by the same command, which keeps finished files of rows. The same data
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +28,7 @@ from pipeline.shards.check import check_shard
 from pipeline.shards.joined import join_shards
 from pipeline.shards.manifest import FILE as MANIFEST
 from pipeline.shards.manifest import Manifest
+from pipeline.shards.published import Published, PublishedFile
 from pipeline.shards.store import read_about
 from weaves.errors import BadInput, WorkFailed
 
@@ -161,24 +161,22 @@ def _listing(about: About, staging: Path, files: Sequence[str]) -> bytes:
     parts = {part.file: part for part in about.parts}
     listed = []
     for file in sorted(files):
-        path = staging / file
-        entry: dict[str, Any] = {"file": file, "bytes": path.stat().st_size, "sha256": file_sha256(path)}
-        if part := parts.get(file):
-            entry |= {"role": part.role, "split": part.split, "rows": part.rows, "fabrics": list(part.fabrics)}
-        listed.append(entry)
-    content = {
-        "name": about.manifest.name,
-        "version": about.version,
-        "fingerprint": about.manifest.fingerprint,
-        "schema_version": about.manifest.schema_version,
-        "truth_version": about.truth_version,
-        "licence": about.licence,
-        "rows": about.rows,
-        "roles": about.manifest.roles,
-        "options": about.manifest.about,
-        "files": listed,
-    }
-    return json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
+        path, part = staging / file, parts.get(file)
+        entry = PublishedFile(file=file, bytes=path.stat().st_size, sha256=file_sha256(path))
+        listed.append(entry.model_copy(update=part.entry()) if part else entry)
+    return Published(
+        name=about.manifest.name,
+        version=about.version,
+        fingerprint=about.manifest.fingerprint,
+        schema_version=about.manifest.schema_version,
+        truth_version=about.truth_version,
+        licence=about.licence,
+        rows=about.rows,
+        roles=about.manifest.roles,
+        fabrics=about.manifest.fabrics,
+        options=about.manifest.about,
+        files=listed,
+    ).encoded()
 
 
 def _remove_others(staging: Path, wanted: set[str]) -> None:

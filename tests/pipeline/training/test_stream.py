@@ -6,6 +6,7 @@ import torch
 from torch.utils.data import DataLoader
 
 from pipeline.shards.manifest import Manifest
+from pipeline.shards.pieces import DatasetRows
 from pipeline.training.stream import RowStream
 from weaves.errors import BadInput
 
@@ -14,7 +15,7 @@ ROWS = 4096
 
 
 def stream(folder, split="train", names=NAMES, **rest):
-    return RowStream(Manifest.load(folder), folder, split, names, **rest)
+    return RowStream(DatasetRows.load(folder).of(split, names), **rest)
 
 
 def rows_of(batches):

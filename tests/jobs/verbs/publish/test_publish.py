@@ -2,16 +2,19 @@
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 
 import duckdb
 import mlcroissant
+import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import yaml
 
+import twillight
 from jobs.cli import main
 from jobs.plan.dataset import fingerprint_of, folder_of, shards
 from jobs.recipe.load import load_recipe
@@ -20,6 +23,7 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest
 from pipeline.shards.schema import SCHEMA
 from tests.jobs import made_up
+from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 RECIPE = """
@@ -88,8 +92,10 @@ def test_the_folder_holds_what_it_should_and_its_hashes(published):
     assert {"fabrics/denim.toml", "fabrics/own.toml", "fabrics/twill_4_4.toml", "population.toml"} < listed.keys()
     rows = {}
     for entry in manifest["files"]:
-        if "rows" in entry:
-            rows[entry["role"], entry["split"]] = rows.get((entry["role"], entry["split"]), 0) + entry["rows"]
+        if "role" in entry:
+            rows[entry["role"], entry["split"]] = rows.get((entry["role"], entry["split"]), 0) + sum(
+                entry["rows"].values()
+            )
     assert rows == ROWS and manifest["rows"] == sum(ROWS.values())
     assert not [name for name in found if ".tmp" in name or "lock" in name]
 
@@ -119,6 +125,37 @@ def test_pandas_and_the_loader_read_it(published):
     assert done.stdout.split() == ["320", "64", "3"], done.stderr
     lines = (published / "load.py").read_text().splitlines()
     assert len([line for line in lines if line.strip()]) <= 11  # and a docstring
+
+
+def test_the_door_reads_it_as_the_data_set_itself(published, dataset):
+    ours, theirs = twillight.open_dataset(dataset), twillight.open_dataset(published)
+    assert (ours.fabrics, ours.roles) == (theirs.fabrics, theirs.roles)
+    for split in ("train", "validation", "test"):
+        assert ours.pandas(split).equals(theirs.pandas(split))
+    for mine, other in zip(ours.numpy("own", "train"), theirs.numpy("own", "train"), strict=True):
+        assert all(np.array_equal(*columns) for columns in zip(mine, other, strict=True))
+    batches = list(theirs.torch("train", rows=50))
+    assert sum(len(batch["u"]) for batch in batches) == ROWS["seen", "train"] + ROWS["population", "train"]
+
+
+def test_the_door_refuses_damaged_files(published, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(published, copy)
+    data = twillight.open_dataset(copy)
+    first, second, *_ = sorted(copy.glob("data/seen/test-*.parquet"))
+    whole = first.read_bytes()
+    first.write_bytes(whole[:1000] + bytes(byte ^ 1 for byte in whole[1000:2000]) + whole[2000:])
+    with pytest.raises(BadInput, match="get the data set again"):
+        data.pandas("test")
+    shutil.copy(second, first)
+    with pytest.raises(BadInput, match="has 0 rows of denim"):
+        data.pandas("test")
+    first.unlink()
+    with pytest.raises(BadInput, match="get the whole data set"):
+        data.pandas("test")
+    (copy / "manifest.json").write_text("{}")
+    with pytest.raises(BadInput, match="not a manifest"):
+        twillight.open_dataset(copy)
 
 
 def test_duckdb_reads_it(published):

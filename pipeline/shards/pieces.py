@@ -1,0 +1,125 @@
+"""Rows of a data set, generated here or published, in pieces: those of one fabric and split in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy.typing as npt
+
+from pipeline.shards.joined import read_fabric
+from pipeline.shards.manifest import Manifest, Role
+from pipeline.shards.published import Published
+from pipeline.shards.store import read_columns
+from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric
+
+SPLITS: Final = ("train", "validation", "test")
+
+_OF_PUBLISHED: Final = "croissant.json"
+
+
+class Piece(NamedTuple):
+    """Rows of one fabric and split in one file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    fabric, split : str
+        Name of the fabric, and split of the rows.
+    rows : int
+        Number of rows.
+    joined : bool
+        True if the file may have rows of other fabrics too.
+    """
+
+    path: Path
+    fabric: str
+    split: str
+    rows: int
+    joined: bool
+
+    def read(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the rows by column, the fabric left out; BadInput if the file is missing or damaged."""
+        if not self.joined:
+            return read_columns(self.path, "components")
+        found = read_fabric(self.path, self.fabric)
+        if (rows := len(found["u"])) != self.rows:
+            raise BadInput(str(self.path), "", f"has {rows:,} rows of {self.fabric}", f"{self.rows:,} are needed")
+        return found
+
+
+class DatasetRows(NamedTuple):
+    """Fabrics and pieces of a data set.
+
+    Attributes
+    ----------
+    folder : Path
+        Its folder.
+    fabrics : dict of str to Fabric
+        Every fabric.
+    roles : dict of str to list of str
+        Names of the fabrics in each role.
+    pieces : list of Piece
+        All rows that every model may read, in their order.
+    """
+
+    folder: Path
+    fabrics: dict[str, Fabric]
+    roles: dict[Role, list[str]]
+    pieces: list[Piece]
+
+    @classmethod
+    def load(cls, folder: Path) -> DatasetRows:
+        """Read the manifest of a data set; BadInput if it is missing or damaged."""
+        if (folder / _OF_PUBLISHED).exists():
+            contents = Published.load(folder)
+            return cls(folder, dict(contents.fabrics), dict(contents.roles), list(_joined(contents, folder)))
+        manifest = Manifest.load(folder)
+        return cls(folder, dict(manifest.fabrics), dict(manifest.roles), list(_shards(manifest, folder)))
+
+    def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[Piece]:
+        """Return the pieces of a split, fabric after fabric.
+
+        Parameters
+        ----------
+        split : str
+            train, validation or test.
+        fabrics : sequence of str, optional
+            Names; all that have this split if left out.
+
+        Raises
+        ------
+        BadInput
+            If a split or fabric does not exist, or has no rows.
+        """
+        if split not in SPLITS:
+            raise BadInput(str(self.folder), "split", split, nearest(split, SPLITS))
+        by_fabric: dict[str, list[Piece]] = {}
+        for piece in self.pieces:
+            if piece.split == split:
+                by_fabric.setdefault(piece.fabric, []).append(piece)
+        chosen = [name for name in self.fabrics if name in by_fabric] if fabrics is None else fabrics
+        for name in chosen:
+            if name not in self.fabrics:
+                raise BadInput(str(self.folder), "fabric", name, nearest(name, self.fabrics))
+            if name not in by_fabric:
+                raise BadInput(str(self.folder), "split", split, f"{name} has no such rows")
+        if not chosen:
+            raise BadInput(str(self.folder), "split", split, "no fabric has such rows")
+        return [piece for name in chosen for piece in by_fabric[name]]
+
+
+def _shards(manifest: Manifest, folder: Path) -> Iterator[Piece]:
+    """Yield the shards that every model may read; extra rows of single models have other columns or no splits."""
+    for shard in sorted(manifest.shards, key=lambda shard: shard.start):
+        if shard.kind == "components":
+            yield Piece(folder / shard.file, shard.fabric, shard.split, shard.rows, joined=False)
+
+
+def _joined(contents: Published, folder: Path) -> Iterator[Piece]:
+    for entry in contents.files:
+        for fabric, rows in entry.rows.items():
+            yield Piece(folder / entry.file, fabric, entry.split or "", rows, joined=True)
