@@ -1,6 +1,7 @@
 """The notebooks, executed from top to bottom in a fresh kernel."""
 
 import os
+import sys
 from pathlib import Path
 
 import nbformat
@@ -41,7 +42,7 @@ def executed(path, folder):
     """Return a notebook executed in a folder."""
     notebook = nbformat.read(path, as_version=4)
     where = {"metadata": {"path": folder}}
-    NotebookClient(notebook, kernel_name="python3", timeout=600, startup_timeout=300, resources=where).execute()
+    NotebookClient(notebook, kernel_name="python3", timeout=1800, startup_timeout=300, resources=where).execute()
     return notebook
 
 
@@ -89,3 +90,13 @@ def test_a_data_set_and_a_model(folder):
     assert errors.keys() == {"polyester_lining", "denim", "twill_4_4"}
     assert np.all(np.array(list(errors.values())) < 10)
     assert "'fabric': (200,)" in printed[3]
+
+
+def test_a_method_enters_the_benchmark(folder, monkeypatch):
+    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    notebook = executed(ROOT / "notebooks" / "method.ipynb", folder)
+    assert len(outputs(notebook, "image/png")) == 1
+    assert (folder / "out" / "report" / "mine" / "index.html").is_file(), outputs(notebook, "stream")
+    assert "lambert.py, version 1, SHA-256 " in outputs(notebook, "stream")
+    (table,) = outputs(notebook, "text/html")
+    assert all(f"<th>{name}</th>" in table for name in ("lambert", "point_sampled", "colour_rrmse", "time"))

@@ -8,17 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from reports.record import read_records
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
 SECTION = TEXT.partition("\n## A method of your own\n")[2].partition("\n## ")[0]
-
-FAILING = """
-import time
-
-from nowhere import NOTHING
-"""
 
 LATE = """
 import numpy as np
@@ -72,49 +68,59 @@ def run(command, folder):
     )
 
 
-def test_the_text_is_enough_and_faults_of_others_are_sentences(tmp_path):
-    files = dict(re.findall(r"^`(\S+)`:\n\n```\w+\n(.*?)^```$", SECTION, re.M | re.S))
-    assert list(files) == ["nearest_table.py", "mine.toml"]
-    for name, content in files.items():
-        (tmp_path / name).write_text(content, encoding="utf-8")
-    (command,) = re.findall(r"^```sh\n(.*)\n```$", SECTION, re.M)
-    done = run(command, tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert {path.name for path in tmp_path.iterdir()} == {*files, "out"}
+FILES = dict(re.findall(r"^`(\S+)`:\n\n```\w+\n(.*?)^```$", SECTION, re.M | re.S))
+(COMMAND,) = re.findall(r"^```sh\n(.*)\n```$", SECTION, re.M)
 
-    page = tmp_path / "out" / "report" / "mine"
+
+@pytest.fixture(scope="module")
+def entered(tmp_path_factory):
+    """Return a folder with the files of the text, in which its command was run."""
+    folder = tmp_path_factory.mktemp("entered")
+    for name, content in FILES.items():
+        (folder / name).write_text(content, encoding="utf-8")
+    done = run(COMMAND, folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_the_text_is_enough(entered):
+    assert {path.name for path in entered.iterdir()} == {"nearest_table.py", "mine.toml", "out"} == {*FILES, "out"}
+    page = entered / "out" / "report" / "mine"
     html = (page / "index.html").read_text(encoding="utf-8")
     records = [one for one in read_records([page / "records.json"]) if one.method == "nearest_table"]
     assert {one.metric for one in records} >= {"mse", "flicker", "time", "prepare_time", "size_colour", "extreme_error"}
     (origin,) = {one.provenance.origin for one in records}
     assert re.fullmatch(r"nearest_table\.py, version 1, SHA-256 [0-9a-f]{64}", origin) and origin in html
     assert len(re.findall(r"<tr[^>]*>\s*<t[hd][^>]*>(?:<[^>]*>|\s)*nearest[ _]table", html)) > 3, "a row in each table"
+    assert "nothing to do" in run(COMMAND, entered).stdout
+    without = run(COMMAND.partition(" --add")[0], entered)
+    assert without.returncode == 2
+    assert "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
 
-    # The same command finds nothing to do.
-    assert "nothing to do" in run(command, tmp_path).stdout
 
-    # Methods that fail: one in a measurement of times alone, one in every call, and one that is no code.
-    (tmp_path / "late.py").write_text(LATE)
-    (tmp_path / "hangs.py").write_text(HANGS)
-    (tmp_path / "failing.py").write_text(FAILING)
-    assert run(f"{command} --add failing.py:Nothing", tmp_path).returncode == 2
-    recipe = files["mine.toml"] + SCENE + '\n[[models]]\nmodel = "hangs"\nlimit = 5\n'
-    (tmp_path / "mine.toml").write_text(recipe, encoding="utf-8")
+@pytest.mark.slow
+def test_methods_that_fail_leave_the_others_their_results(entered):
+    """One fails in a measurement of times alone, one in every call, and one is no code."""
+    (entered / "late.py").write_text(LATE)
+    (entered / "hangs.py").write_text(HANGS)
+    (entered / "failing.py").write_text("from nowhere import NOTHING\n")
+    assert run(f"{COMMAND} --add failing.py:Nothing", entered).returncode == 2
+    recipe = FILES["mine.toml"] + SCENE + '\n[[models]]\nmodel = "hangs"\nlimit = 5\n'
+    (entered / "mine.toml").write_text(recipe, encoding="utf-8")
     adds = "--add late.py:Late --add hangs.py:Hangs"
-    done = run(f"{command} {adds}", tmp_path)
+    done = run(f"{COMMAND} {adds}", entered)
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert "hangs: predict took longer than 5 s, its limit" in last and adds in last
 
-    timing = {path.name: read_records([path]) for path in (tmp_path / "out" / "records").glob("timing-*[0-9a-f].json")}
-    (times,) = [
-        found for name, found in timing.items() if "plane" not in name and any(r.method == "late" for r in found)
-    ]
-    (frame,) = [found for name, found in timing.items() if "plane" in name]
+    files = [path for path in (entered / "out" / "records").glob("timing-*.json") if "machine" not in path.name]
+    timing = {path.name: read_records([path]) for path in files}
+    frame = next(found for name, found in timing.items() if "plane" in name)
+    times = next(found for name, found in timing.items() if "plane" not in name and "late" in {r.method for r in found})
     assert {one.method for one in times if one.metric == "time"} == {"truth", "point_sampled", "nearest_table"}
     assert {one.method for one in frame if one.metric == "frame_time"} == {"point_sampled", "nearest_table", "late"}
     notes = {one.method: one.note for one in times if one.metric == "not_run"}
     assert notes["hangs"] == "predict took longer than 5 s, its limit"
     assert notes["late"] == "prepare: KeyError: 'a fabric that was edited' (late.py, line 13)"
-    failed = [json.loads(path.read_text())["title"] for path in (tmp_path / "out" / "ledger").glob("*.failed.json")]
+    failed = [json.loads(path.read_text())["title"] for path in (entered / "out" / "ledger").glob("*.failed.json")]
     assert sorted(failed) == ["extremes of hangs", "hangs on denim", "hangs on the scene plane"]
