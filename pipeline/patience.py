@@ -1,8 +1,8 @@
 """Patience with a storage that fails for a while: requests are repeated, with growing pauses, for a stated time.
 
 A storage that has answered before, or that answers with an error of its own, gets `MOST_SECONDS`; one that was never
-reached gets `UNREACHED_SECONDS`, because its address may be wrong. The first failure is told to a listener, once in a
-minute at most.
+reached gets `UNREACHED_SECONDS`, because its address may be wrong. The first failure is reported to a listener, at
+most once in a minute.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ UNREACHED_SECONDS: Final = 4.0
 
 _FIRST_PAUSE: Final = 0.5
 _LONGEST_PAUSE: Final = 10.0  # seconds
-_QUIET: Final = 60.0  # seconds without a failure, after which the next one is told again
+_QUIET: Final = 60.0  # seconds without a failure, after which the next one is reported again
 
 Failure = Literal["answered", "unreached", "final"]
-"""Kind of an error: an answer that asks to try again; no answer; or one that would come again."""
+"""Kind of an error: an answer after which to try again; no answer; or one that would come again."""
 
 Answer = TypeVar("Answer")
 
@@ -36,7 +36,7 @@ class StorageFailed(WorkFailed):
 
 
 class _State:
-    """What this process knows of the storage."""
+    """State of the storage as this process knows it."""
 
     def __init__(self) -> None:
         self.reached = False
@@ -49,7 +49,7 @@ _state: Final = _State()
 
 
 def tell(listener: Callable[[str], None] | None) -> None:
-    """Set who is told that a storage is waited for; None: it is printed on stderr. Calls come from another thread."""
+    """Set the listener for waits for a storage; None: it is printed on stderr. Calls come from another thread."""
     _state.listener = listener
 
 

@@ -207,7 +207,7 @@ def _register_patient_s3() -> None:
 
 
 def _kind_of(error: Exception) -> Failure:
-    """Return whether an error of s3fs is an answer that asks to try again, no answer, or final."""
+    """Return whether an error of s3fs is an answer after which to try again, no answer, or final."""
     import botocore.exceptions
     from s3fs.core import S3_RETRYABLE_ERRORS
 

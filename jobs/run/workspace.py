@@ -5,7 +5,7 @@ storage, it is a folder of this machine and user: the products that the task nee
 their receipts, and those that it makes are stored. Nothing in it is needed again: it may be removed while no run uses
 it, and saves time as long as it is there.
 
-Each question to a storage is a request over the network. A snapshot asks for 1000 files at a time, and fetches many
+Each question to a storage is a request over the network. A snapshot lists 1000 files at a time, and fetches many
 receipts at the same time into the workspace, and again only when their version changes.
 """
 
@@ -99,7 +99,7 @@ def _fetch(out: Path, folder: Path, path: str, sha256: str) -> None:
 
 
 class Snapshot:
-    """The files of an output folder when they were first asked for, and what this process has written since.
+    """The files of an output folder when they were first needed, and what this process has written since.
 
     Parameters
     ----------
