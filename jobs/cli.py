@@ -33,7 +33,7 @@ FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
 Add = Annotated[
     list[str],
-    Parameter(help="Method from outside: MODULE:CLASS, FILE.py:CLASS, or the name of an installed one; runs its code."),
+    Parameter(help="Method or metric from outside: MODULE:NAME, FILE.py:NAME, or an installed method; runs its code."),
 ]
 NOTHING: list[str] = []
 

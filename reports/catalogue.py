@@ -24,6 +24,9 @@ Format = Literal[
 ]
 """How tables print a value (`reports.tables.number_format.shown`)."""
 
+ADDED: Final = "added_"
+"""Begins the names of metrics from outside the package."""
+
 OTHER: Final = "other_metrics"
 """Table of the metrics that have no table of their own."""
 
@@ -293,3 +296,21 @@ METRICS: Final[dict[str, MetricRow]] = {
     )
 }
 """All metrics by name."""
+
+
+def metric_row(metric: str) -> MetricRow:
+    """Return the row of a metric; one from outside that was not entered (`enter`) has little more than its name.
+
+    Raises
+    ------
+    KeyError
+        If there is no such metric.
+    """
+    if metric not in METRICS and metric.startswith(ADDED):
+        return MetricRow(metric, metric.removeprefix(ADDED).replace("_", " "))
+    return METRICS[metric]
+
+
+def enter(row: MetricRow) -> None:
+    """Enter a metric from outside in this process."""
+    METRICS[row.name] = row

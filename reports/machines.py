@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from reports.catalogue import METRICS
+from reports.catalogue import metric_row
 from reports.record import Machine, Record
 from weaves.errors import BadInput
 
@@ -59,7 +59,7 @@ def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
         refuse_several(part, name)
         for record in part:
             one = record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": name})})
-            if METRICS[record.metric].of_machine:
+            if metric_row(record.metric).of_machine:
                 records.append(one)
                 continue
             key = _subject(record)

@@ -24,7 +24,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, Typ
 from pipeline import versions
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256
-from reports.catalogue import METRICS
+from reports.catalogue import ADDED, METRICS, metric_row
 from reports.error import Error
 from reports.options import Role
 from weaves.errors import BadInput
@@ -55,7 +55,7 @@ OF_A_PAGE: Final = "records.json"
 
 def _known(metric: str) -> str:
     """Return a metric of the catalogue; ValueError if there is no such row."""
-    if metric not in METRICS:
+    if metric not in METRICS and not metric.startswith(ADDED):
         raise ValueError(f"{metric!r} is no metric of reports.catalogue")
     return metric
 
@@ -78,7 +78,7 @@ class Provenance(BaseModel):
     model: str = ""
     """Fingerprint of the trained model; empty where nothing is trained."""
     origin: str = ""
-    """Of a method from outside the package: distribution or file, its version, and the SHA-256 of its code."""
+    """Of a method or metric from outside: distribution or file, its version, and the SHA-256 of its code."""
     machine: str = ""
     """Machine, where Records of several are in one file (`reports.machines`)."""
     version: int = versions.BENCH
@@ -138,13 +138,14 @@ class Record(BaseModel):
         samples: tuple[float, ...] = (),
     ) -> Record:
         """Return another number measured on the same subject, in the unit of its metric."""
-        number = {"metric": metric, "value": value, "count": count, "unit": METRICS[metric].unit}
+        number = {"metric": metric, "value": value, "count": count, "unit": metric_row(metric).unit}
         bounds = {"standard_error": standard_error, "low": low, "high": high, "curve": curve, "samples": samples}
         return Record.model_validate(self.model_dump() | number | bounds)
 
     def made_by(self, origin: str) -> Record:
-        """Return the Record with the origin of a method from outside the package."""
-        return self.model_copy(update={"provenance": self.provenance.model_copy(update={"origin": origin})})
+        """Return the Record with the origin of a method or metric from outside the package."""
+        origins = "; ".join(filter(None, (self.provenance.origin, origin)))
+        return self.model_copy(update={"provenance": self.provenance.model_copy(update={"origin": origins})})
 
     def of_error(self, error: Error) -> list[Record]:
         """Return the three numbers of a mean squared error."""

@@ -16,6 +16,8 @@ from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
 from pipeline.models.added.added_method import AddedMethod
+from reports.added_metric import AddedMetric
+from reports.catalogue import enter
 from reports.options import BenchOptions, Role
 from reports.page.model_note import ModelNote
 from weaves.fabric import Fabric
@@ -38,6 +40,8 @@ class Page(Task):
     """The models."""
     options: BenchOptions
     """Options of the measurements."""
+    metrics: Annotated[tuple[AddedMetric, ...], PLACE]
+    """Metrics from outside; the ids of their measurements are in `measured`."""
     measured: tuple[str, ...]
     """Ids of the measurements."""
     others: dict[str, str]
@@ -107,6 +111,8 @@ class Page(Task):
         from reports.record import read_machine, read_records
 
         # Measurements are the same in every recipe; the page adds the recipe's name.
+        for metric in self.metrics:
+            enter(metric.row)
         own = {"recipe": self.recipe, "recipe_fingerprint": self.id}
         content = PageInput(
             recipe=self.recipe,
@@ -137,6 +143,7 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
         fabrics=tuple((subject.fabric, subject.role) for subject in subjects.fabrics),
         models=tuple(_note(recipe, model.recipe, model.trainings, shots) for model in subjects.models),
         options=recipe.bench,
+        metrics=recipe.metrics,
         measured=tuple(task.id for task in benches),
         others=dict(alone),
         records=tuple(task.records for task in benches if task.records),

@@ -1,7 +1,8 @@
-"""Methods from outside in a recipe: given with `--add`, or installed and named by the recipe.
+"""Methods and metrics from outside in a recipe: given with `--add`, or installed and named by the recipe.
 
 A recipe names such a method as it names any other, ``[[models]] model = "its_name"``; the keys beside are its options.
-`--add` enters it with its defaults if the recipe does not name it. A recipe alone never runs code.
+`--add` enters it with its defaults if the recipe does not name it. A function is a metric, which is measured of
+all methods. A recipe alone never runs code.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import entry_points
 from typing import Any, Final
 
+from pipeline.models.added.added_code import AddedFunction
 from pipeline.models.added.added_method import ADDED, GROUP, AddedMethod
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import WHERE
 from pipeline.models.catalogue import CLASSES
+from reports.added_metric import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.renamed import replacement
+from weaves.validation import validated
 
 _BESIDE: Final = ("model", "name", "version", "limit", "training", "runtimes")
 """Keys of a recipe's entry that are no options of the method."""
@@ -37,12 +41,20 @@ class Added:
 
     def __init__(self, given: Sequence[str] = ()) -> None:
         self._given: dict[str, AddedMethod] = {}
+        self.metrics: list[AddedMetric] = []
+        """The metrics from outside."""
         for text in given:
             source = text if ":" in text else _installed().get(text)
             if source is None:
                 known = f"installed: {', '.join(sorted(_installed()))}" if _installed() else "none is installed"
                 raise BadInput(WHERE, "", text, f"no method of this name; {known}; MODULE:CLASS or FILE.py:CLASS?")
             method = describe(source, {}, {})
+            if isinstance(method, AddedFunction):
+                metric = validated(AddedMetric, method.model_dump(), text)
+                if metric.name in [one.name for one in self.metrics]:
+                    raise BadInput(WHERE, "", text, f"a metric {metric.name!r} is given twice")
+                self.metrics.append(metric)
+                continue
             if method.name in CLASSES or method.name == ADDED:
                 raise BadInput(WHERE, "", text, f"its name {method.name!r} is that of a method of the package")
             if method.name in self._given:
@@ -86,6 +98,8 @@ class Added:
         name = entry.get("name", model)
         source = f"{given.source}" if given else str(installed)
         method = describe(source, own, {"name": name, **({"limit": entry["limit"]} if "limit" in entry else {})})
+        if isinstance(method, AddedFunction):
+            raise BadInput(where, f"{key}.model", model, "is the entry point of a metric; a method is needed")
         if "version" in entry and str(entry["version"]) != method.stated:
             raise BadInput(where, f"{key}.version", entry["version"], f"the method given has version {method.stated}")
         rest = {name: entry[name] for name in ("training", "runtimes") if name in entry}

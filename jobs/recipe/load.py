@@ -38,7 +38,7 @@ def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
     name_or_path : str or Path
         Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
     add : sequence of str
-        Methods from outside the package (`jobs.recipe.added`).
+        Methods and metrics from outside the package (`jobs.recipe.added`).
 
     Raises
     ------
@@ -84,6 +84,7 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
         population=tuple(population_fabrics(dataset.population)),
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
         trained_by=trained_by,
+        metrics=() if chain else tuple(added.metrics),
     )
     validate_recipe(recipe, where)
     check_trained_by(recipe, where)

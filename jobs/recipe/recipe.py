@@ -17,6 +17,7 @@ from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
+from reports.added_metric import AddedMetric
 from reports.options import BenchOptions, RuntimeName
 from weaves.fabric import Fabric
 from weaves.population import Population
@@ -151,6 +152,8 @@ class Recipe:
         The fabrics in the order of the recipe.
     trained_by : mapping
         From the names of models that another recipe trains to that recipe.
+    metrics : tuple of AddedMetric
+        Metrics from outside (`jobs.recipe.added`).
     """
 
     name: str
@@ -162,6 +165,7 @@ class Recipe:
     population: tuple[Fabric, ...]
     unseen: tuple[Fabric, ...]
     trained_by: Mapping[str, Recipe] = field(default_factory=dict)
+    metrics: tuple[AddedMetric, ...] = ()
 
     @property
     def fabrics(self) -> tuple[Fabric, ...]:

@@ -17,11 +17,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pipeline.fingerprint import fingerprint
+from pipeline.models.added.guarded import load_function
 from pipeline.scenes.shade import colours_of
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
+from reports.added_metric import AddedMetric
+from reports.catalogue import enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
@@ -86,6 +89,41 @@ def measure_errors(
     # A component that is nowhere seen has no relative error.
     records += [subject.of(name, e.relative_rmse, e.count) for name, e in relative.items() if e.mean > 0]
     return records
+
+
+def measure_added(
+    method: Method,
+    metric: AddedMetric,
+    manifest: Manifest,
+    folder: Path,
+    fabric: str,
+    role: Role,
+    options: ErrorOptions,
+    provenance: Provenance | None = None,
+) -> Record:
+    """Measure a metric from outside; arguments as for `measure_errors`.
+
+    Raises
+    ------
+    MethodFailed
+        If the metric's code fails, or returns no finite number.
+    """
+    enter(metric.row)
+    measured = load_function(metric)
+    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
+    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+    method.prepare(cloth)
+    values = method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
+    value = measured(cloth, queries, values, truth.mean, truth.standard_error)
+    subject = Record(
+        method=method.name,
+        setting=method.setting,
+        fabric=fabric,
+        role=role,
+        scene="queries",
+        provenance=provenance or Provenance(),
+    )
+    return subject.of(metric.row.name, value, len(values)).made_by(metric.origin)
 
 
 def measure_truth(

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.truth.conventions import COMPONENTS
-from reports.catalogue import METRICS, MetricRow
+from reports.catalogue import MetricRow, metric_row
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
 from reports.record import TRUTH, Record
@@ -305,7 +305,7 @@ def edit_rows(records: Sequence[Record]) -> list[list[str]]:
 
 def other_columns(table: pd.DataFrame) -> list[str]:
     """Return the columns of `other_rows` after the method: title, unit, and which direction is better."""
-    return [_heading(METRICS[name]) for name in table.columns[2:]]
+    return [_heading(metric_row(name)) for name in table.columns[2:]]
 
 
 def other_rows(table: pd.DataFrame) -> list[Row]:

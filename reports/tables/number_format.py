@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from reports.catalogue import METRICS, Format
+from reports.catalogue import Format, metric_row
 
 NONE = "–"
 
@@ -133,4 +133,4 @@ _FORMATS: Final[dict[Format, Callable[[float], str]]] = {
 
 def shown(metric: str, value: float) -> str:
     """Return the value of a metric in its format (`reports.catalogue`)."""
-    return _FORMATS[METRICS[metric].format](value)
+    return _FORMATS[metric_row(metric).format](value)

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.truth.conventions import COMPONENTS
-from reports.catalogue import METRICS, OTHER
+from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -217,7 +217,10 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
 def other_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the metrics without a table of their own: one row a method, one column a metric, means over Records."""
     table = to_table(records)
-    names = [name for name, row in METRICS.items() if row.table == OTHER and (table["metric"] == name).any()]
+    measured = table["metric"].unique()
+    names = [
+        name for name in dict.fromkeys((*METRICS, *measured)) if name in measured and metric_row(name).table == OTHER
+    ]
     if not names:
         return pd.DataFrame(columns=_KEYS)
     chosen = table[table["metric"].isin(names)]

@@ -196,6 +196,17 @@ results smoke
 results smoke --out good.json
 results smoke --readme nothing.md
 compare nothing nothing
+plan smoke --add nothing
+plan smoke --add nothing.py:Nothing
+plan smoke --add nothing:Nothing
+plan smoke --add weaves.fabric:Fabric
+plan smoke --add {"a" * 5000}:b
+status smoke --add :
+check smoke --add good.json:a
+bench truth --add a:b
+records merge good.json --out a.json
+records merge good.json good.json --out good.json
+records merge good.json nothing --out nowhere/a.json
 compare . .
 compare good.json good.json
 require nothing

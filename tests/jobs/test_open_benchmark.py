@@ -14,6 +14,7 @@ from reports.record import read_records
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
+(METRIC,) = re.findall(r"^`largest_error.py`:\n\n```python\n(.*?)^```$", TEXT, re.M | re.S)
 SECTION = TEXT.partition("\n## A method of your own\n")[2].partition("\n## ")[0]
 
 LATE = """
@@ -107,11 +108,12 @@ def test_methods_that_fail_leave_the_others_their_results(entered):
     assert run(f"{COMMAND} --add failing.py:Nothing", entered).returncode == 2
     recipe = FILES["mine.toml"] + SCENE + '\n[[models]]\nmodel = "hangs"\nlimit = 5\n'
     (entered / "mine.toml").write_text(recipe, encoding="utf-8")
-    adds = "--add late.py:Late --add hangs.py:Hangs"
+    (entered / "largest_error.py").write_text(METRIC)
+    adds = "--add late.py:Late --add hangs.py:Hangs --add largest_error.py:largest_error"
     done = run(f"{COMMAND} {adds}", entered)
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
-    assert "hangs: predict took longer than 5 s, its limit" in last and adds in last
+    assert "hangs: predict took longer than 5 s, its limit" in last and "--add late.py:Late" in last
 
     files = [path for path in (entered / "out" / "records").glob("timing-*.json") if "machine" not in path.name]
     timing = {path.name: read_records([path]) for path in files}
@@ -123,4 +125,15 @@ def test_methods_that_fail_leave_the_others_their_results(entered):
     assert notes["hangs"] == "predict took longer than 5 s, its limit"
     assert notes["late"] == "prepare: KeyError: 'a fabric that was edited' (late.py, line 13)"
     failed = [json.loads(path.read_text())["title"] for path in (entered / "out" / "ledger").glob("*.failed.json")]
-    assert sorted(failed) == ["extremes of hangs", "hangs on denim", "hangs on the scene plane"]
+    metrics = [
+        path for path in (entered / "out" / "records").glob("largest_error-*.json") if "machine" not in path.name
+    ]
+    measured = {one.method: one for one in read_records(metrics)}
+    assert measured.keys() == {"point_sampled", "nearest_table", "late"}
+    assert all(one.unit == "1/sr" and 0 < one.value < 2 for one in measured.values())
+    assert sorted(failed) == [
+        "extremes of hangs",
+        "hangs on denim",
+        "hangs on the scene plane",
+        "largest_error of hangs on denim",
+    ]

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -52,6 +52,7 @@ def test_bytes_do_not_depend_on_the_machine_or_the_date(tmp_path):
     assert machine_path(tmp_path / "a.json").read_bytes() != machine_path(tmp_path / "b.json").read_bytes()
 
 
+@settings(deadline=None)
 @given(st.data())
 def test_every_flip_of_records_or_of_their_machine_is_refused(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "flips" / "a.json"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from jobs.plan.measurements.added_metric import OfAddedMetric
 from jobs.plan.measurements.extremes import Extremes
 from jobs.plan.measurements.frame_time import FrameTime
 from jobs.plan.measurements.latents import Latents
@@ -30,6 +31,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     FrameTime,
     Extremes,
     Timing,
+    OfAddedMetric,
 )
 
 

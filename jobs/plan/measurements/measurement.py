@@ -82,6 +82,11 @@ class Measurement(Task):
         """Models that it measures."""
         return ()
 
+    @property
+    def runs_added_code(self) -> bool:
+        """True if code from outside is run."""
+        return any(isinstance(one.options, AddedMethod) for one in self.trained)
+
     def without(self, names: Sequence[str]) -> Self | None:
         """Return the measurement without some methods from outside; None if it measures one model alone."""
         return None
@@ -96,7 +101,7 @@ class Measurement(Task):
         MethodFailed
             If the only method fails.
         """
-        if not any(isinstance(one.options, AddedMethod) for one in self.trained):
+        if not self.runs_added_code:
             self.write(out, progress)
             return
         from pipeline.models.added.apart import run_apart

@@ -1,4 +1,4 @@
-"""Description of a method from outside, read from its code in a process of its own."""
+"""Description of a method or metric from outside, read from its code in a process of its own."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final, get_args
 
+from pipeline.models.added.added_code import AddedFunction
 from pipeline.models.added.added_method import AddedMethod, Kind
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed, faults_of
@@ -27,11 +28,17 @@ _TRAINED: Final = ("build", "loss", "start_at", "schedule", "parameter_groups", 
 _STATED: Final = ("name", "setting", "version", "kinds")
 """Attributes; the last may be missing."""
 
+METRIC_PARAMETERS: Final = ("fabric", "queries", "answers", "truth", "standard_error")
+"""Parameters of a metric: the cloth, N queries about it, the method's answers, the truth's and their errors, (N, 4)."""
+
+_OF_METRICS: Final = {"title": "", "unit": "1", "better": "lower", "format": "significant"}
+"""Attributes that a metric may have, with their defaults."""
+
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
-def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> AddedMethod:
-    """Return the options of a method from outside.
+def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> AddedMethod | AddedFunction:
+    """Return what code from outside is: a function is a metric, a class a method.
 
     Parameters
     ----------
@@ -55,7 +62,8 @@ def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> Adde
         fields = run_apart(_described, text, dict(own))
     except MethodFailed as failure:
         raise BadInput(WHERE, "", text, failure.reason) from failure
-    return validated(AddedMethod, {**fields, **more}, WHERE)
+    fields |= more
+    return validated(AddedMethod, fields, WHERE) if "own" in fields else validated(AddedFunction, fields, WHERE)
 
 
 def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]) -> dict[str, Any]:
@@ -65,8 +73,16 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     with faults_of(source.name, "import", LOADING, source.root):
         module = source.imported()
     make = source.of(module)
+    code = {
+        "source": source.text,
+        "folder": source.folder,
+        "sha256": sha256,
+        "distribution": source.distribution(),
+    }
+    if inspect.isfunction(make):
+        return {**_stated_by_function(make, text), **code}
     if not callable(make):
-        raise BadInput(WHERE, "", text, "is no class and no function that makes a method")
+        raise BadInput(WHERE, "", text, "is no class of a method and no function of a metric")
     _check_options(make, own, text)
     with faults_of(source.name, "__init__", LOADING, source.root):
         method = make(**own)
@@ -74,13 +90,22 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
         has = {name: getattr(method, name) for name in (*_STATED, *_FUNCTIONS, *_TRAINED) if hasattr(method, name)}
         if not isinstance(has.get("kinds", ""), str):
             has["kinds"] = list(has["kinds"])
-    return {
-        **_stated(has, text),
-        "source": source.text,
-        "folder": source.folder,
-        "sha256": sha256,
-        "distribution": source.distribution(),
-        "own": own,
+    return {**_stated(has, text), **code, "own": own}
+
+
+def _stated_by_function(function: Callable[..., Any], text: str) -> dict[str, Any]:
+    """Return what a metric says of itself: its name, its docstring, and its attributes."""
+    if len(inspect.signature(function).parameters) != len(METRIC_PARAMETERS):
+        raise BadInput(WHERE, "", text, f"a metric is a function of {', '.join(METRIC_PARAMETERS)}")
+    definition = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split())
+    if not definition:
+        raise BadInput(WHERE, "", text, "lacks a docstring, which defines the metric on the page")
+    stated = {key: getattr(function, key, default) for key, default in _OF_METRICS.items()}
+    name = function.__name__
+    words = name.replace("_", " ")
+    return {**stated, "title": stated["title"] or words, "stated": str(getattr(function, "version", 1))} | {
+        "name": name,
+        "definition": definition,
     }
 
 

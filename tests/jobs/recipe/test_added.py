@@ -23,6 +23,12 @@ class Theirs:
     prepare = predict = bytes_stored = covers
 """
 
+METRIC = '''
+def largest(fabric, queries, answers, truth, standard_error):
+    """Largest error."""
+    return abs(answers - truth).max()
+'''
+
 HERE = '\n[[models]]\nmodel = "theirs"\n'
 
 
@@ -113,3 +119,22 @@ def test_what_cannot_be_entered_is_refused(files, theirs, tmp_path, name, add, m
 def test_a_name_that_is_not_installed_is_refused(files):
     with pytest.raises(BadInput, match=r"--add: theirs: no method of this name; none is installed"):
         load_recipe(files.write(), ["theirs"])
+
+
+def test_a_metric_is_measured_of_every_model_on_every_fabric(files, tmp_path):
+    (tmp_path / "metrics.py").write_text(METRIC)
+    path = files.write()
+    before, after = ids(load_recipe(path)), ids(load_recipe(path, [f"{tmp_path / 'metrics.py'}:largest"]))
+    models, fabrics = ("woven", "neumip", "point_sampled"), ("denim", "own", "twill_4_4")
+    assert after.keys() - before.keys() == {f"bench largest of {m} on {f}" for m in models for f in fabrics}
+    assert {title for title in before if after[title] != before[title]} == {"report page of tiny"}
+
+
+@pytest.mark.parametrize(("key", "value"), [("better", "upper"), ("format", "roman")])
+def test_a_metric_with_an_unknown_word_is_refused(files, tmp_path, key, value):
+    (tmp_path / "metrics.py").write_text(METRIC + f"largest.{key} = {value!r}\n")
+    with pytest.raises(BadInput, match=f"{key} = '{value}'"):
+        load_recipe(files.write(), [f"{tmp_path / 'metrics.py'}:largest"])
+    with pytest.raises(BadInput, match="a metric 'largest' is given twice"):
+        (tmp_path / "metrics.py").write_text(METRIC)
+        load_recipe(files.write(), [f"{tmp_path / 'metrics.py'}:largest"] * 2)

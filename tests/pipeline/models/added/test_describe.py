@@ -70,7 +70,7 @@ def test_an_installed_module_has_its_distribution():
         ("class Theirs", "raise SystemExit\nclass Theirs", "import: SystemExit (theirs.py, line 2)"),
         ("class Theirs", "import os; os._exit(0)\nclass Theirs", "import ended its process (exit code 0)"),
         ("class Theirs", "class Other", "no such name; did you mean 'Other'? known: Other"),
-        ("class Theirs:", "Theirs = 5\nclass Other:", "is no class"),
+        ("class Theirs:", "Theirs = 5\nclass Other:", "is no class of a method and no function of a metric"),
         ("def covers", "def cover", "lacks the function 'covers'"),
         ("def predict", "predict = 5\n    def forecast", "lacks the function 'predict'"),
         ('"2.1", ""', '2.1, ""', "version = 2.1 must be an integer or a short text"),
@@ -119,4 +119,41 @@ def test_a_source_of_another_form_is_refused(text, sentence, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BadInput) as refusal:
         describe(text, {}, {})
+    assert sentence in str(refusal.value), refusal.value
+
+
+METRIC = '''
+def largest(fabric, queries, answers, truth, standard_error):
+    """Largest error
+    of any component.
+
+    More."""
+    return abs(answers - truth).max()
+
+
+largest.unit, largest.version = "1/sr", 2
+'''
+
+
+def test_a_function_is_a_metric(path):
+    path.write_text(METRIC)
+    found = describe(f"{path}:largest", {}, {})
+    assert (found.name, found.title, found.definition) == ("largest", "largest", "Largest error of any component.")
+    assert (found.unit, found.better, found.stated) == ("1/sr", "lower", "2")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (", standard_error)", ")", "a metric is a function of fabric, queries, answers, truth, standard_error"),
+        ('"""Largest error', '""; """Largest error', "lacks a docstring"),
+        ("largest", "Largest", "name = 'Largest'"),
+        ('"1/sr", 2', "5, 2", "unit = 5"),
+    ],
+)
+def test_a_function_that_is_no_metric_gets_a_sentence(path, old, new, sentence):
+    assert old in METRIC
+    path.write_text(METRIC.replace(old, new))
+    with pytest.raises(BadInput) as refusal:
+        describe(f"{path}:{'Largest' if new == 'Largest' else 'largest'}", {}, {})
     assert sentence in str(refusal.value), refusal.value

@@ -4,8 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.models.added.added_code import AddedFunction
 from pipeline.models.added.added_method import AddedMethod
-from pipeline.models.added.guarded import Guarded, MethodFailed, load_added, unchecked
+from pipeline.models.added.guarded import Guarded, MethodFailed, load_added, load_function, unchecked
+from pipeline.models.added.source import locate
 from pipeline.models.method import Method
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput, WorkFailed
@@ -130,3 +132,37 @@ def test_code_that_is_not_the_planned_one_is_refused(tmp_path):
     options = OPTIONS.model_copy(update={"source": f"{path}:Theirs"})
     with pytest.raises(WorkFailed, match=r"SHA-256 is .* on this machine, and 000000000000… was planned"):
         load_added(options)
+
+
+@pytest.fixture
+def metric(tmp_path):
+    """A metric from outside whose body is given."""
+
+    def of(body):
+        path = tmp_path / "metrics.py"
+        path.write_text(f"def theirs(*given):\n    return {body}\n")
+        fields = {"title": "t", "definition": "d", "unit": "1", "better": "lower", "format": "percent"}
+        source = locate(f"{path}:theirs")
+        return AddedFunction(name="theirs", source=source.text, sha256=source.sha256(), stated="1", **fields)
+
+    return of
+
+
+def test_a_metric_is_a_number(metric):
+    assert load_function(metric("sum(given)"))(1, 2, 3) == 6.0
+    assert load_function(metric("__import__('numpy').float32(0.5)"))() == 0.5
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("float('nan')", "theirs: it returned nan; a finite number is needed"),
+        ("None", "theirs: it returned None; a finite number is needed"),
+        ("True", "theirs: it returned True; a finite number is needed"),
+        ("1 / 0", "theirs: the metric: ZeroDivisionError: division by zero (metrics.py, line 2)"),
+    ],
+)
+def test_a_metric_that_is_no_number_fails_in_a_sentence(metric, body, sentence):
+    with pytest.raises(MethodFailed) as failure:
+        load_function(metric(body))()
+    assert str(failure.value) == sentence

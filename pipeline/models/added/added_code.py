@@ -1,0 +1,81 @@
+"""Code from outside the package: where it is, its hash, its version.
+
+No recipe holds these fields. They are made from `--add` or from an installed package (`jobs.recipe.added`), so a recipe
+alone never runs code. Where the code lies and how long a call may take are no part of an identity.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+from typing import Annotated, Any, Final
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
+
+from pipeline.fingerprint import IDENTITY
+
+Limit = Annotated[float, Field(gt=0, le=86_400)]
+"""Seconds."""
+
+_PLACES: Final = ("source", "folder", "limit")
+
+
+class AddedCode(BaseModel):
+    """A class or function from outside the package."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    source: str = Field(max_length=4096)
+    """``module:name``, or the absolute path of a file with ``:name``."""
+    folder: str = ""
+    """Folder in which the module is looked for after all installed ones; empty if it is installed."""
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    """Hash of the file, or of all files of the package."""
+    distribution: str = ""
+    """Name and version of the installed distribution; empty for a file or folder."""
+    stated: str = Field(max_length=64)
+    """Version that the code states."""
+    limit: Limit = 600.0
+    """Longest time of one call."""
+
+    @property
+    def in_source(self) -> str:
+        """Name of the class or function in the source."""
+        return self.source.rpartition(":")[2]
+
+    @property
+    def origin(self) -> str:
+        """Distribution and version, or name of the file; then the hash of the code."""
+        place = self.source.rpartition(":")[0]
+        where = self.distribution or (PurePath(place).name if place.endswith(".py") else place)
+        return f"{where}, version {self.stated}, SHA-256 {self.sha256}"
+
+    @model_serializer(mode="wrap")
+    def _without_places(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        content: dict[str, Any] = dump(self)
+        if info.context != IDENTITY:
+            return content
+        return {name: value for name, value in content.items() if name not in _PLACES} | {"in_source": self.in_source}
+
+
+class AddedFunction(AddedCode):
+    """A function from outside, which measures something."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")
+    """Name of the metric."""
+    title: str = Field(max_length=60)
+    """Heading of its column on the page."""
+    definition: str = Field(max_length=1000)
+    """Explanation on the page."""
+    unit: str = Field(max_length=20)
+    """Unit of its values."""
+    better: str
+    """Direction of a better value."""
+    format: str
+    """How tables print a value."""
