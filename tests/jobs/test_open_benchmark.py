@@ -130,7 +130,7 @@ def test_methods_that_fail_leave_the_others_their_results(entered):
     ]
     measured = {one.method: one for one in read_records(metrics)}
     assert measured.keys() == {"point_sampled", "nearest_table", "late"}
-    assert all(one.unit == "1/sr" and 0 < one.value < 2 for one in measured.values())
+    assert all(one.unit == "1/sr" and one.value > 0 for one in measured.values())
     assert sorted(failed) == [
         "extremes of hangs",
         "hangs on denim",
