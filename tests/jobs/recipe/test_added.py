@@ -138,3 +138,22 @@ def test_a_metric_with_an_unknown_word_is_refused(files, tmp_path, key, value):
     with pytest.raises(BadInput, match="a metric 'largest' is given twice"):
         (tmp_path / "metrics.py").write_text(METRIC)
         load_recipe(files.write(), [f"{tmp_path / 'metrics.py'}:largest"] * 2)
+
+
+def test_an_installed_package_has_its_version(files, tmp_path, monkeypatch):
+    site = tmp_path / "site"
+    about = site / "their_distribution-1.2.dist-info"
+    (site / "their_package").mkdir(parents=True)
+    about.mkdir()
+    (site / "their_package" / "__init__.py").write_text(METHOD)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: their-distribution\nVersion: 1.2\n")
+    (about / "top_level.txt").write_text("their_package\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\ntheirs = their_package:Theirs\n")
+    monkeypatch.syspath_prepend(site)
+    files.text += HERE
+    path = files.write()
+    (found,) = [model.options for model in load_recipe(path).models if model.options.model == "added"]
+    assert (found.source, found.distribution, found.folder) == ("their_package:Theirs", "their-distribution 1.2", "")
+    before = ids(load_recipe(path))
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: their-distribution\nVersion: 1.3\n")
+    assert ids(load_recipe(path))["bench theirs on denim"] != before["bench theirs on denim"]
