@@ -1,11 +1,17 @@
 import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
+import psutil
 import pytest
 
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed
 from weaves.errors import BadInput, WorkFailed
+
+ROOT = Path(__file__).parents[4]
 
 GUARDED = "__import__('pipeline.models.added.guarded', fromlist=['WATCH'])"
 BEGIN = f"{GUARDED}.WATCH.begin(b'theirs', b'predict', 0.5)"
@@ -68,3 +74,21 @@ def test_a_process_that_dies_outside_of_calls_blames_no_method():
     with pytest.raises(WorkFailed, match=r"ended \(exit code 9\)") as failure:
         run_apart(Code("lambda progress: __import__('os')._exit(9)"))
     assert not isinstance(failure.value, MethodFailed)
+
+
+PARENT = """
+from pipeline.models.added.apart import run_apart
+
+class Code:
+    def __reduce__(self):
+        return eval, ("lambda p: (p(__import__('os').getpid()), __import__('time').sleep(3600))",)
+
+run_apart(Code(), progress=lambda pid: print(int(pid), flush=True))
+"""
+
+
+def test_the_process_ends_when_its_parent_is_killed():
+    with subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True, cwd=ROOT) as parent:
+        child = psutil.Process(int(parent.stdout.readline()))
+        parent.kill()
+        child.wait(timeout=120)
