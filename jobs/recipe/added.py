@@ -47,7 +47,7 @@ class Added:
             source = text if ":" in text else _installed().get(text)
             if source is None:
                 known = f"installed: {', '.join(sorted(_installed()))}" if _installed() else "none is installed"
-                raise BadInput(WHERE, "", text, f"no method of this name; {known}; MODULE:CLASS or FILE.py:CLASS?")
+                raise BadInput(WHERE, "", text, f"no method of this name; {known}; MODULE:NAME or FILE.py:NAME?")
             method = describe(source, {}, {})
             if isinstance(method, AddedFunction):
                 metric = validated(AddedMetric, method.model_dump(), text)

@@ -124,7 +124,7 @@ def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) 
                 raise BadInput(WHERE, "", text, f"has no option {brief(key)}; {known}")
     for parameter in named:
         if parameter.default is parameter.empty and parameter.name not in own:
-            raise BadInput(WHERE, "", text, f"its option {parameter.name!r} has no default and is in no recipe")
+            raise BadInput(WHERE, "", text, f"its option {parameter.name!r} has no default; every option needs one")
 
 
 def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def locate(text: str, folder: str = "") -> Source:
     """
     place, _, name = text.rpartition(":")
     if not place or not name.isidentifier():
-        raise BadInput(WHERE, "", text, "must be MODULE:CLASS, FILE.py:CLASS, or the name of an installed method")
+        raise BadInput(WHERE, "", text, "must be MODULE:NAME, FILE.py:NAME, or the name of an installed method")
     if place.endswith(".py"):
         path = Path(place).resolve()
         if not path.is_file():

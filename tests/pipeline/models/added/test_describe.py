@@ -82,7 +82,7 @@ def test_an_installed_module_has_its_distribution():
         ('"theirs", "2.1"', '"../theirs", "2.1"', "name = '../theirs' must be letters"),
         ('{"stretch"}', '{"sideways"}', "kinds = ['sideways'] must be some of behind, stretch, curvature"),
         ("def prepare", "def loss(self): ...\n    def prepare", "a network cannot be trained from outside yet"),
-        ("rows=8", "rows", "its option 'rows' has no default and is in no recipe"),
+        ("rows=8", "rows", "its option 'rows' has no default; every option needs one"),
         ("rows=8", "rows=800", "__init__: AssertionError: too many rows (theirs.py, line 6)"),
     ],
 )
@@ -105,9 +105,9 @@ def test_options_that_it_does_not_have_are_refused(path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("theirs", "must be MODULE:CLASS"),
-        (":Theirs", "must be MODULE:CLASS"),
-        ("theirs:", "must be MODULE:CLASS"),
+        ("theirs", "must be MODULE:NAME"),
+        (":Theirs", "must be MODULE:NAME"),
+        ("theirs:", "must be MODULE:NAME"),
         ("nothing_of_this_name:Theirs", "there is no module nothing_of_this_name"),
         ("nothing.py:Theirs", "there is no file nothing.py"),
         ("a-b:Theirs", "a-b is no name of a module"),
