@@ -92,6 +92,7 @@ def test_a_data_set_and_a_model(folder):
     assert "'fabric': (200,)" in printed[3]
 
 
+@pytest.mark.slow
 def test_a_method_enters_the_benchmark(folder, monkeypatch):
     monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     notebook = executed(ROOT / "notebooks" / "method.ipynb", folder)
