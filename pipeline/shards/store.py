@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,20 +67,22 @@ def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: 
         )
 
 
-def read_table(path: Path, kind: Kind = "components") -> pa.Table:
-    """Read a shard of a kind with its checksums verified.
+def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ()) -> pa.Table:
+    """Read a shard of a kind, or only some of its columns by their `names`, with checksums verified.
 
     Raises
     ------
     BadInput
         If the file is missing, cut short, damaged, or not a shard of this kind and schema.
     """
-    schema = SCHEMAS[kind]
+    schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
     try:
         with local_copy(path) as file:
             # Shards are small: threads within one cost more than they save.
-            table = pq.read_table(file, page_checksum_verification=True, memory_map=False, use_threads=False)
+            table = pq.read_table(
+                file, columns=list(names) or None, page_checksum_verification=True, memory_map=False, use_threads=False
+            )
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "generate it again with `twillight generate`") from error
     except (pa.ArrowException, OSError) as error:

@@ -23,14 +23,17 @@ from torch import Tensor
 from pipeline.atomic import atomic_path
 from pipeline.models.method import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.store import read_shard
-from pipeline.truth.query import Answers, Queries
+from pipeline.shards.schema import QUERY_COLUMNS
+from pipeline.shards.store import read_table
+from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 
 COLUMNS = 17
 """u, v, sigma, wi (3), wo (3), sigma_minor, angle, curvature, components (4), transparency."""
 
 TARGET = slice(12, 16)
 """The columns of the components."""
+
+_NAMES: Final = (*QUERY_COLUMNS, *COMPONENTS, TRANSPARENCY)
 
 _READERS: Final = 4  # shards that are read at the same time
 
@@ -66,26 +69,20 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
         A ``.npy`` file; the caller names it after what it holds and deletes it in the end.
     """
     counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
-    with atomic_path(cache) as temporary:
+    with atomic_path(cache, durable=False) as temporary:  # no later process reads it
         shape = (sum(counts), COLUMNS)
         table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
         parts = [part for name in fabrics for part in manifest.parts(folder, name, "train")]
         starts = np.cumsum([0, *(part.rows for part in parts)])
 
         def fill(part: ShardEntry, start: int) -> None:
-            table[start : start + part.rows] = as_table(*read_shard(folder / part.file))
+            columns = read_table(folder / part.file, names=_NAMES)
+            table[start : start + part.rows] = np.stack([column.to_numpy() for column in columns.columns], axis=-1)
 
         with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
             for _ in pool.map(fill, parts, starts):
                 pass
-        table.flush()
     return Rows(np.load(cache, mmap_mode="r"), counts)
-
-
-def as_table(queries: Queries, answers: Answers) -> npt.NDArray[np.float32]:
-    """Return queries and answers side by side, float32 (N, COLUMNS)."""
-    columns = [*queries, answers.mean, answers.transparency]
-    return np.concatenate([c.reshape(len(c), -1) for c in columns], axis=-1).astype(np.float32)
 
 
 class Order:

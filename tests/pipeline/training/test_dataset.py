@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.training.dataset import COLUMNS, Batches, Order, Rows, as_table
+from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.store import write_shard
+from pipeline.training.dataset import COLUMNS, Batches, Order, Rows, load_rows
 from pipeline.truth.query import Answers, Queries
 
 
@@ -68,15 +70,18 @@ def test_batches_hold_the_rows_of_their_fabrics():
     assert batch.sigma_minor.shape == batch.angle.shape == batch.curvature.shape == batch.transparency.shape == (2, 6)
 
 
-def test_columns_are_where_batches_look_for_them():
+def test_columns_are_where_batches_look_for_them(tmp_path):
     numbers = iter(np.arange(17, dtype=np.float32))
     column = lambda width: np.array([[next(numbers) for _ in range(width)]], np.float32)  # noqa: E731
     scalar = lambda: column(1)[0]  # noqa: E731
     queries = Queries(scalar(), scalar(), scalar(), column(3), column(3), scalar(), scalar(), scalar())
     answers = Answers.opaque(column(4), np.zeros((1, 4), np.float32), np.ones(1, np.int32))
-    table = as_table(queries, answers._replace(transparency=scalar()))
-    np.testing.assert_array_equal(table, np.arange(17)[None])
-    batch = Batches(Rows(table, [1]), Order([1], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
+    write_shard(tmp_path / "one.parquet", "denim", queries, answers._replace(transparency=scalar()), {})
+    shard = ShardEntry(file="one.parquet", fabric="denim", split="train", start=0, rows=1, sha256="0" * 64)
+    manifest = Manifest(name="one", fingerprint="0", roles={}, fabrics={}, about={}, shards=[shard])
+    rows = load_rows(manifest, tmp_path, ["denim"], tmp_path / "rows.npy")
+    np.testing.assert_array_equal(rows.table, np.arange(17)[None])
+    batch = Batches(rows, Order([1], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
     for name in Queries._fields:
         np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
     np.testing.assert_array_equal(batch.target[0], answers.mean)
