@@ -67,7 +67,8 @@ def faults(
             found += of_task
             seen((index + 1) / len(tasks))
     found = _explained(found, tasks, ledger)
-    bad = {Path(path).name for fault in found if fault.task for path in fault.task.products}
+    unknown = {fault.task.id: fault.task for fault in found if fault.task and ledger.state(fault.task) != "done"}
+    bad = {Path(path).name for task in unknown.values() for path in task.products}
     for one in recipe.together:
         found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
     for page in (task for task in tasks if isinstance(task, Page)):
@@ -159,7 +160,7 @@ def _value_faults(part: Shard, path: Path, sha256: str) -> list[str]:
 
 
 def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[Fault]:
-    """Yield the fault of a manifest; shards in the files `bad`, which have faults of their own, are not compared."""
+    """Yield the fault of a manifest; shards in the files `bad`, whose hashes no receipt has, are not compared."""
     from pipeline.shards.manifest import FILE, Manifest
 
     expected, path = file.content(), file.folder / FILE
