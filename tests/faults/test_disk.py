@@ -31,11 +31,11 @@ def test_a_full_disk_ends_a_run_and_the_next_one_continues(recipe, undisturbed, 
     assert found.code == 1, found.stderr
     found.assert_sentence()
     assert "No space left" in found.stderr
-    assert_no_leftovers(out)
     kept = set(out.rglob("*.parquet"))
     found = run(recipe, out)
     assert found.code == 0, found.stderr
     assert hashes(recipe, out) == undisturbed[1] and all(path.exists() for path in kept)
+    assert_no_leftovers(out)  # a worker that was writing when the run ended may have left some before
 
 
 def test_an_output_folder_that_cannot_be_written_is_refused(recipe, undisturbed, tmp_path):
