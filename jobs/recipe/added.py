@@ -83,7 +83,7 @@ class Added:
             return dict(content)
         models = [self._entry(entry, f"models.{index}", where) for index, entry in enumerate(entries)]
         if all_given:
-            named = {entry.get("model") for entry in entries if isinstance(entry, Mapping)}
+            named = [entry.get("model") for entry in entries if isinstance(entry, Mapping)]
             models += [method.model_dump() for name, method in self._given.items() if name not in named]
         return {**content, "models": models} if models else dict(content)
 
