@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.guarded import load_function
@@ -69,10 +70,7 @@ def measure_errors(
     options : ErrorOptions
         Number of rows, and the seed of random methods.
     """
-    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
-    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
-    method.prepare(cloth)
-    values = method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
+    cloth, queries, truth, values = _answered(method, manifest, folder, fabric, options)
     subject = Record(
         method=method.name,
         setting=method.setting,
@@ -110,10 +108,7 @@ def measure_added(
     """
     enter(metric.row)
     measured = load_function(metric)
-    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
-    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
-    method.prepare(cloth)
-    values = method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
+    cloth, queries, truth, values = _answered(method, manifest, folder, fabric, options)
     value = measured(cloth, queries, values, truth.mean, truth.standard_error)
     subject = Record(
         method=method.name,
@@ -124,6 +119,16 @@ def measure_added(
         provenance=provenance or Provenance(),
     )
     return subject.of(metric.row.name, value, len(values)).made_by(metric.origin)
+
+
+def _answered(
+    method: Method, manifest: Manifest, folder: Path, fabric: str, options: ErrorOptions
+) -> tuple[Fabric, Queries, Answers, npt.NDArray[np.float32]]:
+    """Return a fabric, its held-out queries, the truth with errors that are right on average, and a method's values."""
+    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
+    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+    method.prepare(cloth)
+    return cloth, queries, truth, method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
 
 
 def measure_truth(
