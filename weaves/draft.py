@@ -140,6 +140,20 @@ class Draft:
         shifts = sum(np.array_equal(np.roll(matrix, shift, (0, 1)), matrix) for shift in np.ndindex(matrix.shape))
         return int(matrix.size // shifts)
 
+    def hangs_together(self) -> bool:
+        """Return whether no yarns lie loose on the others, so that the cloth does not come apart.
+
+        The cloth hangs together if and only if the graph is strongly connected that has an arrow from the upper yarn to
+        the lower one for each crossing [Clapham1980Fabric].
+        """
+        from scipy.sparse.csgraph import connected_components
+
+        over = self.warp_over.T
+        arrows = np.block(
+            [[np.zeros((len(over), len(over)), np.bool_), over], [~over.T, np.zeros((over.shape[1],) * 2)]]
+        )
+        return bool(connected_components(arrows, connection="strong", return_labels=False) == 1)
+
     def canonical(self) -> tuple[tuple[int, int], bytes]:
         """Return a form that is equal for all shifts and mirror images of this cloth, and for no other cloth."""
         matrix = _smallest_repeat(self.warp_over)

@@ -1,21 +1,38 @@
-"""Random fabrics: many drafts and yarns to train a general network on.
+"""Random fabrics: many drafts and yarns to train a general network on, or to measure it on.
 
 Fabric i of a population is a function of the seed and i alone, so a larger population begins with the smaller one. The
-default ranges of roughness and relief are those of a published generator, quoted as stand-ins for the unknown ones of
-[Chen2024Woven]; bend is chosen here. Roughness is drawn as the square of a uniform number.
+families `compound_twill`, `large_satin` and `irregular` share no draft with the others: a population of them is unseen
+by a network that was trained on the others.
+
+An irregular draft is a random matrix of 4 to 8 ends and picks. It is drawn again until the cloth hangs together, no
+float is longer than `LONGEST_FLOAT`, and no other family has the draft.
+
+The default ranges of roughness and relief are those of a published generator, quoted as stand-ins for the unknown
+ones of [Chen2024Woven]; bend is chosen here. Roughness is drawn as the square of a uniform number.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import cache
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    ValidationError,
+    model_validator,
+)
 
-from weaves.draft import Draft, Matrix
+from weaves.draft import Draft, Matrix, cells
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.plain import basket, plain, rib
@@ -23,9 +40,26 @@ from weaves.satin import sateen, satin, valid_moves
 from weaves.twill import broken_twill, herringbone, twill
 from weaves.yarn import Number, Yarn
 
-FamilyName = Literal["plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"]
+FamilyName = Literal[
+    "plain",
+    "rib",
+    "basket",
+    "twill",
+    "broken_twill",
+    "herringbone",
+    "satin",
+    "sateen",
+    "compound_twill",
+    "large_satin",
+    "irregular",
+]
 LONGEST_TWILL = 8
 SATIN_ENDS = (5, 7, 8)
+LARGE_SATIN_ENDS = (9, 10)
+IRREGULAR_REPEATS = (4, 8)
+"""Fewest and most ends, and picks, of an irregular draft."""
+LONGEST_FLOAT = 4
+"""Longest float of an irregular draft, in cells."""
 
 
 def _range_of(key: str) -> Callable[[tuple[float, float]], tuple[float, float]]:
@@ -82,6 +116,8 @@ class Population(BaseModel):
     """Weave families, equally likely; write one twice to double its share."""
     solid: float = Field(default=0.0, ge=0, le=1)
     """Share of the fabrics whose yarns are as wide as their spacing, in place of the drawn width."""
+    balanced: StrictBool = False
+    """True: the families take turns, and of each the share `solid` is solid. False: both are drawn."""
     exclude: tuple[str, ...] = ()
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
     plain: Ranges = Ranges()
@@ -92,6 +128,8 @@ class Population(BaseModel):
     """Ranges of all twills."""
     satin: Ranges = Ranges(roughness_warp=(0.04, 0.49), roughness_weft=(0.49, 1.0), relief=(0.2, 1.0))
     """Ranges of satins and sateens."""
+    irregular: Ranges = Ranges()
+    """Ranges of irregular weaves."""
 
     @model_validator(mode="after")
     def _drafts_left(self) -> Population:
@@ -105,28 +143,42 @@ class Population(BaseModel):
         return self
 
 
-def population_fabrics(population: Population) -> list[Fabric]:
+def population_fabrics(population: Population, names: str = "random_{index:03d}") -> list[Fabric]:
     """Draw the fabrics of a population.
+
+    Parameters
+    ----------
+    population : Population
+        Number, seed and ranges.
+    names : str
+        Format of the names, of `index` and `family`.
 
     Returns
     -------
     list of Fabric
-        Named ``random_000``, ``random_001`` …, of `population.count` fabrics.
+        `population.count` fabrics.
     """
     allowed = _allowed(population.families, population.exclude)
-    return [_draw(population, allowed, index) for index in range(population.count)]
+    return [_draw(population, allowed, index, names) for index in range(population.count)]
 
 
-def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]], index: int) -> Fabric:
+def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]], index: int, names: str) -> Fabric:
     """Draw fabric `index`, using up random numbers in a fixed order."""
     random = np.random.default_rng([population.seed, index]).random
-    family, drafts = allowed[int(random() * len(allowed))]
-    draft = drafts[int(random() * len(drafts))]
+    drawn = int(random() * len(allowed))
+    turn, own = divmod(index, len(allowed))
+    family, drafts = allowed[own if population.balanced else drawn]
+    share = random()
+    draft = drafts[int(share * len(drafts))] if drafts else _irregular(population, index)
     ends, picks = draft.repeat
     shift = int(random() * ends), int(random() * picks)
     ranges = _ranges(population, family)
-    # A stream of its own, so that the other numbers are what they were without it.
-    solid = np.random.default_rng([population.seed, index, 1]).random() < population.solid
+    if population.balanced:
+        # Of the first n fabrics of a family, n * solid are solid, rounded down.
+        solid = math.floor((turn + 1) * population.solid) > math.floor(turn * population.solid)
+    else:
+        # A stream of its own, so that the other numbers are what they were without it.
+        solid = bool(np.random.default_rng([population.seed, index, 1]).random() < population.solid)
 
     def between(bounds: Range) -> float:
         # Six decimals: a number that a person can copy from a manifest.
@@ -146,7 +198,7 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
 
     twist = between(ranges.twist)
     return Fabric(
-        name=f"random_{index:03d}",
+        name=names.format(index=index, family=family),
         source=f"Drawn from seed {population.seed}: {draft.name}, begun {shift[0]} ends and {shift[1]} picks further.",
         draft=Matrix(rows=tuple(draft.rolled(*shift).rows())),
         warp=spin(ranges.roughness_warp, twist),
@@ -158,7 +210,21 @@ def _ranges(population: Population, family: FamilyName) -> Ranges:
     """Choose the ranges of a family."""
     if family in ("plain", "rib", "basket"):
         return population.plain
-    return population.satin if family in ("satin", "sateen") else population.twill
+    if family == "irregular":
+        return population.irregular
+    return population.satin if family in ("satin", "sateen", "large_satin") else population.twill
+
+
+def _irregular(population: Population, index: int) -> Draft:
+    """Draw the irregular draft of fabric `index`, from a stream of its own."""
+    random = np.random.default_rng([population.seed, index, 2])
+    fewest, most = IRREGULAR_REPEATS
+    while True:
+        draft = Draft(random.random(random.integers(fewest, most + 1, 2)) < 0.5, "irregular")
+        found = cells(draft)
+        longest = max(found.top_length.max(), found.under_length.max())
+        if longest <= LONGEST_FLOAT and draft.hangs_together() and draft.canonical() not in _known():
+            return draft
 
 
 class Candidate(NamedTuple):
@@ -170,7 +236,7 @@ class Candidate(NamedTuple):
 
 @cache
 def _catalogue() -> dict[FamilyName, list[Candidate]]:
-    """List every draft that a population can hold, by family."""
+    """List every draft that a population can hold, by family, without the irregular ones."""
     steps = [(n, total - n) for total in range(3, LONGEST_TWILL + 1) for n in range(1, total)]
     satins = [(ends, move) for ends in SATIN_ENDS for move in valid_moves(ends)]
     groups = (2, 3, 4)
@@ -188,12 +254,35 @@ def _catalogue() -> dict[FamilyName, list[Candidate]]:
     breakable = [(n, m) for n, m in steps if n + m >= 4]
     catalogue["broken_twill"] = [Candidate(broken_twill([n], [m]), twill([n], [m])) for n, m in breakable]
     catalogue["herringbone"] = [Candidate(herringbone([n], [m]), twill([n], [m])) for n, m in steps]
+    large = [weave(ends, move) for weave in (satin, sateen) for ends in LARGE_SATIN_ENDS for move in valid_moves(ends)]
+    # The two pairs of steps in one order only: the other order is the same cloth, begun elsewhere.
+    pairs = [
+        (first, second)
+        for first, second in itertools.combinations(itertools.product(range(1, LONGEST_TWILL), repeat=2), 2)
+        if sum(first) + sum(second) <= LONGEST_TWILL
+    ]
+    compound = [
+        twill([first[0], second[0]], [first[1], second[1]], side)
+        for side in ("right", "left")
+        for first, second in pairs
+    ]
+    catalogue["large_satin"] = [Candidate(draft, draft) for draft in large]
+    catalogue["compound_twill"] = [Candidate(draft, draft) for draft in compound]
     return catalogue
 
 
 @cache
+def _known() -> set[tuple[tuple[int, int], bytes]]:
+    """Return the canonical forms of all drafts of the catalogue."""
+    return {draft.canonical() for drafts in _catalogue().values() for draft, _ in drafts}
+
+
+@cache
 def _allowed(families: tuple[FamilyName, ...], exclude: tuple[str, ...]) -> list[tuple[FamilyName, list[Draft]]]:
-    """List the drafts of each family that `exclude` leaves, without families that it empties."""
+    """List the drafts of each family that `exclude` leaves, without families that it empties.
+
+    Irregular drafts are not listed.
+    """
     everything = [candidate for candidates in _catalogue().values() for candidate in candidates]
     banned = {draft.canonical() for draft, _ in everything if draft.name in exclude}
     left = [
@@ -201,10 +290,10 @@ def _allowed(families: tuple[FamilyName, ...], exclude: tuple[str, ...]) -> list
             family,
             [
                 draft
-                for draft, origin in _catalogue()[family]
+                for draft, origin in _catalogue().get(family, ())
                 if not banned or banned.isdisjoint({draft.canonical(), origin.canonical()})
             ],
         )
         for family in families
     ]
-    return [(family, drafts) for family, drafts in left if drafts]
+    return [(family, drafts) for family, drafts in left if drafts or family == "irregular"]

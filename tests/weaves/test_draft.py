@@ -53,6 +53,28 @@ def test_drawing_reads_back(matrix):
     assert draft.text().count("██") == matrix.sum()
 
 
+@settings(deadline=None)
+@given(hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=4)))
+def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):
+    """By the definition: every choice of yarns is tried."""
+    picks, ends = matrix.shape
+
+    def lies_on_the_others(upper_ends, upper_picks):
+        over_lower_picks = all(matrix[j, i] for i in upper_ends for j in set(range(picks)) - upper_picks)
+        return over_lower_picks and not any(matrix[j, i] for j in upper_picks for i in set(range(ends)) - upper_ends)
+
+    def choices(count):
+        return [{i for i in range(count) if number >> i & 1} for number in range(2**count)]
+
+    loose = any(
+        lies_on_the_others(upper_ends, upper_picks)
+        for upper_ends in choices(ends)
+        for upper_picks in choices(picks)
+        if 0 < len(upper_ends) + len(upper_picks) < ends + picks
+    )
+    assert Draft(matrix).hangs_together() == (not loose)
+
+
 def test_drawing_has_pick_0_at_the_bottom():
     draft = Draft.from_rows(["#..", "##."])
     assert draft.repeat == (3, 2)

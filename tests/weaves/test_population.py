@@ -1,12 +1,21 @@
 """Random fabrics: reproducible, within their ranges, and never what was excluded."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import stats
 
+from weaves.draft import cells
 from weaves.fabric import Fabric
 from weaves.population import FamilyName, Population, Ranges, population_fabrics
 from weaves.twill import broken_twill, herringbone, twill
+
+RANGES = ("plain", "twill", "satin", "irregular")
+UNSEEN: tuple[FamilyName, ...] = ("compound_twill", "large_satin", "irregular")
+SEEDS = st.integers(0, 2**63 - 1)
 
 
 def test_fabric_i_depends_on_seed_and_i_alone():
@@ -43,7 +52,7 @@ def test_excluded_drafts_do_not_occur_in_any_disguise():
     assert not occurs(("twill 4/4",))
 
 
-@pytest.mark.parametrize("family", Population().families)
+@pytest.mark.parametrize("family", get_args(FamilyName))
 def test_numbers_lie_in_their_ranges(family):
     ranges = Ranges(
         roughness_warp=(0.1, 0.2),
@@ -53,7 +62,7 @@ def test_numbers_lie_in_their_ranges(family):
         bend=(7, 9),
         twist=(5, 6),
     )
-    population = Population(count=20, seed=2, families=(family,), plain=ranges, twill=ranges, satin=ranges)
+    population = Population(count=20, seed=2, families=(family,), **dict.fromkeys(RANGES, ranges))
     for fabric in population_fabrics(population):
         assert Fabric.model_validate(fabric.model_dump()) == fabric
         assert max(fabric.weave.repeat) <= 16
@@ -105,3 +114,42 @@ def test_a_share_of_solid_cloth_changes_nothing_but_widths():
             "weft": b.weft.model_copy(update={"width": a.weft.width}),
         }
         assert b.model_copy(update=same) == a
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=SEEDS)
+def test_irregular_cloth_hangs_together_and_has_short_floats(seed):
+    for fabric in population_fabrics(Population(count=2, seed=seed, families=("irregular",))):
+        over = fabric.weave.warp_over
+        assert min(over.shape) >= 4 and max(over.shape) <= 8
+        for axis in (0, 1):  # every end and every pick interlaces
+            assert over.any(axis=axis).all() and not over.all(axis=axis).any()
+        floats = cells(fabric.weave)
+        assert max(floats.top_length.max(), floats.under_length.max()) <= 4
+        assert fabric.weave.hangs_together()
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS, other=SEEDS)
+def test_drafts_for_unseen_cloth_are_in_no_population_of_the_default_families(seed, other):
+    """Also with shifts and mirror images: `canonical` is equal for them."""
+    unseen = {
+        fabric.weave.canonical() for fabric in population_fabrics(Population(count=6, seed=seed, families=UNSEEN))
+    }
+    trained = {fabric.weave.canonical() for fabric in population_fabrics(Population(count=40, seed=other))}
+    assert not unseen & trained
+
+
+@pytest.mark.parametrize(("solid", "expected"), [(0.5, 2), (0.25, 1), (1.0, 4), (0.0, 0)])
+def test_a_balanced_population_has_every_family_and_the_share_of_solid_cloth_in_each(solid, expected):
+    """Sixteen fabrics of four families: four each, of which 4 * solid are solid."""
+    narrow = Ranges(width=(0.6, 0.9))
+    population = Population(
+        count=16, seed=8, families=("plain", *UNSEEN), balanced=True, solid=solid, **dict.fromkeys(RANGES, narrow)
+    )
+    fabrics = population_fabrics(population, "cloth_{index}_{family}")
+    for place, family in enumerate(population.families):
+        own = fabrics[place::4]
+        assert [fabric.name for fabric in own] == [f"cloth_{place + 4 * turn}_{family}" for turn in range(4)]
+        assert sum(fabric.warp.width == fabric.weft.width == 1.0 for fabric in own) == expected
+    assert {fabric.weave.repeat for fabric in fabrics[::4]} == {(2, 2)}
