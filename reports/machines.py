@@ -84,7 +84,7 @@ def _subject(record: Record) -> tuple[object, ...]:
     """Return what a number is of, whatever the name of the recipe."""
     about = record.provenance
     own = (record.method, record.setting, record.fabric, record.role, record.scene, record.metric, record.threads)
-    return (*own, record.note, about.dataset, about.model, about.origin, about.version)
+    return (*own, record.note, about.dataset, about.model, about.seed, about.origin, about.version)
 
 
 def _number(record: Record) -> tuple[object, ...]:

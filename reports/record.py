@@ -77,6 +77,8 @@ class Provenance(BaseModel):
     """Fingerprint of the data set."""
     model: str = ""
     """Fingerprint of the trained model; empty where nothing is trained."""
+    seed: int = 0
+    """Seed of its training."""
     origin: str = ""
     """Of a method or metric from outside: distribution or file, its version, and the SHA-256 of its code."""
     machine: str = ""

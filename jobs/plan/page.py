@@ -141,7 +141,10 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
         about=recipe.about,
         dataset=f"{recipe.name}, {fingerprint_of(subjects.shards)}",
         fabrics=tuple((subject.fabric, subject.role) for subject in subjects.fabrics),
-        models=tuple(_note(recipe, model.recipe, model.trainings, shots) for model in subjects.models),
+        models=tuple(
+            _note(recipe, model, first.trainings, shots)
+            for model, first in zip(recipe.models, subjects.first_models, strict=True)
+        ),
         options=recipe.bench,
         metrics=recipe.metrics,
         measured=tuple(task.id for task in benches),
@@ -155,7 +158,7 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
 def _note(
     recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]
 ) -> ModelNote:
-    """Return the page's note on a model."""
+    """Return the page's note on a model; `trainings` are those of its first seed."""
     options, training = model.options, model.training
     about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
     if isinstance(options, AddedMethod):
@@ -167,6 +170,8 @@ def _note(
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
+        if model.seeds > 1:
+            about += f", {model.seeds} trainings with the seeds {training.seed} to {training.seed + model.seeds - 1}"
         about += _trained_by(recipe, model) + _left_out(recipe, model, trainings, shots)
     return ModelNote(
         name=options.name,

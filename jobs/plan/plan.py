@@ -32,13 +32,13 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
     rows, trained = list(own), {}
     for model in (model for model in recipe.models if model.learns):
         trainer = recipe.trainer_of(model)
-        tasks = trained[model.options.name] = trainings(trainer, model, parts[id(trainer)])
-        # Of another recipe's rows those that its model learns from.
-        read = {need for task in tasks.values() for need in task.needs}
+        trained[model.options.name] = trainings(trainer, model, parts[id(trainer)])
+        # Of another recipe's rows those that its model learns from; they are the same for every seed.
+        read = {need for task in trained[model.options.name][0].values() for need in task.needs}
         rows += [part for part in parts[id(trainer)] if part.id in read]
     subjects = Subjects(recipe, own, trained)
     benches = measurements(subjects)
-    every = [task for tasks in trained.values() for task in tasks.values()]
+    every = [task for seeds in trained.values() for tasks in seeds for task in tasks.values()]
     return [*_once(rows), *every, *benches, page_of(subjects, benches, alone)]
 
 

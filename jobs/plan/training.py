@@ -42,7 +42,7 @@ class Training(Task):
     def title(self) -> str:
         """Name of the model and its fabrics."""
         fabrics = self._fabric or f"{len(self.fabrics)} fabrics"
-        return f"{self.options.name} on {fabrics}"
+        return f"{self.options.name} on {fabrics}{seed_title(self.training.seed)}"
 
     @property
     def products(self) -> tuple[str, ...]:
@@ -96,8 +96,21 @@ class Training(Task):
         train(self.options, self.training, out / self.dataset, list(self.fabrics), out / self.folder, progress)
 
 
-def trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Training]:
-    """Return the trainings of a model: one under the key "", or one a fabric for a model of a single material."""
+def seed_title(seed: int) -> str:
+    """Return the end of a task's title that tells the trainings of a model apart; empty for seed 0."""
+    return f", seed {seed}" if seed else ""
+
+
+def trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> list[dict[str, Training]]:
+    """Return the trainings of a model, in the order of their seeds.
+
+    Of each seed one under the key "", or one a fabric for a model of a single material.
+    """
+    return [_trainings(recipe, single, parts) for single in model.single]
+
+
+def _trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Training]:
+    """Return the trainings of a model with one seed."""
     if model.of_one_material:
         groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
     else:

@@ -82,6 +82,8 @@ class ModelRecipe(_Section):
     """The design."""
     training: TrainingOptions = TrainingOptions()
     """Options of its training."""
+    seeds: StrictInt = Field(default=1, ge=1, le=100)
+    """Number of trainings: the first has the seed of its options, each further one the next higher seed."""
     runtimes: tuple[RuntimeName, ...] | None = None
     """Ways to run it that are measured too; left out: those of ``bench.runtimes``."""
 
@@ -107,16 +109,27 @@ class ModelRecipe(_Section):
     def _split(cls, table: Any) -> Any:
         if not isinstance(table, Mapping):
             return table
-        beside = {key: table[key] for key in ("training", "runtimes") if key in table}
+        beside = {key: table[key] for key in ("training", "seeds", "runtimes") if key in table}
         return {"options": {key: value for key, value in table.items() if key not in beside}} | beside
 
     @model_validator(mode="after")
     def _nothing_idle(self) -> ModelRecipe:
         if not self.learns and "training" in self.model_fields_set:
             raise ValueError(f"{self.options.model} has nothing to train: leave [models.training] out")
+        if not self.learns and "seeds" in self.model_fields_set:
+            raise ValueError(f"{self.options.model} has nothing to train: leave seeds out")
+        if self.training.seed + self.seeds > 2**63:
+            raise ValueError(f"seeds, {self.seeds}, from training.seed, {self.training.seed}, on: above 2^63 - 1")
         if not self.learns and self.runtimes is not None:
             raise ValueError(f"{self.options.model} is no network: leave runtimes out")
         return self
+
+    @property
+    def single(self) -> list[ModelRecipe]:
+        """The model with one training each, in the order of their seeds."""
+        seeds = [{"seed": self.training.seed + index} for index in range(self.seeds)]
+        trainings = [self.training.model_copy(update=seed) for seed in seeds]
+        return [self.model_copy(update={"seeds": 1, "training": training}) for training in trainings]
 
     def measured(self, bench: BenchOptions) -> BenchOptions:
         """Return the measurements of this model: only networks are run in several ways."""

@@ -98,7 +98,7 @@ def _taken_over(
         raise BadInput(where, f"{key}.{more}", entry[more], f"leave it out: the recipe {trainer.name} says it")
     if not model.learns:
         raise BadInput(where, f"{key}.recipe", entry["recipe"], f"{name} has nothing to train: leave it out")
-    found = options.model_dump() | {"training": model.training.model_dump()}
+    found = options.model_dump() | {"training": model.training.model_dump(), "seeds": model.seeds}
     found |= {"runtimes": entry["runtimes"]} if "runtimes" in entry else {}
     return found, trainer.trained_by.get(name, trainer)
 

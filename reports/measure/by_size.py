@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -77,18 +77,15 @@ def measure_by_size(
         one for one in methods if any(one.covers(cloth) for members in classes.values() for cloth, _, _ in members)
     ]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
-    errors: dict[tuple[int, str], list[tuple[float, float]]] = {}
     for done, (low, members) in enumerate(classes.items()):
         progress(done / len(classes))
         contenders = []
-        for index, method in enumerate(methods):
+        for method in methods:
             own = [one for one in members if method.covers(one[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
             drawn = [(cloth, queries) for cloth, queries, _ in own]
             contenders.append(affordable(Contender(method.predict, drawn), LONGEST, FEWEST))
-            for name, error in _errors(method, own, options.seed):
-                errors.setdefault((index, name), []).append((low, error))
         timings = time_side_by_side(
             contenders,
             options.timing_repeats,
@@ -100,16 +97,22 @@ def measure_by_size(
     records = []
     for index, method in enumerate(methods):
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
-        count = sum(
-            len(queries.u) for members in classes.values() for cloth, queries, _ in members if method.covers(cloth)
-        )
+        errors = _errors(subject, method, classes, shares, options.seed)
         mean = sum(shares[low] * ns for low, ns in times[index])
-        records.append(subject.of("size_time", mean, count, curve=tuple(times[index])))
-        for name, (metric, _) in MEASURES.items():
-            curve = errors[index, name]
-            # Squared errors add up: over all classes they weigh as their queries occur.
-            whole = math.sqrt(sum(shares[low] * error**2 for low, error in curve))
-            records.append(subject.of(metric, whole, count, curve=tuple(curve)))
+        records.append(subject.of("size_time", mean, errors[0].count, curve=tuple(times[index])))
+        records += errors
+    return records
+
+
+def measure_errors_by_size(
+    methods: Sequence[Method], manifest: Manifest, folder: Path, seed: int, provenance: Provenance | None = None
+) -> list[Record]:
+    """Measure errors as `measure_by_size` does, without times; `seed` is that of random methods."""
+    classes, shares = _classes(manifest, folder)
+    records = []
+    for method in methods:
+        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
+        records += _errors(subject, method, classes, shares, seed)
     return records
 
 
@@ -131,12 +134,26 @@ def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Rows], dict
     return {low: classes[low] for low in sorted(classes)}, {low: count / total for low, count in counts.items()}
 
 
-def _errors(method: Method, members: _Rows, seed: int) -> Iterator[tuple[str, float]]:
-    """Yield the error of each measure, the mean over fabrics; 0 where it is lost in the noise of the truth."""
-    values = [
-        method.predict(cloth, queries, int(fingerprint(["size", cloth.name, seed]), 16))
-        for cloth, queries, _ in members
+def _errors(
+    subject: Record, method: Method, classes: Mapping[float, _Rows], shares: Mapping[float, float], seed: int
+) -> list[Record]:
+    """Return the error of each measure, the mean over fabrics; 0 where it is lost in the noise of the truth."""
+    curves: dict[str, list[tuple[float, float]]] = {name: [] for name in MEASURES}
+    count = 0
+    for low, members in classes.items():
+        own = [one for one in members if method.covers(one[0])]
+        count += sum(len(queries.u) for _, queries, _ in own)
+        for cloth, _, _ in own:
+            method.prepare(cloth)
+        values = [
+            method.predict(cloth, queries, int(fingerprint(["size", cloth.name, seed]), 16))
+            for cloth, queries, _ in own
+        ]
+        for name, (_, weights) in MEASURES.items():
+            found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, own, strict=True)]
+            curves[name].append((low, float(np.mean([e.relative_rmse for e in found if e.mean > 0] or [0.0]))))
+    # Squared errors add up: over all classes they weigh as their queries occur.
+    wholes = {name: math.sqrt(sum(shares[low] * error**2 for low, error in curve)) for name, curve in curves.items()}
+    return [
+        subject.of(metric, wholes[name], count, curve=tuple(curves[name])) for name, (metric, _) in MEASURES.items()
     ]
-    for name, (_, weights) in MEASURES.items():
-        found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, members, strict=True)]
-        yield name, float(np.mean([error.relative_rmse for error in found if error.mean > 0] or [0.0]))

@@ -36,10 +36,10 @@ class OfAddedMetric(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a metric, fabric and model that answers for it."""
+        """Yield one a metric, fabric, model that answers for it, and seed."""
         for metric in subjects.recipe.metrics:
             for subject in subjects.fabrics:
-                for trained in subjects.models_on([subject.fabric.name]):
+                for _, trained in subjects.answering([subject.fabric.name]):
                     yield cls(
                         metric=metric,
                         model=trained,
@@ -57,7 +57,7 @@ class OfAddedMetric(Measurement):
     @property
     def title(self) -> str:
         """Metric, model and fabric."""
-        return f"{self.metric.name} of {self.model.options.name} on {self.fabric.name}"
+        return f"{self.metric.name} of {self.model.title} on {self.fabric.name}"
 
     @property
     def name(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from jobs.plan.measurements.added_metric import OfAddedMetric
+from jobs.plan.measurements.errors_by_size import ErrorsBySize
 from jobs.plan.measurements.extremes import Extremes
 from jobs.plan.measurements.frame_time import FrameTime
 from jobs.plan.measurements.latents import Latents
@@ -31,6 +32,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     FrameTime,
     Extremes,
     Timing,
+    ErrorsBySize,
     OfAddedMetric,
 )
 

@@ -31,7 +31,7 @@ class Extremes(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a model, on the first fabric of each role that it answers for."""
+        """Yield one a model and seed, on the first fabric of each role that it answers for."""
         physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
         for model in subjects.models:
             known: dict[Role, FabricSubject] = {}
@@ -53,7 +53,7 @@ class Extremes(Measurement):
     @property
     def title(self) -> str:
         """Model."""
-        return f"extremes of {self.model.options.name}"
+        return f"extremes of {self.model.title}"
 
     @property
     def name(self) -> str:

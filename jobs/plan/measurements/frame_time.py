@@ -39,13 +39,13 @@ class FrameTime(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a scene."""
+        """Yield one a scene, of models trained with their first seed: times do not depend on the weights."""
         bench = subjects.recipe.bench
         for shot in SceneShot.all(bench.scenes):
             yield cls(
                 scene=shot.scene,
                 shot=shot.made,
-                models=tuple(subjects.models_on(shot.fabrics)),
+                models=tuple(trained for model, trained in subjects.answering(shot.fabrics) if model.is_first),
                 footprint=bench.scenes.footprint,
                 options=select(RepeatOptions, bench),
                 seed=bench.scenes.seed,

@@ -36,10 +36,10 @@ class Latents(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a model that blends latents."""
+        """Yield one a model that blends latents, trained with its first seed."""
         names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
         dataset = subjects.recipe.dataset
-        for model in subjects.models:
+        for model in subjects.first_models:
             if subjects.recipe.bench.latents and model.recipe.options.blends:
                 yield cls(
                     model=model.whole,

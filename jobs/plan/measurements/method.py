@@ -53,7 +53,7 @@ class OnFabric(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a fabric and model that answers for it."""
+        """Yield one a fabric, model that answers for it, and seed; pictures are made of the first seed alone."""
         recipe = subjects.recipe
         bench = recipe.bench
         for subject in subjects.fabrics:
@@ -63,16 +63,16 @@ class OnFabric(Measurement):
                 if trained := model.on([subject.fabric.name]):
                     yield cls(
                         model=trained,
-                        ways=select(RunOptions, model.recipe.measured(bench)),
+                        ways=model.ways(bench),
                         fabric=subject.fabric,
                         role=subject.role,
                         dataset=subject.dataset,
                         errors=select(ErrorOptions, bench),
                         frames=frames.made,
                         frame_options=select(FrameOptions, bench),
-                        views=views,
+                        views=views if model.is_first else {},
                         picture_options=select(PictureOptions, bench),
-                        shown=trained.shown(bench.picture_counts),
+                        shown=trained.shown(bench.picture_counts) if model.is_first else (),
                         edge=edge.made if edge else None,
                         edge_options=bench.edge if edge else None,
                     )
@@ -85,7 +85,7 @@ class OnFabric(Measurement):
     @property
     def title(self) -> str:
         """Model and fabric."""
-        return f"{self.model.options.name} on {self.fabric.name}"
+        return f"{self.model.title} on {self.fabric.name}"
 
     @property
     def name(self) -> str:

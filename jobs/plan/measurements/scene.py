@@ -38,17 +38,17 @@ class OnScene(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a scene, model that answers for its cloths, and setting."""
+        """Yield one a scene, model that answers for its cloths, seed and setting; pictures are of the first seed."""
         bench = subjects.recipe.bench
         for shot in SceneShot.all(bench.scenes):
-            for trained in subjects.models_on(shot.fabrics):
+            for model, trained in subjects.answering(shot.fabrics):
                 for one in trained.settings:
                     yield cls(
                         scene=shot.scene,
                         shot=shot.made,
                         model=one,
                         options=select(SceneErrorOptions, bench.scenes),
-                        shown=one.shown(bench.picture_counts),
+                        shown=one.shown(bench.picture_counts) if model.is_first else (),
                         extent=shot.options.size,
                         frames=shot.options.frames,
                     )
@@ -61,9 +61,8 @@ class OnScene(Measurement):
     @property
     def title(self) -> str:
         """Model, setting and scene."""
-        options = self.model.options
-        settings = [f"k = {k}" for k in options.settings]
-        return " ".join([options.name, *settings, f"on the scene {self.scene}"])
+        settings = [f"k = {k}" for k in self.model.options.settings]
+        return " ".join([self.model.title, *settings, f"on the scene {self.scene}"])
 
     @property
     def name(self) -> str:

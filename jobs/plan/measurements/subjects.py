@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 from jobs.plan.dataset import Shard, fingerprint_of, folder_of
-from jobs.plan.task import Made, Part, Place
-from jobs.plan.training import Training
+from jobs.plan.task import PLACE, Made, Part, Place
+from jobs.plan.training import Training, seed_title
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint
-from reports.options import Role, RunOptions
+from reports.options import BenchOptions, Role, RunOptions, select
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -41,11 +41,18 @@ class Trained(Part):
     """The model."""
     networks: tuple[Made, ...] = ()
     """Its trained networks; none where nothing is trained."""
+    seed: Annotated[int, PLACE] = 0
+    """Seed of their training, which the ids of the networks depend on."""
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Ids of the trainings."""
         return tuple(network.task for network in self.networks)
+
+    @property
+    def title(self) -> str:
+        """Name of the model, with the seed of its training where that is not 0."""
+        return f"{self.options.name}{seed_title(self.seed)}"
 
     @property
     def settings(self) -> list[Self]:
@@ -61,7 +68,7 @@ class Trained(Part):
         """Return the provenance of Records of this model."""
         from reports.record import Provenance
 
-        return Provenance(dataset=dataset, model=" ".join(self.needs))
+        return Provenance(dataset=dataset, model=" ".join(self.needs), seed=self.seed)
 
     def methods(self, out: Path) -> list[Method]:
         """Load its methods, one a setting."""
@@ -97,11 +104,14 @@ class FabricSubject:
 
 @dataclass(frozen=True)
 class ModelSubject:
-    """A model of the recipe and its trainings."""
+    """A model of the recipe, trained with one seed."""
 
     recipe: ModelRecipe
+    """The model with this training alone."""
     trainings: Mapping[str, Training]
     """Trainings by fabric; a general model has one, with an empty key."""
+    is_first: bool = True
+    """True for the first seed, which pictures are made of and times are taken of."""
 
     def on(self, fabrics: Sequence[str]) -> Trained | None:
         """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""
@@ -109,16 +119,22 @@ class ModelSubject:
         if not self.recipe.learns:
             return Trained(options=options)
         if "" in self.trainings:
-            return Trained(options=options, networks=(self.trainings[""].made,))
-        if not self.trainings.keys() >= set(fabrics):
-            return None
-        return Trained(options=options, networks=tuple(self.trainings[fabric].made for fabric in fabrics))
+            return self._with([""])
+        return self._with(fabrics) if self.trainings.keys() >= set(fabrics) else None
 
     @property
     def whole(self) -> Trained:
-        """The model with all its networks."""
-        networks = tuple(training.made for training in self.trainings.values())
-        return Trained(options=self.recipe.options, networks=networks)
+        """The model with the networks of all fabrics."""
+        return self._with(list(self.trainings))
+
+    def _with(self, keys: Sequence[str]) -> Trained:
+        networks = tuple(self.trainings[key].made for key in keys)
+        return Trained(options=self.recipe.options, networks=networks, seed=self.recipe.training.seed)
+
+    def ways(self, bench: BenchOptions) -> RunOptions:
+        """Return the ways to run the networks that are measured too; other runtimes only of the first seed."""
+        ways = select(RunOptions, self.recipe.measured(bench))
+        return ways if self.is_first else ways.model_copy(update={"runtimes": ()})
 
 
 @dataclass(frozen=True)
@@ -128,8 +144,8 @@ class Subjects:
     recipe: Recipe
     shards: Sequence[Shard]
     """The data set."""
-    trainings: Mapping[str, Mapping[str, Training]]
-    """Trainings by the model's name and by fabric."""
+    trainings: Mapping[str, Sequence[Mapping[str, Training]]]
+    """Trainings by the model's name, then one mapping from fabrics a seed."""
 
     @cached_property
     def fabrics(self) -> list[FabricSubject]:
@@ -139,12 +155,23 @@ class Subjects:
 
     @cached_property
     def models(self) -> list[ModelSubject]:
-        """The models, in the order of the recipe."""
-        return [ModelSubject(one, self.trainings.get(one.options.name, {})) for one in self.recipe.models]
+        """The models in the order of the recipe, once for each seed that they are trained with."""
+        return [
+            ModelSubject(single, trainings, is_first=index == 0)
+            for model in self.recipe.models
+            for index, (single, trainings) in enumerate(
+                zip(model.single, self.trainings.get(model.options.name, [{}]), strict=True)
+            )
+        ]
 
-    def models_on(self, fabrics: Sequence[str]) -> list[Trained]:
-        """Return the models that answer for all of some fabrics."""
-        return [trained for model in self.models if (trained := model.on(fabrics))]
+    @property
+    def first_models(self) -> list[ModelSubject]:
+        """The models, each trained with its first seed."""
+        return [model for model in self.models if model.is_first]
+
+    def answering(self, fabrics: Sequence[str]) -> list[tuple[ModelSubject, Trained]]:
+        """Return the models of all seeds that answer for all of some fabrics, with the networks that do."""
+        return [(model, trained) for model in self.models if (trained := model.on(fabrics))]
 
     def dataset(self, names: Sequence[str]) -> Dataset:
         """Return the test rows of fabrics."""

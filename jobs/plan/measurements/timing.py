@@ -52,12 +52,10 @@ class Timing(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield the one of the recipe."""
+        """Yield the one of the recipe, of models trained with their first seed: times do not depend on the weights."""
         bench = subjects.recipe.bench
         yield cls(
-            models=tuple(
-                Timed(model=one.whole, ways=select(RunOptions, one.recipe.measured(bench))) for one in subjects.models
-            ),
+            models=tuple(Timed(model=one.whole, ways=one.ways(bench)) for one in subjects.first_models),
             dataset=subjects.dataset([subject.fabric.name for subject in subjects.fabrics]),
             options=select(TimingOptions, bench),
         )

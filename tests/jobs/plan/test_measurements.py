@@ -21,6 +21,8 @@ def tasks():
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
     recipes[0] = replace(recipes[0], metrics=(AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),))
+    first, *others = recipes[0].models
+    recipes[0] = replace(recipes[0], models=(first.model_copy(update={"seeds": 2}), *others))
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 

@@ -92,6 +92,16 @@ def ids(tasks, stage, word=""):
     return [task.id for task in tasks if task.stage == stage and word in task.title]
 
 
+def test_seeds_are_those_of_the_other_recipe(asks, files):
+    trainer = TRAINER.replace('model = "curved"', 'model = "curved"\nseeds = 2')
+    recipe = asks(trainer)
+    assert recipe.models[-1].seeds == 2
+    own = ids(plan(load_recipe(files.folder / "bent.toml")), "train", "curved")
+    assert ids(plan(recipe), "train", "curved") == own and len(own) == 6
+    with pytest.raises(BadInput, match=r"seeds = 3.*leave it out: the recipe bent says it"):
+        asks(trainer, OTHER + "seeds = 3\n")
+
+
 def test_the_other_recipe_says_everything(asks, files):
     recipe = asks()
     bent = load_recipe(files.folder / "bent.toml")

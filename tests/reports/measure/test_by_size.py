@@ -1,6 +1,6 @@
 """Errors and times by the size of footprints: each class by itself."""
 
-from reports.measure.by_size import EDGES, MEASURES, SIZES, measure_by_size
+from reports.measure.by_size import EDGES, MEASURES, SIZES, measure_by_size, measure_errors_by_size
 
 
 def test_errors_are_those_of_the_class_alone(dataset, points, options):
@@ -17,3 +17,6 @@ def test_errors_are_those_of_the_class_alone(dataset, points, options):
     values = [value for _, value in few.curve]
     assert min(values) <= few.value <= max(values)
     assert {low for low, _ in few.curve} <= set(EDGES[:-1])
+    # Errors alone are the same numbers.
+    alone = measure_errors_by_size(points, manifest, folder, options.seed)
+    assert alone == [record for record in found if record.metric != "size_time"]

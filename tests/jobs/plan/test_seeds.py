@@ -1,0 +1,109 @@
+"""Several trainings of a model: seeds, tasks, and which measurements are made of each."""
+
+import pytest
+
+from jobs.plan.measurements.errors_by_size import ErrorsBySize
+from jobs.plan.measurements.extremes import Extremes
+from jobs.plan.measurements.frame_time import FrameTime
+from jobs.plan.measurements.latents import Latents
+from jobs.plan.measurements.method import OnFabric
+from jobs.plan.measurements.scene import OnScene
+from jobs.plan.measurements.timing import Timing
+from jobs.plan.plan import plan
+from jobs.plan.training import Training
+from jobs.recipe.load import load_recipe
+
+SEEDS = ('model = "woven"\nhidden = 32', 'model = "woven"\nhidden = 32\nseeds = 3')
+
+
+@pytest.fixture
+def one(files):
+    """The tasks of the recipe with one training of each model."""
+    files.exchange("frames = 4", 'frames = 4\nruntimes = ["onnx"]\n[bench.scenes]\nnames = ["curtain", "drape"]')
+    return plan(load_recipe(files.write()))
+
+
+@pytest.fixture
+def three(one, files):
+    """The tasks of the recipe with three trainings of `woven`."""
+    return plan(load_recipe(files.exchange(*SEEDS).write()))
+
+
+def of(tasks, kind, name="woven"):
+    """Return the tasks of a kind that are about one model, by their seeds."""
+    found = {}
+    for task in tasks:
+        if isinstance(task, kind):
+            options = task.options if kind is Training else task.model.options
+            seed = task.training.seed if kind is Training else task.model.seed
+            if options.name == name:
+                found.setdefault(seed, []).append(task)
+    return found
+
+
+def test_more_seeds_add_trainings_and_change_none(one, three):
+    before, after = of(one, Training), of(three, Training)
+    assert list(before) == [0] and list(after) == [0, 1, 2]
+    assert [task.id for task in after[0]] == [task.id for task in before[0]]
+    assert len({task.id for (task,) in after.values()}) == 3
+    assert {task.training.model_copy(update={"seed": 0}) for (task,) in after.values()} == {before[0][0].training}
+    assert after[2][0].title == "woven on 5 fabrics, seed 2"
+    kept = {task.id for task in one if task.stage != "report"}
+    assert kept < {task.id for task in three}
+
+
+def test_seeds_follow_that_of_the_training(one, files):
+    files.exchange(*SEEDS).exchange("steps = 10", "steps = 10\nseed = 5")
+    assert list(of(plan(load_recipe(files.write())), Training)) == [5, 6, 7]
+
+
+def test_each_training_of_one_material_has_every_seed(one, files):
+    tasks = plan(load_recipe(files.exchange('model = "neumip"', 'model = "neumip"\nseeds = 2').write()))
+    found = of(tasks, Training, "neumip")
+    assert {seed: [task.fabrics for task in same] for seed, same in found.items()} == {
+        seed: [("denim",), ("own",), ("twill_4_4",)] for seed in (0, 1)
+    }
+    (by_size,) = of(tasks, ErrorsBySize, "neumip")[1]
+    assert [made.task for made in by_size.model.networks] == [task.id for task in found[1]]
+
+
+@pytest.mark.parametrize("kind", [OnFabric, OnScene, Extremes])
+def test_errors_are_measured_of_every_training(one, three, kind):
+    before, after = of(one, kind), of(three, kind)
+    assert list(after) == [0, 1, 2] and {len(same) for same in after.values()} == {len(before[0])}
+    networks = {seed: task.id for seed, (task,) in of(three, Training).items()}
+    for seed, same in after.items():
+        assert all(networks[seed] in task.needs for task in same)
+    assert len({task.title for same in after.values() for task in same}) == 3 * len(before[0])
+
+
+def test_errors_by_size_of_further_trainings_have_tasks_of_their_own(one, three):
+    assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
+
+
+def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
+    for kind in (Timing, FrameTime, Latents):
+        assert [task.id for task in one if isinstance(task, kind)] == [t.id for t in three if isinstance(t, kind)]
+    assert one[-1].pictures == three[-1].pictures
+    for kind in (OnFabric, OnScene):
+        assert {bool(task.pictures) for task in of(three, kind)[0]} == {True}
+        assert {bool(task.pictures) for seed in (1, 2) for task in of(three, kind)[seed]} == {False}
+    assert {seed: same[0].ways.runtimes for seed, same in of(three, OnFabric).items()} == {0: ("onnx",), 1: (), 2: ()}
+
+
+def test_the_bound_is_measured_of_every_training(one, files):
+    tasks = plan(load_recipe(files.exchange(*SEEDS).exchange("frames = 4", "frames = 4\nbounds = true").write()))
+    assert {task.ways.bounds for same in of(tasks, OnFabric).values() for task in same} == {True}
+
+
+def test_the_note_on_a_model_names_its_seeds(one, three):
+    (note,) = [note for note in three[-1].models if note.name == "woven"]
+    assert "3 trainings with the seeds 0 to 2" in note.about
+    assert note.fingerprint == of(one, Training)[0][0].id
+    assert not any("trainings with" in note.about for note in one[-1].models)
+
+
+def test_records_name_the_seed(three):
+    for seed, same in of(three, OnFabric).items():
+        provenance = same[0].model.provenance()
+        assert (provenance.seed, provenance.model) == (seed, of(three, Training)[seed][0].id)
