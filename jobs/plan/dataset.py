@@ -37,7 +37,7 @@ class Shard(Task):
     shard: AnyShardTask
     """Rows of one fabric, and how they are answered."""
     role: str
-    """Role of the fabric in the data set: seen, population or unseen."""
+    """Role of the fabric in the data set (`pipeline.shards.manifest`)."""
     folders: Places
     """Folders of the data sets that hold the shard."""
 
@@ -51,7 +51,7 @@ class Shard(Task):
         """Role and split, or kind of extra rows."""
         shard = self.shard
         what = shard.kind.replace("_", " ") if isinstance(shard, ExtraShardTask) else shard.split
-        return f"{self.role} · {what}"
+        return f"{self.role.replace('_', ' ')} · {what}"
 
     @property
     def title(self) -> str:

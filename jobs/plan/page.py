@@ -35,7 +35,7 @@ class Page(Task):
     dataset: str
     """Name and fingerprint of the data set."""
     fabrics: tuple[tuple[Fabric, Role], ...]
-    """The named fabrics."""
+    """The fabrics that are measured."""
     models: tuple[ModelNote, ...]
     """The models."""
     options: BenchOptions
@@ -140,7 +140,7 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
         recipe=recipe.name,
         about=recipe.about,
         dataset=f"{recipe.name}, {fingerprint_of(subjects.shards)}",
-        fabrics=tuple((subject.fabric, subject.role) for subject in subjects.fabrics),
+        fabrics=tuple((one.fabric, one.role) for one in (*subjects.fabrics, *subjects.unseen_population)),
         models=tuple(
             _note(recipe, model, first.trainings, shots)
             for model, first in zip(recipe.models, subjects.first_models, strict=True)
@@ -195,5 +195,6 @@ def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Traini
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
     scenes = [f"in the scene {shot.scene}" for shot in shots if not trainings.keys() >= set(shot.fabrics)]
-    where = [f"on {name}" for name in fabrics] + scenes
+    random = ["on random unseen fabrics"] if recipe.unseen_population else []
+    where = [f"on {name}" for name in fabrics] + random + scenes
     return f"; left out {', '.join(where)}: it was not trained on that cloth" if where else ""

@@ -83,6 +83,7 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
         seen=tuple(_fabrics(dataset.seen, path, "dataset.seen")),
         population=tuple(population_fabrics(dataset.population)),
         unseen=tuple(_fabrics(dataset.unseen, path, "dataset.unseen")),
+        unseen_population=tuple(population_fabrics(dataset.unseen_population, "unseen_{index}_{family}")),
         trained_by=trained_by,
         metrics=() if chain else tuple(added.metrics),
     )

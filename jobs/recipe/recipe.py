@@ -1,8 +1,9 @@
 """Recipes: which fabrics, how many rows, which models, which measurements.
 
-Three kinds of fabrics: `seen` ones are named, trained on and measured; members of the `population` are drawn at random
-and only trained on; `unseen` ones are only measured. An unseen fabric has training rows too when a model of a single
-material (`neumip`) is in the recipe, and no other model ever reads them.
+Four kinds of fabrics: `seen` ones are named, trained on and measured; members of the `population` are drawn at random
+and only trained on; `unseen` ones are named and only measured; members of the `unseen_population` are drawn at random
+and only measured, on held-out queries. A named unseen fabric has training rows too when a model of a single material
+(`neumip`) is in the recipe, and no other model ever reads them. Such a model is not measured on random unseen fabrics.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Rows(_Section):
     validation: StrictInt = Field(default=2048, ge=1, le=10**10)
     """For the figures on model cards, each named fabric."""
     test: StrictInt = Field(default=8192, ge=1, le=10**10)
-    """For the benchmark, each named fabric; no model ever reads them."""
+    """For the benchmark, each named fabric and each of the unseen population; no model ever reads them."""
 
 
 class DatasetOptions(_Section):
@@ -53,6 +54,11 @@ class DatasetOptions(_Section):
     """Fabrics that general models are measured on and never trained on."""
     population: Population = Population()
     """Random fabrics, only trained on."""
+    unseen_population: Population = Population()
+    """Random fabrics that general models are measured on, on held-out queries, and never trained on.
+
+    No draft of it is in the population, unless a seen fabric has it too. No design may be chosen by what is measured
+    on it (CONTRIBUTING.md)."""
     rows: Rows
     """Queries for each fabric."""
     shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)
@@ -161,7 +167,7 @@ class Recipe:
         Designs and trainings.
     bench : BenchOptions
         Measurements.
-    seen, population, unseen : tuple of Fabric
+    seen, population, unseen, unseen_population : tuple of Fabric
         The fabrics in the order of the recipe.
     trained_by : mapping
         From the names of models that another recipe trains to that recipe.
@@ -177,13 +183,14 @@ class Recipe:
     seen: tuple[Fabric, ...]
     population: tuple[Fabric, ...]
     unseen: tuple[Fabric, ...]
+    unseen_population: tuple[Fabric, ...]
     trained_by: Mapping[str, Recipe] = field(default_factory=dict)
     metrics: tuple[AddedMetric, ...] = ()
 
     @property
     def fabrics(self) -> tuple[Fabric, ...]:
         """All fabrics."""
-        return self.seen + self.population + self.unseen
+        return self.seen + self.population + self.unseen + self.unseen_population
 
     @property
     def own_models(self) -> list[ModelRecipe]:
@@ -209,6 +216,7 @@ class Recipe:
             ("seen", self.seen, named),
             ("population", self.population, population),
             ("unseen", self.unseen, unseen),
+            ("unseen_population", self.unseen_population, {"test": rows.test}),
         )
         for role, fabrics, splits in parts:
             for fabric in fabrics:

@@ -129,7 +129,7 @@ def _refuse_fabrics(recipe: Recipe, model: ModelRecipe, trainer: Recipe, key: st
     seen = {fabric.weave.canonical() for fabric in recipe.seen}
     drafts = {fabric.weave.canonical(): fabric.name for fabric in trained}
     domain = Domain.of(trainer.dataset.model_dump(mode="json"), trained)
-    for fabric in recipe.unseen:
+    for fabric in (*recipe.unseen, *recipe.unseen_population):
         draft = fabric.weave.canonical()
         if draft not in seen and draft in drafts:
             allowed = f"{name} was trained there on {drafts[draft]}, of the draft of {fabric.name}, unseen here"

@@ -90,10 +90,16 @@ def _check_population(recipe: Recipe, where: str) -> None:
     # Where a seen fabric has the same draft, only the yarns are unseen.
     seen = {fabric.weave.canonical() for fabric in recipe.seen}
     unseen = {fabric.weave.canonical(): fabric for fabric in recipe.unseen if fabric.weave.canonical() not in seen}
+    random = {fabric.weave.canonical(): fabric for fabric in recipe.unseen_population}
     for member in recipe.population:
-        if fabric := unseen.get(member.weave.canonical()):
+        draft = member.weave.canonical()
+        if fabric := unseen.get(draft):
             allowed = f"must name {fabric.weave.name!r}, else the draft of {fabric.name} is seen in training"
             raise BadInput(where, "dataset.population.exclude", list(recipe.dataset.population.exclude), allowed)
+        if draft not in seen and (fabric := random.get(draft)):
+            exclude = list(recipe.dataset.unseen_population.exclude)
+            allowed = f"must name the draft of {fabric.name}, which {member.name} is trained on ({fabric.source})"
+            raise BadInput(where, "dataset.unseen_population.exclude", exclude, allowed)
 
 
 def _check_physics(recipe: Recipe, where: str) -> None:
@@ -121,8 +127,9 @@ def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | 
     named = (*recipe.seen, *recipe.unseen)
     trained = (*recipe.seen, *recipe.population)
     if any("unseen" in model.trained_roles for model in recipe.own_models):
-        trained = recipe.fabrics
-    yield "dataset.truth", dataset.truth, dataset.queries, named if dataset.training_truth else (*named, *trained)
+        trained = (*trained, *recipe.unseen)
+    tested = (*named, *recipe.unseen_population)
+    yield "dataset.truth", dataset.truth, dataset.queries, tested if dataset.training_truth else (*tested, *trained)
     if dataset.training_truth:
         yield "dataset.training_truth", dataset.training_truth, dataset.queries, trained
     for index, model in enumerate(recipe.models):

@@ -71,6 +71,7 @@ class ManifestFile:
                 "seen": [fabric.name for fabric in recipe.seen],
                 "population": [fabric.name for fabric in recipe.population],
                 "unseen": [fabric.name for fabric in recipe.unseen],
+                "unseen_population": [fabric.name for fabric in recipe.unseen_population],
             },
             fabrics={fabric.name: fabric for fabric in recipe.fabrics},
             about=recipe.dataset.model_dump(mode="json"),

@@ -1,8 +1,8 @@
 """Contents of a data set: its fabrics and their roles, its shards and their hashes.
 
 Roles: `seen` fabrics are named by the recipe; `population` members are drawn at random and only trained on; `unseen`
-fabrics are never shown to a general model (a per-material model, which knows no other fabric, reads their training
-rows).
+fabrics are named and never shown to a general model (a per-material model, which knows no other fabric, reads their
+training rows); `unseen_population` members are drawn at random and only measured.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.reading import MIB, read_json
 
-Role = Literal["seen", "population", "unseen"]
+Role = Literal["seen", "population", "unseen", "unseen_population"]
 Split = Literal["train", "validation", "test"]
 
 FILE = "manifest.json"

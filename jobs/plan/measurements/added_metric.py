@@ -38,7 +38,7 @@ class OfAddedMetric(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a metric, fabric, model that answers for it, and seed."""
         for metric in subjects.recipe.metrics:
-            for subject in subjects.fabrics:
+            for subject in (*subjects.fabrics, *subjects.unseen_population):
                 for _, trained in subjects.answering([subject.fabric.name]):
                     yield cls(
                         metric=metric,

@@ -19,6 +19,7 @@ from jobs.plan.measurements.truth import Truth
 from jobs.plan.measurements.truth_edge import TruthEdge
 from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.measurements.truth_picture import TruthPicture
+from jobs.plan.measurements.unseen_population import OnUnseenPopulation
 
 KINDS: Final[tuple[type[Measurement], ...]] = (
     TruthPicture,
@@ -26,6 +27,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     TruthEdge,
     Truth,
     OnFabric,
+    OnUnseenPopulation,
     Latents,
     SceneShot,
     OnScene,

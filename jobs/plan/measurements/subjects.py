@@ -154,6 +154,12 @@ class Subjects:
         return seen + [FabricSubject(fabric, "unseen", self.dataset([fabric.name])) for fabric in self.recipe.unseen]
 
     @cached_property
+    def unseen_population(self) -> list[FabricSubject]:
+        """The random unseen fabrics."""
+        fabrics = self.recipe.unseen_population
+        return [FabricSubject(fabric, "unseen", self.dataset([fabric.name])) for fabric in fabrics]
+
+    @cached_property
     def models(self) -> list[ModelSubject]:
         """The models in the order of the recipe, once for each seed that they are trained with."""
         return [

@@ -8,6 +8,7 @@ from typing import Any, Final
 import yaml
 
 from jobs.verbs.publish.about import About
+from jobs.verbs.publish.contents import POPULATIONS
 from jobs.verbs.publish.licence import hub_licence, licence_url
 from pipeline.shards.joined import columns_joined
 
@@ -30,6 +31,7 @@ _ROLES: Final = {
     "seen": "named fabrics, for training and measurements",
     "population": "random fabrics, for training",
     "unseen": "named fabrics that no general model is trained on",
+    "unseen_population": "random fabrics that no model is trained on",
 }
 
 _SIZES: Final = ((10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"))
@@ -90,8 +92,8 @@ def card(about: About) -> str:
             place = f"`data/{role}/{split}-*.parquet`"
             files.append((role, split, f"{fabrics:,}", f"{rows:,}", place, _ROLES[role]))
     named = ", ".join(f"`{name}`" for name in manifest.names("seen", "unseen"))
-    population = len(manifest.names("population"))
-    random = f"; `population.toml` has the {population:,} random ones" if population else ""
+    populations = [(role, len(manifest.names(role))) for role in POPULATIONS]
+    random = "".join(f"; `{role}.toml` has {count:,} random ones" for role, count in populations if count)
     text = _TEXT.format(
         title=about.title,
         summary=about.summary,

@@ -14,7 +14,9 @@ from pipeline.shards.manifest import Manifest, Role, ShardEntry
 MOST_FILES: Final = 90
 """Most Parquet files, if each role and split has one at least."""
 
-ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen")
+ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen", "unseen_population")
+POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")
+"""Roles of random fabrics."""
 SPLITS: Final = ("train", "validation", "test")
 
 

@@ -11,7 +11,7 @@ import tomli_w
 
 from jobs.plan.dataset import shards
 from jobs.recipe.load import load_recipe
-from jobs.verbs.publish.contents import own_shards
+from jobs.verbs.publish.contents import POPULATIONS, own_shards
 from pipeline.atomic import atomic_write
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput, brief
@@ -54,11 +54,12 @@ def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
 
 
 def _fabric_files(manifest: Manifest) -> dict[str, str]:
-    """Return a file for each named fabric, and one for the population."""
+    """Return a file for each named fabric, and one for each population."""
     files = {f"fabrics/{name}.toml": manifest.fabrics[name].to_toml() for name in manifest.names("seen", "unseen")}
-    if population := manifest.names("population"):
-        tables = {name: manifest.fabrics[name].model_dump(mode="json", exclude_none=True) for name in population}
-        files["population.toml"] = tomli_w.dumps(tables)
+    for role in POPULATIONS:
+        if population := manifest.names(role):
+            tables = {name: manifest.fabrics[name].model_dump(mode="json", exclude_none=True) for name in population}
+            files[f"{role}.toml"] = tomli_w.dumps(tables)
     return files
 
 

@@ -174,6 +174,25 @@ def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tas
     assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
 
 
+def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks):
+    """One task a model, on test rows alone; all that is about the other fabrics is as it was, but for the data set."""
+    unseen = '[dataset.unseen_population]\ncount = 2\nfamilies = ["irregular"]\n\n[dataset.queries]'
+    planned = plan(load_recipe(files.exchange("[dataset.queries]", unseen).write()))
+    added = [task for task in planned if getattr(task, "kind", "") == "unseen population"]
+    assert [task.model.options.name for task in added] == ["woven", "point_sampled"]
+    rows = [task for task in planned if getattr(task, "role", "") == "unseen_population"]
+    assert {task.shard.split for task in rows} == {"test"} and {task.rows for task in rows} == {500}
+    assert all({task.id for task in rows} <= set(one.needs) for one in added)
+    for stage in ("generate", "train"):
+        before, after = ({task.id for task in some if task.stage == stage} for some in (tasks, planned))
+        assert after - before == ({task.id for task in rows} if stage == "generate" else set()) and before <= after
+    (page,) = (task for task in planned if task.stage == "report")
+    assert [fabric.name for fabric, role in page.fabrics if role == "unseen"][1:] == [
+        "unseen_0_irregular",
+        "unseen_1_irregular",
+    ]
+
+
 def test_what_lies_between_fabrics_needs_the_training_alone(files, tasks):
     """Its pairs are presets: no row and no fabric of the recipe enters but through the network and the queries."""
     (task,) = [task for task in tasks if task.title.startswith("latents")]

@@ -186,6 +186,79 @@ def test_the_unseen_draft_must_be_kept_out_of_the_population(files):
         load_recipe(files.write())
 
 
+UNSEEN_POPULATION = """
+[dataset.unseen_population]
+count = 8
+seed = 7
+families = ["plain", "compound_twill", "large_satin", "irregular"]
+balanced = true
+solid = 0.5
+"""
+
+
+def test_random_unseen_fabrics_have_drafts_that_nobody_is_trained_on(files):
+    """But for the plain weave, which has one draft: a seen fabric has it here."""
+    files.exchange('"denim"', '"polyester_lining"')
+    recipe = load_recipe(files.exchange("[dataset.queries]", f"{UNSEEN_POPULATION}\n[dataset.queries]").write())
+    assert [fabric.name for fabric in recipe.unseen_population][:4] == [
+        "unseen_0_plain",
+        "unseen_1_compound_twill",
+        "unseen_2_large_satin",
+        "unseen_3_irregular",
+    ]
+    trained = {fabric.weave.canonical() for fabric in recipe.seen + recipe.population}
+    drafts = [fabric.weave.canonical() for fabric in recipe.unseen_population]
+    assert [draft in trained for draft in drafts[1:4] + drafts[5:]] == [False] * 6
+    assert [row for row in recipe.own_rows() if row[0] == "unseen_population"] == [
+        ("unseen_population", fabric, "test", 500) for fabric in recipe.unseen_population
+    ]
+
+
+def test_a_random_unseen_draft_that_is_trained_on_is_refused(files):
+    """A rib: of the seen fabrics denim is a twill and `own` a satin."""
+    files.exchange('exclude = ["twill 4/4"]', 'families = ["rib"]').exchange("count = 3", "count = 30")
+    families = '["plain", "compound_twill", "large_satin", "irregular"]'
+    unseen = UNSEEN_POPULATION.replace(families, '["rib"]')
+    files.exchange("[dataset.queries]", f"{unseen}\n[dataset.queries]")
+    words = r"tiny.toml: dataset.unseen_population.exclude = \[\]: must name the draft of unseen_\d_rib, which random_"
+    with pytest.raises(BadInput, match=words + r"\d+ is trained on \(Drawn from seed 7: rib"):
+        load_recipe(files.write())
+
+
+def test_a_random_unseen_draft_may_be_that_of_a_seen_fabric(files):
+    """Then only the yarns are unseen, as of a named fabric: a plain weave has one draft."""
+    unseen = UNSEEN_POPULATION.replace("count = 8", "count = 1")
+    files.exchange("[dataset.queries]", f"{unseen}\n[dataset.queries]")
+    files.exchange('exclude = ["twill 4/4"]', 'families = ["plain"]').exchange('"denim"', '"polyester_lining"')
+    recipe = load_recipe(files.write())
+    assert recipe.unseen_population[0].weave.canonical() == recipe.population[0].weave.canonical()
+    files.exchange('"polyester_lining"', '"denim"')
+    with pytest.raises(BadInput, match="must name the draft of unseen_0_plain"):
+        load_recipe(files.write())
+
+
+def test_designs_are_chosen_on_other_cloths_than_those_of_any_page():
+    """`ablations` is the recipe for choices of design (CONTRIBUTING.md)."""
+    chosen_on = load_recipe("ablations")
+    assert len(chosen_on.unseen_population) >= 8 and not chosen_on.unseen
+    optics = [fabric.optics() for fabric in chosen_on.unseen_population]
+    for name in recipe_names():
+        recipe = load_recipe(name)
+        if name != "ablations" and recipe.unseen_population:
+            assert recipe.dataset.unseen_population.seed != chosen_on.dataset.unseen_population.seed
+        if name != "ablations":
+            assert not [fabric.name for fabric in recipe.unseen + recipe.unseen_population if fabric.optics() in optics]
+
+
+@pytest.mark.parametrize("name", ["standard", "trade", "full"])
+def test_pages_have_eight_random_unseen_fabrics_of_every_kind(name):
+    fabrics = load_recipe(name).unseen_population
+    assert len(fabrics) >= 8
+    for family in ("plain", "compound_twill", "large_satin", "irregular"):
+        widths = [fabric.warp.width for fabric in fabrics if fabric.name.endswith(family)]
+        assert 1.0 in widths and min(widths) < 1.0
+
+
 @pytest.mark.parametrize("name", ["quik", "", "no/such/recipe.toml", "a\0b.toml"])
 def test_a_recipe_that_does_not_exist(name):
     with pytest.raises(BadInput):
