@@ -36,14 +36,14 @@ class OnUnseenPopulation(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a model that answers for all of the fabrics: models of one material do not."""
+        """Yield one a seed and model that answers for all of the fabrics: models of one material do not."""
         fabrics = tuple(subject.fabric for subject in subjects.unseen_population)
         names, bench = [fabric.name for fabric in fabrics], subjects.recipe.bench
         for model in subjects.models:
             if names and (trained := model.on(names)):
                 yield cls(
                     model=trained,
-                    ways=select(RunOptions, model.recipe.measured(bench)),
+                    ways=model.ways(bench),
                     fabrics=fabrics,
                     dataset=subjects.dataset(names),
                     errors=select(ErrorOptions, bench),
@@ -57,7 +57,7 @@ class OnUnseenPopulation(Measurement):
     @property
     def title(self) -> str:
         """Model and number of fabrics."""
-        return f"{self.model.options.name} on {len(self.fabrics)} random unseen fabrics"
+        return f"{self.model.title} on {len(self.fabrics)} random unseen fabrics"
 
     @property
     def name(self) -> str:
