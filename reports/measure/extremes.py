@@ -197,7 +197,7 @@ def _largest(answers: Array, others: Array) -> float:
 
 
 def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the extremes, one row a method: the worst over its fabrics, those of alpha = .01 apart.
+    """Return the extremes, one row a method: the worst over its fabrics and trainings, those of alpha = .01 apart.
 
     Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
     footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,

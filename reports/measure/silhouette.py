@@ -28,6 +28,7 @@ from pipeline.truth.geometry.opacity import opacity
 from pipeline.truth.query import Queries
 from reports.images.exr import read_exr, write_exr
 from reports.options import EdgeOptions, Role
+from reports.over_seeds import over_seeds
 from reports.record import TRUTH, Provenance, Record, to_table
 from weaves.fabric import Fabric
 
@@ -183,6 +184,7 @@ def measure_silhouette(
     ]
 
 
+@over_seeds(["method", "setting"], ["coverage", "displacement", "light"])
 def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return one row a method: coverage, displacement, light, fabrics; means over fabrics."""
     table = to_table(records)

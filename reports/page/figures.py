@@ -31,6 +31,8 @@ _MARK_EVERY: Final = 9  # points of a spectrum; one curve's marks are shifted ag
 def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:
     """Draw the MSE of every method: each fabric as a faint dot, the mean of a role with its 95 % interval.
 
+    A broad bar is the range of that mean over trainings.
+
     Parameters
     ----------
     table : DataFrame
@@ -48,6 +50,11 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
             axes.scatter(single, np.full(len(single), row), s=16, color=colours[method], alpha=0.3, linewidths=0)
             found = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
             for mean in rows(found):
+                if mean.mse_least < mean.mse_most:
+                    axes.plot(
+                        [mean.mse_least, mean.mse_most], [row, row], linewidth=7, alpha=0.3, color=colours[method],
+                        solid_capstyle="butt",
+                    )  # fmt: skip
                 spread = _bounds(mean.mse, mean.low, mean.high)
                 _mark(axes, mean.mse, row, colours[method], role, scheme.marker(method), xerr=spread)
         noise = table.loc[table["role"] == role, "truth_noise"].mean()

@@ -1,8 +1,9 @@
 """Plots of errors against costs, both logarithmic, with the Pareto front.
 
 The settings of a method are one curve; its first and last are labelled, and so is the baseline. The broad band is the
-front. The dashed arrow is the ratio of the paper, drawn from our baseline: 4.1 times lower MSE, which is 2.0 times
-lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0 have no place on a logarithmic axis and are left out.
+front, a vertical bar the range over trainings. The dashed arrow is the ratio of the paper, drawn from our baseline: 4.1
+times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0 have no place on a
+logarithmic axis and are left out.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _TIME: Final = "time of a query, ns (one process, side by side)"
 
 def error_against_time(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw the colour's error against the time of a query, with the paper's step, from `tradeoff.tradeoff_table`."""
-    table = table.assign(x=table["ns"], y=table["error"])
+    table = table.assign(x=table["ns"], y=table["error"], least=table["error_least"], most=table["error_most"])
     return _by_role(scheme, table, _TIME, "relative RMSE of the colour", _percent, paper=True)
 
 
@@ -193,6 +194,9 @@ def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colo
         settings["x"], settings["y"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
         markeredgewidth=1.6, linewidth=1.3, zorder=3,
     )  # fmt: skip
+    for row in rows(settings) if "least" in settings else ():
+        if 0 < row.least < row.most:
+            axes.plot([row.x, row.x], [row.least, row.most], color=colour, linewidth=4, alpha=0.3, zorder=2)
     ends = {settings["setting"].iloc[0], settings["setting"].iloc[-1]}
     for row in rows(settings[settings["setting"].isin(ends) | of_baseline(settings)]):
         if row.setting:

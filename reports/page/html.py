@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from reports.images import tiles
 from reports.measure import latents
 from reports.measure.extremes import extremes_table
+from reports.over_seeds import first_training, trainings
 from reports.page.alt_texts import PLOT_TITLES, alt_texts
 from reports.page.colours import DARK, LIGHT, Scheme
 from reports.page.content import PageInput
@@ -111,9 +112,10 @@ def _methods(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, A
         "beaten": beaten(tables["tradeoff"]),
         "equal_time": method_rows.equal_time_rows(tables["equal_time"]),
         "equal_time_sentences": equal_time_sentences(tables["equal_time"]),
+        "most_trainings": max(trainings(page.records).values(), default=0),
         "errors": method_rows.error_rows(errors, per_material),
         "error_columns": method_rows.ERROR,
-        "by_fabric": method_rows.fabric_rows(tables["errors_by_fabric"]),
+        "by_fabric": method_rows.fabric_rows(tables["errors_by_fabric"], summary.fabric_ranges(page.records)),
         "aliasing": method_rows.aliasing_rows(tables["aliasing"], page.records),
         "energy": method_rows.energy_rows(tables["energy"], errors, timing),
         "energy_columns": method_rows.ENERGY,
@@ -143,7 +145,7 @@ def _pictures(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, 
         page.pictures,
         {fabric.name: role for fabric, role in page.fabrics},
         [*page.options.views, *page.options.scenes.names],
-        [tables["pictures"], tables["scenes"]],
+        [tables["pictures"], summary.scene_table(first_training(page.records))],
     )
     return {
         "fabrics": [fabric_card(fabric, role) for fabric, role in page.fabrics],

@@ -11,7 +11,7 @@ from reports.images.tiles import DIFFERENCE_RANGE, EXPOSURE
 from reports.options import BenchOptions
 from reports.record import Record
 from reports.tables.number_format import display, listed
-from reports.tables.summary import of_baseline
+from reports.tables.summary import of_baseline, rows
 
 
 def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataFrame) -> list[str]:
@@ -24,7 +24,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         "diffuse lobe; reflection only. It is not a measurement of real cloth.",
         "Times are those of this machine and of code called from Python, a batch of queries at a time; the paper's are "
         "of a GPU renderer. Compare only ratios within one column.",
-        "One training, one seed: how much another training would differ was not measured.",
+        *_trainings(errors),
         _footprint_note(view),
         f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
         f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
@@ -42,6 +42,29 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         names = " and ".join(display(name) for name in per_material)
         notes.append(
             f"{names} is trained on every fabric by itself, so no fabric is unseen; the rows are for comparison."
+        )
+    return notes
+
+
+def _trainings(errors: pd.DataFrame) -> list[str]:
+    """Return sentences on the number of trainings, if anything was trained."""
+    counts: dict[str, int] = {}
+    for row in rows(errors[errors["seeds"] > 0]) if len(errors) else ():
+        counts[display(row.method)] = max(row.seeds, counts.get(display(row.method), 0))
+    once = [name for name, count in counts.items() if count == 1]
+    several = {name: count for name, count in counts.items() if count > 1}
+    notes = []
+    if once:
+        notes.append(
+            f"One training of {listed(once)}, with one seed: how much another training would differ was not measured."
+        )
+    if several:
+        numbers = listed(sorted({str(count) for count in several.values()}))
+        notes.append(
+            f"Numbers of {listed(list(several))} are means over {numbers} trainings, which differ in their seed alone; "
+            "brackets hold the least and the most of them. That range is no interval: another training may lie "
+            "outside. Extremes are the worst of all trainings. Times, memory, errors between fabrics, pictures and "
+            "other runtimes are of the first training."
         )
     return notes
 

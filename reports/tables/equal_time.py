@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from reports.measure.by_size import EDGES, MEASURES, SIZES, WHOLE
+from reports.over_seeds import mean_over_seeds
 from reports.record import Record
 from reports.tables.summary import rows
 
@@ -23,10 +24,13 @@ COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival"
 
 
 def size_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return times and errors by size, one row a method, setting and size: ns, colour, specular, diffuse."""
+    """Return times and errors by size, one row a method, setting and size: ns, colour, specular, diffuse.
+
+    Errors of several trainings are their mean.
+    """
     found: dict[tuple[str, str, str], dict[str, float]] = {}
     names: dict[str, str] = {"size_time": "ns"} | {metric: measure for measure, (metric, _) in MEASURES.items()}
-    for record in records:
+    for record in mean_over_seeds(records):
         if record.metric in names:
             values = {SIZES[EDGES.index(low)]: value for low, value in record.curve} | {WHOLE: record.value}
             for size, value in values.items():

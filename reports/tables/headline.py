@@ -7,18 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from typing import Any
 
 import pandas as pd
 
+from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, PAPER, rows
 
 
 def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
-    """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print."""
+    """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print.
+
+    A mean over trainings has its range; a single training is called one.
+    """
     found = errors[(errors["method"] == method) & (errors["setting"] == setting) & errors["ratio"].notna()]
-    parts = [(_comparison(row.ratio), _fabrics(row.fabrics, row.role)) for row in rows(found)]
+    parts = [(_comparison(row.ratio) + _range(row), _fabrics(row.fabrics, row.role)) for row in rows(found)]
     if not parts:
         return ""
     (first, where), *others = parts
@@ -28,6 +33,7 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
     lower, faster = PAPER
     name = display(method, setting)
     said = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
+    said += " (one training)" if found["seeds"].iloc[0] == 1 else ""
     return f"{said}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{said}."
 
 
@@ -40,6 +46,15 @@ def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) ->
 
 def _comparison(ratio: float) -> str:
     return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+
+
+def _range(row: Any) -> str:
+    """Return the range of a ratio over trainings; empty where there are not several."""
+    least, most = getattr(row, "ratio" + LEAST), getattr(row, "ratio" + MOST)
+    if not math.isfinite(least):
+        return ""
+    ends = (least, most) if row.ratio >= 1 else (1 / most, 1 / least)
+    return f" ({_number(ends[0])}× to {_number(ends[1])}× over {row.seeds} trainings)"
 
 
 def _number(value: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import MetricRow, metric_row
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
+from reports.over_seeds import LEAST, MOST, is_range
 from reports.record import TRUTH, Record
 from reports.tables.headline import learnt
 from reports.tables.number_format import (
@@ -29,6 +30,8 @@ from reports.tables.number_format import (
     shown,
     significant,
     size,
+    span,
+    span_of,
     times,
 )
 from reports.tables.summary import BASELINE, rows
@@ -57,6 +60,24 @@ def row_of(method: str, setting: str) -> Row:
     }
 
 
+def ranged(text: str, row: Any, column: str, worded: Callable[[float], str]) -> str | Row:
+    """Return a number as a cell of a table, with its range over trainings where there are several."""
+    found = span(worded, getattr(row, column + LEAST), getattr(row, column + MOST))
+    return {"text": text, "range": found} if found else text
+
+
+def _metric(metric: str, row: Any) -> str | Row:
+    """Return the value of a metric as a cell, with its range over trainings where there are several."""
+    found = span_of(metric, getattr(row, metric + LEAST), getattr(row, metric + MOST))
+    text = shown(metric, getattr(row, metric))
+    return {"text": text, "range": found} if found else text
+
+
+def plain_text(cell: str | Row) -> str:
+    """Return a cell as text, with its range."""
+    return cell if isinstance(cell, str) else " ".join(filter(None, (cell["text"], cell.get("range", ""))))
+
+
 ERROR: Final = (
     "MSE",
     "95 % interval",
@@ -76,13 +97,12 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
         known = row.role == "unseen" and row.method in per_material
         line = row_of(row.method, row.setting) | {
             "cells": [
-                shown("mse", row.mse),
+                _metric("mse", row),
                 f"{scientific(row.low)} … {scientific(row.high)}",
                 percent(row.noise_share),
-                times(row.ratio) if (row.method, row.setting) != BASELINE else "1",
+                ranged(times(row.ratio), row, "ratio", times) if (row.method, row.setting) != BASELINE else "1",
                 interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
-                shown("colour_rrmse", row.colour_rrmse),
-                *(shown(metric, getattr(row, metric)) for metric in (f"rrmse_{name}" for name in COMPONENTS)),
+                *(_metric(metric, row) for metric in ("colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS))),
             ],
         }
         line["label"] += " *" if known else ""
@@ -90,15 +110,23 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
     return {role: groups(lines) for role, lines in result.items()}
 
 
-def fabric_rows(table: pd.DataFrame) -> dict[str, Any]:
-    """Return the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked."""
+def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) -> dict[str, Any]:
+    """Return the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked.
+
+    Parameters
+    ----------
+    table, ranges : DataFrame
+        From `summary.fabric_table` and `summary.fabric_ranges`.
+    """
     labels = [column for column in table.columns if column not in ("role", "fabric")]
     records = table.to_dict("records")
     best = [min((r[label] for label in labels if not missing(r[label])), default=math.nan) for r in records]
     lines = []
     for label in labels:
         values = [(record[label], lowest) for record, lowest in zip(records, best, strict=True)]
-        cells = [{"text": scientific(value), "best": value == lowest} for value, lowest in values]
+        cells: list[Row] = [{"text": scientific(value), "best": value == lowest} for value, lowest in values]
+        for cell, least, most in zip(cells, *(part[label] for part in ranges), strict=True):
+            cell["range"] = span(scientific, least, most) if least < most else ""
         lines.append(row_of(*_split(label)) | {"cells": cells})
     columns = [plain(str(r["fabric"])) + (" (unseen)" if r["role"] == "unseen" else "") for r in records]
     return {"columns": columns, "groups": groups(lines)}
@@ -112,7 +140,8 @@ def front_rows(table: pd.DataFrame) -> dict[str, list[Row]]:
     """Return what is on the front by role, the fastest first."""
     result: dict[str, list[Row]] = {}
     for row in rows(table[table["front"]].sort_values("ns", kind="stable") if len(table) else table):
-        cells = [f"{row.ns:,.0f}", percent(row.error, 2), size(row.bytes_stored)]
+        error = ranged(percent(row.error, 2), row, "error", lambda value: percent(value, 2))
+        cells = [f"{row.ns:,.0f}", error, size(row.bytes_stored)]
         line = row_of(row.method, row.setting) | {"cells": cells}
         result.setdefault(row.role, []).append(line)
     return result
@@ -141,11 +170,10 @@ def aliasing_rows(aliasing: pd.DataFrame, records: Sequence[Record]) -> dict[str
     """Return the rows of the aliasing table in groups, and the variance that the motion itself brings."""
     motion = [record.value for record in records if record.metric == "motion"]
     roles = list(dict.fromkeys(aliasing["role"])) if len(aliasing) else []
-    found: dict[tuple[str, str], dict[str, list[str]]] = {}
+    found: dict[tuple[str, str], dict[str, list[str | Row]]] = {}
     for row in rows(aliasing):
-        found.setdefault((row.method, row.setting), {})[row.role] = [
-            shown(metric, getattr(row, metric)) for metric in ("flicker", "excess_energy")
-        ]
+        cells = [_metric(metric, row) for metric in ("flicker", "excess_energy")]
+        found.setdefault((row.method, row.setting), {})[row.role] = cells
     lines = [
         row_of(*key) | {"cells": [text for role in roles for text in by_role.get(role, [NONE, NONE])]}
         for key, by_role in found.items()
@@ -165,14 +193,19 @@ def energy_rows(energy: pd.DataFrame, errors: pd.DataFrame, timing: pd.DataFrame
     """Return the rows of the table of energies, in groups; albedos above 1 are marked."""
     lines = []
     for row in rows(energy):
-        albedos = (row.diffuse, row.specular, row.colour)
-        cells = [f"{value:.3f}{' ✗' if value > 1.0 else ''}" for value in albedos]
+        cells = [_albedo(row, name) for name in ("diffuse", "specular", "colour")]
         mse = _number(errors[errors["role"] == "seen"] if len(errors) else errors, row, "mse")
         lines.append(
             row_of(row.method, row.setting)
             | {"cells": [*cells, scientific(mse), grouped(_number(timing, row, "median_ns"))]}
         )
     return groups(lines)
+
+
+def _albedo(row: Any, name: str) -> str | Row:
+    """Return an albedo as a cell; marked if it, or that of any training, is above 1."""
+    largest = max(getattr(row, name), np.nan_to_num(getattr(row, name + MOST)))
+    return ranged(f"{getattr(row, name):.3f}{' ✗' if largest > 1.0 else ''}", row, name, lambda value: f"{value:.3f}")
 
 
 def _number(table: pd.DataFrame, row: Any, column: str) -> float:
@@ -191,9 +224,18 @@ def silhouette_rows(table: pd.DataFrame) -> list[Row]:
     """Return the rows of the table of silhouettes, in groups."""
     lines = []
     for row in rows(table):
-        cells = [fixed(row.coverage), f"{row.displacement:+.4f}".replace("-", "−"), fixed(row.light), f"{row.fabrics}"]
+        cells = [
+            ranged(fixed(row.coverage), row, "coverage", fixed),
+            ranged(_outwards(row.displacement), row, "displacement", _outwards),
+            ranged(fixed(row.light), row, "light", fixed),
+            f"{row.fabrics}",
+        ]
         lines.append(row_of(row.method, row.setting) | {"cells": cells})
     return groups(lines)
+
+
+def _outwards(value: float) -> str:
+    return f"{value:+.4f}".replace("-", "−")
 
 
 def timing_columns(timing: pd.DataFrame) -> list[str]:
@@ -243,6 +285,7 @@ def figures_of_merit(
             if not missing(row.ratio):
                 fabrics = "fabric" if row.fabrics == 1 else "fabrics"
                 note = f"MSE of 2 points over that of {display(method, setting)}, {row.fabrics} {row.role} {fabrics}"
+                note += f", {_trainings(row)}" if row.seeds else ""
                 result.append({"value": times(row.ratio), "note": note, "paper": "paper: 4.1×"})
         cost = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
         if len(cost) and not missing(cost.iloc[0]):
@@ -253,6 +296,12 @@ def figures_of_merit(
         note = "relative standard error of the truth: median over queries, mean over fabrics"
         result.append({"value": percent(float(np.mean(truth)), 2), "note": note, "paper": ""})
     return result
+
+
+def _trainings(row: Any) -> str:
+    """Return the number of trainings and the range of the ratio over them."""
+    found = span(times, getattr(row, "ratio" + LEAST), getattr(row, "ratio" + MOST))
+    return " ".join(filter(None, (f"mean of {row.seeds} trainings" if row.seeds > 1 else "one training", found)))
 
 
 EXTREMES: Final = (
@@ -305,17 +354,20 @@ def edit_rows(records: Sequence[Record]) -> list[list[str]]:
 
 def other_columns(table: pd.DataFrame) -> list[str]:
     """Return the columns of `other_rows` after the method: title, unit, and which direction is better."""
-    return [_heading(metric_row(name)) for name in table.columns[2:]]
+    return [_heading(metric_row(name)) for name in _metrics(table)]
 
 
 def other_rows(table: pd.DataFrame) -> list[Row]:
     """Return the rows of the metrics without a table of their own, in groups."""
-    metrics = table.columns[2:]
     lines = [
-        row_of(line["method"], line["setting"]) | {"cells": [shown(metric, line[metric]) for metric in metrics]}
-        for line in table.to_dict("records")
+        row_of(row.method, row.setting) | {"cells": [_metric(m, row) for m in _metrics(table)]} for row in rows(table)
     ]
     return groups(lines)
+
+
+def _metrics(table: pd.DataFrame) -> list[str]:
+    """Return the columns of metrics."""
+    return [name for name in table.columns[2:] if not is_range(name)]
 
 
 def _heading(metric: MetricRow) -> str:

@@ -13,6 +13,9 @@ NONE = "–"
 
 NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 
+IN_THE_NOISE: Final = "in the noise"
+"""Words for an error of which nothing is left after the noise of the truth was subtracted."""
+
 NAMES: Final = {
     "neumip": "NeuMIP",
     "gauss_nodes": "Gauss nodes",
@@ -46,7 +49,7 @@ def scientific(value: float | None) -> str:
 
 def beyond_noise(value: float, worded: Callable[[float], str]) -> str:
     """Return an error in words, or that nothing of it is left after the noise of the truth was subtracted."""
-    return "in the noise" if value <= 0 else worded(value)
+    return IN_THE_NOISE if value <= 0 else worded(value)
 
 
 def scientific_interval(low: float, high: float) -> str:
@@ -104,6 +107,22 @@ def size(value: float) -> str:
 def interval(low: float, high: float) -> str:
     """Return both ends with two digits: ``1.2 … 3.4``."""
     return NONE if missing(low) else " … ".join(f"{v:.2g}" if v < 100 else f"{v:,.0f}" for v in (low, high))
+
+
+def span(worded: Callable[[float], str], low: float, high: float) -> str:
+    """Return the range over trainings: ``[1.2 … 3.4 %]``; empty where there is none."""
+    if missing(low) or missing(high):
+        return ""
+    if worded in (scientific, signed):
+        return scientific_interval(low, high).replace("(", "[").replace(")", "]")
+    first, last = (worded(end).replace(IN_THE_NOISE, "0") for end in (low, high))
+    unit = re.search(r"[^\d.,e−+]*$", last)
+    return f"[{first.removesuffix(unit[0] if unit else '')} … {last}]"
+
+
+def span_of(metric: str, low: float, high: float) -> str:
+    """Return the range of a metric over trainings, in its format (`reports.catalogue`)."""
+    return span(_FORMATS[metric_row(metric).format], low, high)
 
 
 def listed(words: Sequence[str]) -> str:

@@ -10,9 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+import pandas as pd
+
 from reports.record import Machine, Record
 from reports.tables.markdown import markdown_table
-from reports.tables.number_format import NONE, missing, times
+from reports.tables.number_format import NONE, listed, missing, span, times
 from reports.tables.summary import BASELINE, PAPER, error_table, of_baseline, rows, summary_table
 from weaves.errors import BadInput
 
@@ -60,14 +62,15 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
         raise BadInput(
             where, "", "lacks errors, flicker or times of two random points", "Records of a whole page are needed"
         )
+    table = error_table(records)
+    spans = {(row.method, row.setting, row.role): span(times, row.ratio_least, row.ratio_most) for row in rows(table)}
     printed, lines = _printed_times(old), []
     numbers: dict[Any, dict[Any, float]] = {key: dict(row) for key, row in found.to_dict("index").items()}
     for key, words in ROWS.items():
         if row := numbers.get(key):
-            errors = two_digits(row["MSE seen"]), times(row["× lower, seen"]), times(row["× lower, unseen"])
+            ratios = (_ratio(row[f"× lower, {role}"], spans.get((*key, role), "")) for role in ("seen", "unseen"))
             time = kept_time(printed.get(words, NONE), row["× time"])
-            lines.append((words, *errors, three_decimals(row["flicker"]), time))
-    table = error_table(records)
+            lines.append((words, two_digits(row["MSE seen"]), *ratios, three_decimals(row["flicker"]), time))
     held_out = table[of_baseline(table)]
     fabrics = " and ".join(f"{row.fabrics} {row.role}" for row in rows(held_out))
     provenance = next(record.provenance for record in records if record.provenance.recipe)
@@ -80,9 +83,23 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             "MSE: mean squared error of the colour on seen fabrics. × lower: the MSE of two points over that of the "
             "method, on seen and on unseen fabrics. Flicker: variance over time beyond that of the truth, over its "
             "squared mean, on all fabrics. × time: of one query on one thread, over that of two points; times within "
-            "a quarter, because no two runs take equally long. \\* Trained on the unseen fabrics too.",
+            "a quarter, because no two runs take equally long. \\* Trained on the unseen fabrics too. "
+            + _trainings(table),
         ]
     )
+
+
+def _ratio(value: float, spread: str) -> str:
+    return " ".join(filter(None, (times(value), spread)))
+
+
+def _trainings(errors: pd.DataFrame) -> str:
+    """Return a sentence on how often networks were trained."""
+    counts = sorted({int(count) for count in errors["seeds"] if count})
+    if not counts or counts[-1] == 1:
+        return "Each network was trained once."
+    numbers = listed([str(count) for count in counts])
+    return f"Networks: means over {numbers} trainings, in brackets the least and the most of them."
 
 
 def _headline(lines: Sequence[Sequence[str]]) -> list[str]:

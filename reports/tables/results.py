@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from typing import Any
 
 import pandas as pd
 
 from reports.measure.silhouette import silhouette_table
+from reports.over_seeds import trainings
 from reports.record import TRUTH, Machine, Record
 from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.equal_time import equal_time_table, size_table
@@ -18,6 +19,7 @@ from reports.tables.number_format import (
     NONE,
     display,
     interval,
+    listed,
     missing,
     percent,
     plain,
@@ -77,7 +79,7 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
         yield (
             "MSE: mean squared error in the colours of each fabric, mean over fabrics, noise of the truth subtracted. "
             "× lower: MSE of two random points over that of the method, with its 95 % interval. Colour: relative RMSE "
-            "of one colour for all fabrics."
+            "of one colour for all fabrics." + _trainings(records)
         )
         for role in dict.fromkeys(errors["role"]):
             part = errors[errors["role"] == role]
@@ -96,7 +98,7 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
             "half the Nyquist frequency beyond that of the truth, over its squared mean."
         )
         lines = [
-            (_name(row), row.role, three_decimals(row.flicker), three_decimals(row.excess_energy))
+            (_name(row), row.role, *(_ranged(row, name, three_decimals) for name in ("flicker", "excess_energy")))
             for row in summary.rows(aliasing)
         ]
         yield markdown_table(("method", "fabrics", "flicker", "excess energy"), lines)
@@ -185,7 +187,24 @@ def _name(row: Any) -> str:
 def _error_cells(row: Any) -> tuple[str, ...]:
     if (row.method, row.setting) == summary.BASELINE:
         return scientific(row.mse), "1", NONE, percent(row.colour_rrmse)
-    return scientific(row.mse), times(row.ratio), interval(row.ratio_low, row.ratio_high), percent(row.colour_rrmse)
+    ratio = _ranged(row, "ratio", times), interval(row.ratio_low, row.ratio_high)
+    return _ranged(row, "mse", scientific), *ratio, _ranged(row, "colour_rrmse", percent)
+
+
+def _ranged(row: Any, column: str, worded: Callable[[float], str]) -> str:
+    """Return a number in words, with its range over trainings where there are several."""
+    return method_rows.plain_text(method_rows.ranged(worded(getattr(row, column)), row, column, worded))
+
+
+def _trainings(records: Sequence[Record]) -> str:
+    """Return a sentence on the numbers of several trainings; empty where there are none."""
+    counts = sorted({count for count in trainings(records).values() if count > 1})
+    if not counts:
+        return ""
+    return (
+        f" Numbers of trained methods are means over {listed([str(count) for count in counts])} trainings with "
+        "different seeds, in brackets the least and the most of them."
+    )
 
 
 def _time_cells(row: Any) -> tuple[str, ...]:
@@ -201,5 +220,5 @@ def _grouped(columns: Sequence[str], groups: Sequence[Any]) -> str:
 
 
 def _texts(found: Sequence[Any]) -> list[str]:
-    """Return cells as text: on the page some are marked."""
-    return [cell if isinstance(cell, str) else str(cell["text"]) for cell in found]
+    """Return cells as text; on the page some are marked."""
+    return [method_rows.plain_text(cell) for cell in found]

@@ -1,4 +1,4 @@
-"""Rows of the tables of scenes: numbers with their 95 % intervals; last the errors by the noise of the truth alone."""
+"""Rows of the tables of scenes: numbers with 95 % intervals and ranges over trainings; last the noise of the truth."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, Final
 import pandas as pd
 
 from reports.catalogue import METRICS
+from reports.over_seeds import LEAST, MOST
 from reports.tables.method_rows import Row, groups, row_of
 from reports.tables.number_format import (
     NO_BREAK,
@@ -20,6 +21,7 @@ from reports.tables.number_format import (
     scientific,
     scientific_interval,
     shown,
+    span,
     times,
 )
 from reports.tables.summary import rows
@@ -95,7 +97,13 @@ def scene_rows(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
 
 
 def _cell(row: Any, column: Column) -> Row:
-    """Return a number and its interval, which is empty where there is none."""
+    """Return a number, its interval and its range over trainings, which are empty where there are none."""
     low, high = (getattr(row, f"{column.metric}_{end}", math.nan) for end in ("low", "high"))
     text = column.worded(getattr(row, column.metric))
-    return {"text": text, "interval": column.interval(low, high), "best": False}
+    least, most = (getattr(row, f"{column.metric}{end}", math.nan) for end in (LEAST, MOST))
+    return {
+        "text": text,
+        "interval": column.interval(low, high),
+        "range": span(scientific if column.in_powers else column.worded, least, most),
+        "best": False,
+    }

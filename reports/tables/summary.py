@@ -2,7 +2,7 @@
 
 Means over fabrics weigh every fabric alike, as one picture of all of them would. A ratio compares a method with point
 sampling at 2 points on the very fabrics that the method covers; its interval is that of
-`reports.error.ratio`.
+`reports.error.ratio`. Numbers of networks are means over trainings, with their range (`reports.over_seeds`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import pandas as pd
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
+from reports.over_seeds import mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
 
@@ -37,6 +38,9 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
     return (table["method"] == BASELINE[0]) & (table["setting"] == BASELINE[1])
 
 
+@over_seeds(
+    [*_KEYS, "role"], ["mse", "ratio", "zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+)
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.
 
@@ -65,6 +69,15 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
 
 def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the MSE on held-out queries, one row a fabric and one column a method (``method setting``)."""
+    return _by_fabric(mean_over_seeds(records))
+
+
+def fabric_ranges(records: Sequence[Record]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return tables like `fabric_table` of the least and of the most of all trainings."""
+    return _by_fabric(statistic_over_seeds(records, min)), _by_fabric(statistic_over_seeds(records, max))
+
+
+def _by_fabric(records: Sequence[Record]) -> pd.DataFrame:
     table = to_table(records)
     table = table[(table["metric"] == "mse") & (table["scene"] == "queries")]
     labels = (table["method"] + " " + table["setting"]).str.strip()
@@ -83,6 +96,7 @@ def picture_table(records: Sequence[Record]) -> pd.DataFrame:
     return pd.concat([part[part["mse"].notna()] for part in found], ignore_index=True).reindex(columns=columns)
 
 
+@over_seeds([*_KEYS, "role"], ["flicker", "excess_energy"])
 def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return flicker and excess energy: one row a method and role, means over fabrics, and over how many."""
     wide = _wide(records, "plane")
@@ -122,6 +136,9 @@ SCENE_FLOORS: Final[tuple[Metric, ...]] = (
 )
 """Scores of the truth's noise alone on a scene (`reports.measure.scene.image_error`); common to all methods."""
 
+SCENE_CONSTANTS: Final[tuple[Metric, ...]] = ("fallback_share", "frame_time")
+"""Which of `SCENE_METRICS` do not depend on the weights of a network."""
+
 SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
     "mse",
     "mse_relative",
@@ -136,6 +153,7 @@ SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
 """Which of `SCENE_METRICS` have a 95 % interval."""
 
 
+@over_seeds(["scene", *_KEYS], [*(name for name in SCENE_METRICS if name not in SCENE_CONSTANTS), "ratio"])
 def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the benchmark's scenes, one row a scene, method and setting.
 
@@ -165,6 +183,7 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     return wide.rename_axis(columns=None)
 
 
+@over_seeds(_KEYS, ["diffuse", "specular", "colour"])
 def energy_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the worst furnace figures over all fabrics, one row a method: diffuse, specular, colour, fabrics."""
     wide = _wide(records, "queries")
@@ -214,6 +233,7 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     return result
 
 
+@over_seeds(_KEYS, None)
 def other_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the metrics without a table of their own: one row a method, one column a metric, means over Records."""
     table = to_table(records)

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import pandas as pd
 
+from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.pareto_front import front
 
@@ -22,6 +23,8 @@ COLUMNS: Final = (
     "fabrics",
     "ns",
     "error",
+    "error_least",
+    "error_most",
     "bytes_stored",
     "flicker",
     "front",
@@ -42,8 +45,9 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
     -------
     DataFrame
         Columns: role, method, setting, fabrics; ns (median, a query), error (relative RMSE of the colour, mean over
-        fabrics; NaN where it is lost in the noise of the truth), bytes_stored, flicker (distance from the truth's);
-        front (of error and time), front_flicker (of flicker and time), front_bytes (of error and bytes).
+        fabrics; NaN where it is lost in the noise of the truth), error_least and error_most (range over trainings),
+        bytes_stored, flicker (distance from the truth's); front (of error and time), front_flicker (of flicker and
+        time), front_bytes (of error and bytes).
     """
     if errors.empty or timing.empty:
         return pd.DataFrame(columns=[*COLUMNS])
@@ -55,6 +59,7 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
         whole = group[group["fabrics"] == group["fabrics"].max()]
         found = whole.merge(timing, on=["method", "setting"]).merge(moving[[*keys, "flicker"]], on=keys, how="left")
         found = found.rename(columns={"median_ns": "ns", "colour_rrmse": "error"})
+        found = found.rename(columns={f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)})
         found["error"] = found["error"].where(found["error"] > 0)
         found["flicker"] = found["flicker"].astype(float).abs()
         for name, cost, fault in (

@@ -10,9 +10,18 @@ from reports.tables.caveats import caveats, unseen_by_eye
 @pytest.mark.parametrize("footprint", ["major", "geometric_mean"])
 def test_caveats_name_the_footprint(footprint):
     options = BenchOptions(view=ViewOptions(footprint=footprint))
-    text = " ".join(caveats(options, [], pd.DataFrame({"method": ["woven"], "setting": "", "zero_answers": 0.0})))
+    errors = pd.DataFrame({"method": ["woven"], "setting": "", "zero_answers": 0.0, "seeds": 0})
+    text = " ".join(caveats(options, [], errors))
     assert ("longer axis" in text) == (footprint == "major")
     assert "NeuMIP" not in text
+
+
+def test_caveats_name_the_number_of_trainings():
+    errors = pd.DataFrame({"method": ["woven", "selvage", "soft_nodes"], "setting": "", "zero_answers": 0.0})
+    text = " ".join(caveats(BenchOptions(), [], errors.assign(seeds=[1, 3, 0])))
+    assert "One training of woven, with one seed" in text and "soft nodes" not in text
+    assert "Numbers of selvage are means over 3 trainings" in text
+    assert "trainings" not in " ".join(caveats(BenchOptions(), [], errors.assign(seeds=0)))
 
 
 def test_a_measure_that_was_not_installed_is_said_where_scenes_were_measured():

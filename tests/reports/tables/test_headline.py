@@ -5,8 +5,9 @@ import pandas as pd
 from reports.tables.headline import headline, learnt
 
 
-def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8):
-    errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio, "zero_answers": 0.0}
+def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=math.nan, most=math.nan):
+    errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio}
+    errors |= {"seeds": seeds, "ratio_least": least, "ratio_most": most}
     timing = {"method": "woven", "setting": "", "time_ratio": time_ratio}
     return pd.DataFrame([errors]), pd.DataFrame([timing])
 
@@ -16,6 +17,25 @@ def test_headline_admits_a_defeat():
     assert text == (
         "Woven reaches 2.0× higher MSE than point sampling at 2 points on the 8 seen fabrics, at 1.7× its time."
     )
+
+
+def test_one_training_is_called_one():
+    text = headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
+    assert text == (
+        "Woven reaches 9.1× lower MSE than point sampling at 2 points on the 8 seen fabrics, at 0.8× its time "
+        "(one training)."
+    )
+    text = headline("woven", "", *tables(9.13, seeds=1))
+    assert "8 seen fabrics (one training); the paper" in text
+
+
+def test_several_trainings_have_a_range():
+    text = headline("woven", "", *tables(9.13, seeds=3, least=5.7, most=13.21), paper=False)
+    assert "reaches 9.1× lower MSE (5.7× to 13.2× over 3 trainings) than" in text and "one training" not in text
+    worse = headline("woven", "", *tables(0.5, seeds=3, least=0.25, most=0.8), paper=False)
+    assert "2.0× higher MSE (1.2× to 4.0× over 3 trainings)" in worse
+    # All but one are lost in the noise of the truth.
+    assert "trainings" not in headline("woven", "", *tables(0.5, seeds=3))
 
 
 def test_headline_says_only_what_was_measured():

@@ -19,7 +19,7 @@ ERRORS = pd.DataFrame(
         ("fast", "k = 1", "unseen", 1, 0.3),
     ],
     columns=["method", "setting", "role", "fabrics", "colour_rrmse"],
-)
+).assign(colour_rrmse_least=math.nan, colour_rrmse_most=math.nan)
 TIMING = pd.DataFrame(
     [
         ("slow", "", 900.0, 1.0),

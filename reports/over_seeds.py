@@ -1,0 +1,146 @@
+"""Statistics over the trainings of a method: the mean of each number, and the range of a table's numbers.
+
+Records of trained networks name the seed of the training. A table of a benchmark is made of the mean Records; made
+once more of the Records of each training alone, it gives the range from the least to the most. So the range of a ratio
+is that of the trainings' ratios.
+
+The mean of n trainings: value, ends of the interval, points of the curve, and standard error are means. All trainings
+answer the same queries. So their errors share the choice of the queries, and the standard error of the mean lies
+between s / sqrt(n) and s, the mean standard error: s is stated, which is never too small.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Hashable, Sequence
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from reports.record import Record
+
+LEAST: Final = "_least"
+MOST: Final = "_most"
+"""Ends of the names of the columns of a range."""
+
+Table = Callable[[Sequence[Record]], pd.DataFrame]
+
+Statistic = Callable[[Sequence[float]], float]
+
+
+def trainings(records: Sequence[Record]) -> dict[tuple[str, str], int]:
+    """Return the number of trainings of each method and setting; 0 where nothing is trained."""
+    seeds: dict[tuple[str, str], set[int]] = {}
+    for record in records:
+        found = seeds.setdefault((record.method, record.setting), set())
+        if record.provenance.model:
+            found.add(record.provenance.seed)
+    return {key: len(found) for key, found in seeds.items()}
+
+
+def mean_over_seeds(records: Sequence[Record]) -> list[Record]:
+    """Return Records with one for each number that several trainings have, in the order of the first ones."""
+    return statistic_over_seeds(records, lambda values: float(np.mean(values)))
+
+
+def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> list[Record]:
+    """Return Records with one for each number that several trainings have: a statistic of theirs, such as `min`.
+
+    The statistic receives the numbers in the order of the seeds.
+    """
+    groups: dict[Hashable, list[Record]] = {}
+    for index, record in enumerate(records):
+        # Records of no training are never of the same number.
+        groups.setdefault(_subject(record) if record.provenance.model else index, []).append(record)
+    ordered = (sorted(group, key=lambda one: one.provenance.seed) for group in groups.values())
+    return [_condensed(group, statistic) for group in ordered]
+
+
+def first_training(records: Sequence[Record]) -> list[Record]:
+    """Return Records with those of the first training alone of each number that several trainings have."""
+    return statistic_over_seeds(records, lambda values: values[0])
+
+
+def by_seed(records: Sequence[Record]) -> list[list[Record]]:
+    """Return the Records of each seed, together with all those of no training; nothing if there is one seed."""
+    seeds = sorted({record.provenance.seed for record in records if record.provenance.model})
+    if len(seeds) < 2:
+        return []
+    return [[one for one in records if not one.provenance.model or one.provenance.seed == seed] for seed in seeds]
+
+
+def over_seeds(keys: Sequence[str], ranged: Sequence[str] | None) -> Callable[[Table], Table]:
+    """Return a decorator of tables, so that they have means over trainings, their number, and ranges.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Columns that name a row, `method` and `setting` among them.
+    ranged : sequence of str, optional
+        Columns of numbers that get a range; None: all but the keys.
+
+    Notes
+    -----
+    The decorated function adds the columns `seeds`, the number of trainings (0 where nothing is trained), and
+    <name>_least and <name>_most, which are NaN for less than two trainings.
+    """
+
+    def decorated(table: Table) -> Table:
+        @functools.wraps(table)
+        def condensed(records: Sequence[Record]) -> pd.DataFrame:
+            found = table(mean_over_seeds(records))
+            if "method" not in found:
+                return found
+            counts = trainings(records)
+            names = [name for name in found.columns if name not in keys] if ranged is None else list(ranged)
+            found["seeds"] = [counts[key] for key in zip(found["method"], found["setting"], strict=True)]
+            parts = [part for part in map(table, by_seed(records)) if len(part)]
+            if not parts:
+                return found.assign(**{name + end: math.nan for name in names for end in (LEAST, MOST)})
+            groups = pd.concat(parts)[[*keys, *names]].astype(dict.fromkeys(names, float)).groupby([*keys])
+            ends = groups.min().add_suffix(LEAST).join(groups.max().add_suffix(MOST))
+            found = found.merge(ends, on=[*keys], how="left")
+            found.loc[found["seeds"] < 2, list(ends.columns)] = math.nan
+            return found
+
+        return condensed
+
+    return decorated
+
+
+def is_range(column: str) -> bool:
+    """Return whether a column of a table is the number of trainings or an end of a range."""
+    return column == "seeds" or column.endswith((LEAST, MOST))
+
+
+def _subject(record: Record) -> Hashable:
+    """Return what a number is of, whichever training it is measured of."""
+    about = tuple(value for name, value in record.provenance if name not in ("model", "seed"))
+    own = (record.method, record.setting, record.fabric, record.role, record.scene, record.metric, record.threads)
+    return (*own, record.note, *about)
+
+
+def _condensed(group: Sequence[Record], statistic: Statistic) -> Record:
+    """Return one Record for the same number of several trainings."""
+    first = group[0]
+    if len(group) == 1:
+        return first
+
+    def of(values: Sequence[float | None]) -> float | None:
+        known = [value for value in values if value is not None]
+        return statistic(known) if len(known) == len(group) else None
+
+    curves = [dict(one.curve) for one in group]
+    shared = [x for x, _ in first.curve if all(x in curve for curve in curves)]
+    return first.model_copy(
+        update={
+            "value": statistic([one.value for one in group]),
+            "standard_error": of([one.standard_error for one in group]),
+            "low": of([one.low for one in group]),
+            "high": of([one.high for one in group]),
+            "curve": tuple((x, statistic([curve[x] for curve in curves])) for x in shared),
+            "samples": (),
+        }
+    )
