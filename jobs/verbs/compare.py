@@ -29,7 +29,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     from jobs.terminal import Terminal
     from reports.machines import refuse_several
     from reports.record import read_machine, read_records
-    from reports.tables.compare import LEVEL, refuse_other_machine
+    from reports.tables.compare import LEVEL, NO_DIFFERENCE, refuse_other_machine
     from reports.tables.compare import compare as differences
     from reports.tables.machine_load import busy
 
@@ -47,7 +47,7 @@ def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> 
     for sentence in [*unlike, *found.unlike, *busy(first, second)]:
         console.print(f"{sentence}.", soft_wrap=True)
     left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
-    marked = sum(one.result not in ("no difference shown", "not tested") for one in (*found.times, *found.errors))
+    marked = sum(one.result not in NO_DIFFERENCE for one in (*found.times, *found.errors))
     summary = (
         f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
     )
@@ -86,6 +86,7 @@ def _table(title: str, rows: Sequence[Difference]) -> Table:
     """Return differences as a table: subject, A, B, B over A, p-value and result; significant ones are bold."""
     from rich.table import Table
 
+    from reports.tables.compare import NO_DIFFERENCE
     from reports.tables.number_format import display
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
@@ -93,7 +94,7 @@ def _table(title: str, rows: Sequence[Difference]) -> Table:
         table.add_column(name, justify="right" if name in ("A", "B", "B / A", "p") else "left")
     for row in rows:
         p = "" if math.isnan(row.p) else f"{row.p:.2g}" if row.p >= 1e-3 else "< .001"
-        style = "" if row.result in ("no difference shown", "not tested") else "bold"
+        style = "" if row.result in NO_DIFFERENCE else "bold"
         values = [_value(one) for one in (row.a, row.b)]
         method = display(row.a.method, row.a.setting)
         table.add_row(method, _what(row), *values, _number(row.ratio), p, row.result, style=style)

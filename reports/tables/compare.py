@@ -8,6 +8,12 @@ slower than itself, so that two runs of A belong before one of B (how busy the m
 z = (b - a) / sqrt(s_a^2 + s_b^2) with their standard errors; where both were measured on the same queries these are not
 independent, and the test is the stricter for it. All p-values of a comparison are corrected together
 [Holm1979Simple]: the chance that the readings' own scatter marks any difference is at most `LEVEL`.
+
+The error of a network that was trained several times is the mean over trainings (`reports.over_seeds`). A difference
+of such errors counts only if it exceeds both: the interval over queries, by the test above, and the range over
+trainings, the larger of A's and B's. Of equal, normal trainings, three in A and three in B, a difference exceeds the
+range in 5 of 100 comparisons; of two and two in 22, of one and three in 24, of five and five in .2. One training in A
+and one in B have no range: there the test says nothing of other trainings.
 """
 
 from __future__ import annotations
@@ -19,6 +25,7 @@ from typing import Final, Literal
 
 from scipy import stats
 
+from reports.over_seeds import mean_over_seeds, statistic_over_seeds, trainings
 from reports.record import Machine, Metric, Record
 from weaves.errors import BadInput
 
@@ -28,7 +35,10 @@ LEVEL: Final = 0.05
 TIMES: Final[tuple[Metric, ...]] = ("time", "prepare_time", "encode_time")
 """Metrics that are compared by their samples."""
 
-Outcome = Literal["faster", "slower", "lower", "higher", "no difference shown", "not tested"]
+Outcome = Literal["faster", "slower", "lower", "higher", "no difference shown", "within trainings", "not tested"]
+
+NO_DIFFERENCE: Final[tuple[Outcome, ...]] = ("no difference shown", "within trainings", "not tested")
+"""Outcomes that mark no difference."""
 
 _Key = tuple[Metric, str, str, str, int, str]
 
@@ -43,6 +53,8 @@ class Difference:
     """Above 0 if B is the larger: by ranks for times."""
     p: float
     """Probability of a difference at least as large by chance, corrected for all rows; NaN if it cannot be tested."""
+    extent: float = math.nan
+    """Range over trainings, the larger of A's and B's; NaN where neither has several."""
 
     @property
     def ratio(self) -> float:
@@ -56,6 +68,8 @@ class Difference:
             return "not tested"
         if self.p > LEVEL:
             return "no difference shown"
+        if abs(self.b.value - self.a.value) <= self.extent:
+            return "within trainings"
         words: tuple[Outcome, Outcome] = ("faster", "slower") if self.a.metric in TIMES else ("lower", "higher")
         return words[self.sign > 0]
 
@@ -98,18 +112,22 @@ def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
     ----------
     a, b : sequence of Record
         Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times
-        (`TIMES`) and the MSE on held-out queries. Of several that are alike the last counts.
+        (`TIMES`) and the MSE on held-out queries, the mean over trainings. Of several that are alike the last counts.
 
     Raises
     ------
     BadInput
         If they share none.
     """
-    first, second = _comparable(a), _comparable(b)
+    first, second = (_comparable(mean_over_seeds(records)) for records in (a, b))
+    extents = _extents(a, b)
     shared = [key for key in first if key in second]
     if not shared:
         raise BadInput("compare", "", "A and B share no measurement", "times or errors of the same methods are needed")
-    found = [Difference(first[key], second[key], *_test(first[key], second[key])) for key in shared]
+    found = [
+        Difference(first[key], second[key], *_test(first[key], second[key]), extents.get(key, math.nan))
+        for key in shared
+    ]
     adjusted = holm([one.p for one in found])
     found = [replace(one, p=p) for one, p in zip(found, adjusted, strict=True)]
     return Comparison(
@@ -140,6 +158,18 @@ def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
     return {_key(one): one for one in chosen}
 
 
+def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:
+    """Return the range of each number over trainings, the largest of all benchmarks that have several."""
+    found: dict[_Key, float] = {}
+    for records in benchmarks:
+        counts = trainings(records)
+        least, most = (_comparable(statistic_over_seeds(records, ends)) for ends in (min, max))
+        for key, one in most.items():
+            if counts[one.method, one.setting] > 1:
+                found[key] = max(found.get(key, 0.0), one.value - least[key].value)
+    return found
+
+
 def _key(one: Record) -> _Key:
     edit = one.note if one.metric == "encode_time" else ""
     return one.metric, one.method, one.setting, one.fabric, one.threads, edit
@@ -166,6 +196,12 @@ def _unlike(found: Sequence[Difference]) -> list[str]:
         sentences.append("A and B were measured on different data sets")
     if any(one.a.provenance.version != one.b.provenance.version for one in found):
         sentences.append("A and B were measured by different versions of the benchmark")
+    once = [
+        one.a.method for one in found if math.isnan(one.extent) and one.a.provenance.model and one.a.metric not in TIMES
+    ]
+    if once:
+        names = ", ".join(dict.fromkeys(once))
+        sentences.append(f"one training in A and B: another training of {names} may differ by more than is marked here")
     if methods := [one.a.method for one in found if one.a.metric == "time" and one.a.note != one.b.note]:
         sentences.append(f"calls of different sizes were timed: {', '.join(dict.fromkeys(methods))}")
     return sentences
