@@ -17,7 +17,7 @@ import pandas as pd
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
-from reports.over_seeds import mean_over_seeds, over_seeds, statistic_over_seeds
+from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
 
@@ -88,7 +88,11 @@ def _by_fabric(records: Sequence[Record]) -> pd.DataFrame:
 
 
 def picture_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the MSE of the pictures: columns method, setting, fabric, scene, mse, mse_measured, truth_noise."""
+    """Return the MSE of the pictures, which networks make after their first training.
+
+    Columns: method, setting, fabric, scene, mse, mse_measured, truth_noise.
+    """
+    records = first_training(records)
     columns = [*_KEYS, "role", "fabric", "scene", "mse", "mse_measured", "truth_noise"]
     found = [part for part in (_wide(records, scene) for scene in ("sphere", "plane")) if "mse" in part]
     if not found:
