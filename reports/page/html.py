@@ -115,6 +115,8 @@ def _methods(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, A
         "most_trainings": max(trainings(page.records).values(), default=0),
         "errors": method_rows.error_rows(errors, per_material),
         "error_columns": method_rows.ERROR,
+        "over_fabrics": method_rows.over_fabrics_rows(errors),
+        "over_fabrics_columns": method_rows.OVER_FABRICS,
         "by_fabric": method_rows.fabric_rows(tables["errors_by_fabric"], summary.fabric_ranges(page.records)),
         "aliasing": method_rows.aliasing_rows(tables["aliasing"], page.records),
         "energy": method_rows.energy_rows(tables["energy"], errors, timing),

@@ -25,6 +25,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         "Times are those of this machine and of code called from Python, a batch of queries at a time; the paper's are "
         "of a GPU renderer. Compare only ratios within one column.",
         *_trainings(errors),
+        *_unseen(errors),
         _footprint_note(view),
         f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
         f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
@@ -41,7 +42,8 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
     if per_material:
         names = " and ".join(display(name) for name in per_material)
         notes.append(
-            f"{names} is trained on every fabric by itself, so no fabric is unseen; the rows are for comparison."
+            f"{names} is trained on every fabric by itself, so no fabric is unseen; the rows are for comparison. "
+            "Random fabrics are left out."
         )
     return notes
 
@@ -67,6 +69,19 @@ def _trainings(errors: pd.DataFrame) -> list[str]:
             "other runtimes are of the first training."
         )
     return notes
+
+
+def _unseen(errors: pd.DataFrame) -> list[str]:
+    """Return a sentence on the number of unseen fabrics, if any fabric is unseen."""
+    fabrics = max((row.fabrics for row in rows(errors) if row.role == "unseen"), default=0)
+    if fabrics == 1:
+        return ["One fabric is unseen: how much the errors on another would differ was not measured."]
+    if fabrics:
+        return [
+            f"The {fabrics} unseen fabrics are a sample of the ranges of yarns in the recipe, not of the cloth that is "
+            "made. Intervals over fabrics hold for that sample."
+        ]
+    return []
 
 
 def lacking(records: Sequence[Record]) -> list[str]:

@@ -10,6 +10,8 @@ _WORDS: Final = {
     "95 % interval": "Of the MSE, from the spread over queries. It says nothing of other fabrics or other trainings.",
     "[ … ]": "The least and the most over the trainings of a network, which differ in their seed alone; the number "
     "beside it is their mean. × lower is the ratio to the mean MSE.",
+    "( … )": "95 % interval over unseen fabrics of the geometric mean beside it: Student's t interval of the mean "
+    "logarithm. It holds for fabrics drawn at random, as most of them are.",
     "noise": "Mean squared error of the truth in the same colours, as a share of the MSE as measured. The standard "
     "error of every component is a column of the data set; of tabulated answers, which state an error that covers, "
     "the square counts by a third: that is their mean squared error. Components are taken to be uncorrelated.",

@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.over_fabrics import over_unseen
 from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.number_format import display
@@ -20,10 +21,11 @@ from reports.tables.summary import BASELINE, PAPER, rows
 def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
     """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print.
 
-    A mean over trainings has its range; a single training is called one.
+    A mean over trainings has its range; a single training is called one. On several unseen fabrics the ratio is the
+    geometric mean, with its 95 % interval over fabrics.
     """
     found = errors[(errors["method"] == method) & (errors["setting"] == setting) & errors["ratio"].notna()]
-    parts = [(_comparison(row.ratio) + _range(row), _fabrics(row.fabrics, row.role)) for row in rows(found)]
+    parts = [_part(row) for row in rows(found)]
     if not parts:
         return ""
     (first, where), *others = parts
@@ -48,13 +50,29 @@ def _comparison(ratio: float) -> str:
     return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
 
 
-def _range(row: Any) -> str:
+def _part(row: Any) -> tuple[str, str]:
+    """Return the comparison of a ratio, and the fabrics it is of."""
+    where = _fabrics(row.fabrics, row.role)
+    if not over_unseen(row):
+        return _comparison(row.ratio) + _range(row, "ratio"), where
+    low, high = _ends(row.ratio_fabrics, row.ratio_fabrics_low, row.ratio_fabrics_high)
+    where += f" (geometric mean, 95 % interval over fabrics {low}× to {high}×)"
+    return _comparison(row.ratio_fabrics) + _range(row, "ratio_fabrics"), where
+
+
+def _range(row: Any, column: str) -> str:
     """Return the range of a ratio over trainings; empty where there are not several."""
-    least, most = getattr(row, "ratio" + LEAST), getattr(row, "ratio" + MOST)
+    least, most = getattr(row, column + LEAST), getattr(row, column + MOST)
     if not math.isfinite(least):
         return ""
-    ends = (least, most) if row.ratio >= 1 else (1 / most, 1 / least)
-    return f" ({_number(ends[0])}× to {_number(ends[1])}× over {row.seeds} trainings)"
+    low, high = _ends(getattr(row, column), least, most)
+    return f" ({low}× to {high}× over {row.seeds} trainings)"
+
+
+def _ends(ratio: float, low: float, high: float) -> tuple[str, str]:
+    """Return the ends of a ratio's interval; of a ratio below 1 those of its inverse, in rising order."""
+    ends = (low, high) if ratio >= 1 else (1 / high, 1 / low)
+    return _number(ends[0]), _number(ends[1])
 
 
 def _number(value: float) -> str:

@@ -13,6 +13,7 @@ from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import MetricRow, metric_row
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
+from reports.over_fabrics import ERRORS, over_unseen
 from reports.over_seeds import LEAST, MOST, is_range
 from reports.record import TRUTH, Record
 from reports.tables.headline import learnt
@@ -23,6 +24,7 @@ from reports.tables.number_format import (
     fixed,
     grouped,
     interval,
+    interval_of,
     missing,
     percent,
     plain,
@@ -110,15 +112,46 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
     return {role: groups(lines) for role, lines in result.items()}
 
 
-def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) -> dict[str, Any]:
-    """Return the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked.
+OVER_FABRICS: Final = (f"×{NO_BREAK}lower", "MSE", "colour", *ERROR[-4:])
+"""Columns of `over_fabrics_rows` after the method."""
+
+
+def over_fabrics_rows(errors: pd.DataFrame) -> list[Row]:
+    """Return geometric means over several unseen fabrics with their intervals over fabrics, in groups."""
+    lines = []
+    for row in rows(errors):
+        if over_unseen(row):
+            low, high = row.ratio_fabrics_low, row.ratio_fabrics_high
+            ratio: str | Row = {"text": times(row.ratio_fabrics), "range": f"({interval(low, high)})"}
+            if (row.method, row.setting) == BASELINE:
+                ratio = "1"
+            cells = [ratio, *(_over_fabrics(name, row) for name in ERRORS)]
+            lines.append(row_of(row.method, row.setting) | {"cells": cells})
+    return groups(lines)
+
+
+def _over_fabrics(metric: str, row: Any) -> Row:
+    mean, low, high = (getattr(row, f"{metric}_fabrics{end}") for end in ("", "_low", "_high"))
+    return {"text": shown(metric, mean), "range": interval_of(metric, low, high)}
+
+
+def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) -> dict[str, Row]:
+    """Return by role the MSE of every method on every fabric, a column a fabric; the lowest of a column is marked.
 
     Parameters
     ----------
     table, ranges : DataFrame
         From `summary.fabric_table` and `summary.fabric_ranges`.
     """
-    labels = [column for column in table.columns if column not in ("role", "fabric")]
+    found = {}
+    for role in dict.fromkeys(table["role"]):
+        chosen = table["role"] == role
+        found[str(role)] = _fabric_rows(table[chosen], [part[chosen.to_numpy()] for part in ranges])
+    return found
+
+
+def _fabric_rows(table: pd.DataFrame, ranges: Sequence[pd.DataFrame]) -> Row:
+    labels = [column for column in table.columns if column not in ("role", "fabric") and table[column].notna().any()]
     records = table.to_dict("records")
     best = [min((r[label] for label in labels if not missing(r[label])), default=math.nan) for r in records]
     lines = []
@@ -128,8 +161,7 @@ def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) 
         for cell, least, most in zip(cells, *(part[label] for part in ranges), strict=True):
             cell["range"] = span(scientific, least, most) if least < most else ""
         lines.append(row_of(*_split(label)) | {"cells": cells})
-    columns = [plain(str(r["fabric"])) + (" (unseen)" if r["role"] == "unseen" else "") for r in records]
-    return {"columns": columns, "groups": groups(lines)}
+    return {"columns": [plain(str(record["fabric"])) for record in records], "groups": groups(lines)}
 
 
 FRONT: Final = ("ns a query", "error of the colour", "bytes stored")
@@ -283,10 +315,14 @@ def figures_of_merit(
         method, setting = methods[0]
         for row in rows(errors[(errors["method"] == method) & (errors["setting"] == setting)]):
             if not missing(row.ratio):
+                column = "ratio_fabrics" if over_unseen(row) else "ratio"
                 fabrics = "fabric" if row.fabrics == 1 else "fabrics"
                 note = f"MSE of 2 points over that of {display(method, setting)}, {row.fabrics} {row.role} {fabrics}"
-                note += f", {_trainings(row)}" if row.seeds else ""
-                result.append({"value": times(row.ratio), "note": note, "paper": "paper: 4.1×"})
+                if over_unseen(row):
+                    ends = interval(row.ratio_fabrics_low, row.ratio_fabrics_high)
+                    note += f": geometric mean, 95 % interval over fabrics {ends}"
+                note += f", {_trainings(row, column)}" if row.seeds else ""
+                result.append({"value": times(getattr(row, column)), "note": note, "paper": "paper: 4.1×"})
         cost = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
         if len(cost) and not missing(cost.iloc[0]):
             note = f"time of a query of {display(method, setting)} over that of 2 points"
@@ -298,9 +334,9 @@ def figures_of_merit(
     return result
 
 
-def _trainings(row: Any) -> str:
+def _trainings(row: Any, column: str) -> str:
     """Return the number of trainings and the range of the ratio over them."""
-    found = span(times, getattr(row, "ratio" + LEAST), getattr(row, "ratio" + MOST))
+    found = span(times, getattr(row, column + LEAST), getattr(row, column + MOST))
     return " ".join(filter(None, (f"mean of {row.seeds} trainings" if row.seeds > 1 else "one training", found)))
 
 

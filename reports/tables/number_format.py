@@ -120,6 +120,11 @@ def span(worded: Callable[[float], str], low: float, high: float) -> str:
     return f"[{first.removesuffix(unit[0] if unit else '')} … {last}]"
 
 
+def interval_of(metric: str, low: float, high: float) -> str:
+    """Return an interval of a metric: ``(1.2 … 3.4 %)``; empty where there is none."""
+    return span_of(metric, low, high).replace("[", "(").replace("]", ")")
+
+
 def span_of(metric: str, low: float, high: float) -> str:
     """Return the range of a metric over trainings, in its format (`reports.catalogue`)."""
     return span(_FORMATS[metric_row(metric).format], low, high)

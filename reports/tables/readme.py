@@ -12,9 +12,10 @@ from typing import Any, Final
 
 import pandas as pd
 
+from reports.over_fabrics import over_unseen
 from reports.record import Machine, Record
 from reports.tables.markdown import markdown_table
-from reports.tables.number_format import NONE, listed, missing, span, times
+from reports.tables.number_format import NONE, interval, listed, missing, span, times
 from reports.tables.summary import BASELINE, PAPER, error_table, of_baseline, rows, summary_table
 from weaves.errors import BadInput
 
@@ -63,12 +64,12 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             where, "", "lacks errors, flicker or times of two random points", "Records of a whole page are needed"
         )
     table = error_table(records)
-    spans = {(row.method, row.setting, row.role): span(times, row.ratio_least, row.ratio_most) for row in rows(table)}
+    ratios_of = {(row.method, row.setting, row.role): _ratio(row) for row in rows(table)}
     printed, lines = _printed_times(old), []
     numbers: dict[Any, dict[Any, float]] = {key: dict(row) for key, row in found.to_dict("index").items()}
     for key, words in ROWS.items():
         if row := numbers.get(key):
-            ratios = (_ratio(row[f"× lower, {role}"], spans.get((*key, role), "")) for role in ("seen", "unseen"))
+            ratios = (ratios_of.get((*key, role), NONE) for role in ("seen", "unseen"))
             time = kept_time(printed.get(words, NONE), row["× time"])
             lines.append((words, two_digits(row["MSE seen"]), *ratios, three_decimals(row["flicker"]), time))
     held_out = table[of_baseline(table)]
@@ -83,14 +84,27 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             "MSE: mean squared error of the colour on seen fabrics. × lower: the MSE of two points over that of the "
             "method, on seen and on unseen fabrics. Flicker: variance over time beyond that of the truth, over its "
             "squared mean, on all fabrics. × time: of one query on one thread, over that of two points; times within "
-            "a quarter, because no two runs take equally long. \\* Trained on the unseen fabrics too. "
+            "a quarter, because no two runs take equally long. \\* Trained on each fabric that it is measured on. "
+            + _over_fabrics(table)
             + _trainings(table),
         ]
     )
 
 
-def _ratio(value: float, spread: str) -> str:
-    return " ".join(filter(None, (times(value), spread)))
+def _ratio(row: Any) -> str:
+    """Return × lower with its interval over several unseen fabrics, and its range over several trainings."""
+    if not over_unseen(row) or (row.method, row.setting) == BASELINE:
+        return " ".join(filter(None, (times(row.ratio), span(times, row.ratio_least, row.ratio_most))))
+    ends = f"({interval(row.ratio_fabrics_low, row.ratio_fabrics_high)})"
+    trainings = span(times, row.ratio_fabrics_least, row.ratio_fabrics_most)
+    return " ".join(filter(None, (times(row.ratio_fabrics), ends, trainings)))
+
+
+def _over_fabrics(errors: pd.DataFrame) -> str:
+    """Return a sentence on the means over several unseen fabrics; empty where there are none."""
+    if not any(over_unseen(row) for row in rows(errors)):
+        return ""
+    return "On several unseen fabrics: geometric mean, in parentheses its 95 % interval over fabrics. "
 
 
 def _trainings(errors: pd.DataFrame) -> str:

@@ -87,6 +87,9 @@ def _of_methods(records: Sequence[Record]) -> Iterator[str]:
             yield f"### {str(role).capitalize()}: {count}, {part['queries'].max():,} queries"
             lines = [(_name(row), *_error_cells(row)) for row in summary.rows(part)]
             yield markdown_table(("method", "MSE", "× lower", "95 %", "colour"), lines)
+        if over := method_rows.over_fabrics_rows(errors):
+            yield "### Over unseen fabrics: geometric means with their 95 % intervals over fabrics"
+            yield _grouped(method_rows.OVER_FABRICS, over)
         found = [headline(*key, errors, timing, paper=key[0] == "woven") for key in _methods(errors)]
         if sentences := [f"- {sentence}" for sentence in found if sentence]:
             yield "\n".join(sentences)

@@ -17,6 +17,7 @@ import pandas as pd
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
+from reports.over_fabrics import columns_over_fabrics
 from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -39,20 +40,23 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
 
 
 @over_seeds(
-    [*_KEYS, "role"], ["mse", "ratio", "zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+    [*_KEYS, "role"],
+    ["mse", "ratio", "ratio_fabrics", "zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)],
 )
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.
 
     Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
     mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
-    over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics).
+    over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics); geometric means
+    over fabrics with their intervals (`reports.over_fabrics.columns_over_fabrics`).
     """
     wide = _wide(records, "queries")
     result = []
     for (method, setting, role), group in wide.groupby([*_KEYS, "role"], sort=False):
         mse, spread = _mean_error(group)
-        base, base_spread = _mean_error(_baseline(wide, role, set(group["fabric"])))
+        baseline = _baseline(wide, role, set(group["fabric"]))
+        base, base_spread = _mean_error(baseline)
         found = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
         row = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
         row |= {"queries": int(group["count"].sum()), "mse": mse, "standard_error": spread}
@@ -63,6 +67,7 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
         row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
         relative = ["zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
         row |= {name: group[name].mean() if name in group else math.nan for name in relative}
+        row |= columns_over_fabrics(group, baseline)
         result.append(row)
     return pd.DataFrame(result)
 

@@ -10,7 +10,7 @@ from reports.tables.caveats import caveats, unseen_by_eye
 @pytest.mark.parametrize("footprint", ["major", "geometric_mean"])
 def test_caveats_name_the_footprint(footprint):
     options = BenchOptions(view=ViewOptions(footprint=footprint))
-    errors = pd.DataFrame({"method": ["woven"], "setting": "", "zero_answers": 0.0, "seeds": 0})
+    errors = pd.DataFrame({"method": ["woven"], "setting": "", "zero_answers": 0.0, "seeds": 0, "role": "seen"})
     text = " ".join(caveats(options, [], errors))
     assert ("longer axis" in text) == (footprint == "major")
     assert "NeuMIP" not in text
@@ -18,10 +18,18 @@ def test_caveats_name_the_footprint(footprint):
 
 def test_caveats_name_the_number_of_trainings():
     errors = pd.DataFrame({"method": ["woven", "selvage", "soft_nodes"], "setting": "", "zero_answers": 0.0})
+    errors["role"] = "seen"
     text = " ".join(caveats(BenchOptions(), [], errors.assign(seeds=[1, 3, 0])))
     assert "One training of woven, with one seed" in text and "soft nodes" not in text
     assert "Numbers of selvage are means over 3 trainings" in text
     assert "trainings" not in " ".join(caveats(BenchOptions(), [], errors.assign(seeds=0)))
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "One fabric is unseen"), (9, "The 9 unseen fabrics are a sample")])
+def test_caveats_name_the_number_of_unseen_fabrics(count, words):
+    errors = pd.DataFrame({"method": ["woven", "neumip"], "setting": "", "zero_answers": 0.0, "seeds": 0})
+    found = caveats(BenchOptions(), [], errors.assign(role="unseen", fabrics=[count, 1]))
+    assert [text.startswith(words) for text in found].count(True) == 1
 
 
 def test_a_measure_that_was_not_installed_is_said_where_scenes_were_measured():

@@ -1,6 +1,7 @@
 import math
 
 import pandas as pd
+import pytest
 
 from reports.tables.headline import headline, learnt
 
@@ -8,6 +9,7 @@ from reports.tables.headline import headline, learnt
 def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=math.nan, most=math.nan):
     errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio}
     errors |= {"seeds": seeds, "ratio_least": least, "ratio_most": most}
+    errors |= dict.fromkeys(("ratio_fabrics", "ratio_fabrics_low", "ratio_fabrics_high"), math.nan)
     timing = {"method": "woven", "setting": "", "time_ratio": time_ratio}
     return pd.DataFrame([errors]), pd.DataFrame([timing])
 
@@ -36,6 +38,22 @@ def test_several_trainings_have_a_range():
     assert "2.0× higher MSE (1.2× to 4.0× over 3 trainings)" in worse
     # All but one are lost in the noise of the truth.
     assert "trainings" not in headline("woven", "", *tables(0.5, seeds=3))
+
+
+@pytest.mark.parametrize(
+    ("mean", "low", "high", "words"),
+    [
+        (6.2, 3.1, 12.4, "reaches 6.2× lower MSE (5.5× to 7.0× over 3 trainings) than"),
+        (0.5, 0.25, 1.0, "reaches 2.0× higher MSE (0.1× to 0.2× over 3 trainings) than"),
+    ],
+)
+def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low, high, words):
+    errors, timing = tables(100.0, role="unseen", fabrics=9, seeds=3, least=1.0, most=2.0)
+    errors = errors.assign(ratio_fabrics=mean, ratio_fabrics_low=low, ratio_fabrics_high=high)
+    text = headline("woven", "", errors.assign(ratio_fabrics_least=5.5, ratio_fabrics_most=7.0), timing, paper=False)
+    assert words in text
+    ends = "3.1× to 12.4×" if mean > 1 else "1.0× to 4.0×"
+    assert text.endswith(f"on the 9 unseen fabrics (geometric mean, 95 % interval over fabrics {ends}).")
 
 
 def test_headline_says_only_what_was_measured():

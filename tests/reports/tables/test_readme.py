@@ -1,3 +1,5 @@
+import math
+
 import pytest
 
 from reports.record import Machine, Provenance
@@ -34,6 +36,25 @@ def test_rows_hold_the_numbers_of_the_records(records):
         "`woven` has 4.5× lower MSE than two points on seen fabrics, 4.5× on unseen ones, at 4.3× their time" in block
     )
     assert "Recipe `quick`" in block and "1,200 held-out queries of 2 seen and 1 unseen fabrics" in block
+
+
+def test_several_unseen_fabrics_have_an_interval(records):
+    """A second unseen fabric on which woven errs four times as much: 4.5 and 1.125 times lower.
+
+    The geometric mean is 2.25, the interval exp(t_{.975, 1} ln(4) / 2) times less and more, t = 12.7062.
+    """
+    high = 2.25 * math.exp(12.7062 * math.log(4) / 2)
+    found = [one for one in records if one.fabric == "twill_4_4" and one.scene == "queries"]
+    other = [
+        one.model_copy(update={"fabric": "crepe", "value": one.value * (4 if one.method == "woven" else 1)})
+        for one in found
+        if one.method != "neumip"
+    ]
+    block = readme_block([*records, *other], MACHINE, "", "file")
+    assert f"| {ROWS['woven', '']} | 1.7e−4 | 4.5× | 2.2× (0.00034 … {high:,.0f}) | −0.001 | 4.3× |" in block
+    assert "| two random points, exact shadows | 7.5e−4 | 1× | 1× | 0.150 | 1× |" in block
+    assert f"| {ROWS['neumip', '']} | 1.7e−4 | 4.5× | 4.5× |" in block
+    assert "in parentheses its 95 % interval over fabrics" in block
 
 
 def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from reports.record import Provenance, Record
-from reports.tables.method_rows import timing_columns, timing_rows
+from reports.tables.method_rows import over_fabrics_rows, timing_columns, timing_rows
 from reports.tables.summary import (
     aliasing_table,
     energy_table,
@@ -53,6 +53,23 @@ RECORDS = [
 def row(table, **keys):
     (found,) = [r for r in rows(table) if all(getattr(r, key) == value for key, value in keys.items())]
     return found
+
+
+def test_unseen_fabrics_have_geometric_means():
+    """The baseline errs 5 and 8, woven 2 and .8: ratios 2.5 and 10, colour errors sqrt(2) and sqrt(.8)."""
+    more = [*error("woven", "", "crepe", "unseen", 0.8), *error("point_sampled", "k = 2", "crepe", "unseen", 8.0)]
+    table = error_table([*RECORDS, *more])
+    woven = row(table, method="woven", role="unseen")
+    assert woven.fabrics == 2
+    assert woven.ratio == pytest.approx(13.0 / 2.8)
+    assert woven.ratio_fabrics == pytest.approx(5.0)
+    assert woven.mse_fabrics == pytest.approx(math.sqrt(1.6))
+    assert woven.colour_rrmse_fabrics == pytest.approx(1.6**0.25)
+    assert woven.ratio_fabrics_low < 2.5 and woven.ratio_fabrics_high > 10.0
+    groups = over_fabrics_rows(table)
+    assert [group["method"] for group in groups] == ["woven", "point_sampled"]
+    assert groups[0]["rows"][0]["cells"][0]["text"] == "5×"
+    assert groups[1]["rows"][0]["cells"][0] == "1"
 
 
 def test_errors_are_means_over_fabrics():
