@@ -218,7 +218,7 @@ class Dataset:
     fabrics : dict of str to Fabric
         Its fabrics.
     roles : dict of str to list of str
-        Names of the fabrics that are `seen`, of the `population`, and `unseen`.
+        Names of the fabrics that are `seen`, of the `population`, `unseen`, and of the `unseen_population`.
 
     Examples
     --------

@@ -29,7 +29,8 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     Raises
     ------
     BadInput
-        For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population, different physics in
+        For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random unseen
+        fabrics, unless a seen fabric has it), different physics in
         two tables of truth options, models that do not know the queries or the physics of the data set, and the
         estimator `node_table` for cloth or queries that it does not know.
     """

@@ -15,11 +15,11 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     yarns = []
     for family, yarn in (("warp", fabric.warp), ("weft", fabric.weft)):
         numbers = [
-            f"{yarn.bend:g}°",
-            f"{yarn.twist:g}°".replace("-", "−"),
-            f"{yarn.roughness:g}",
-            f"{yarn.relief:g}",
-            f"{yarn.width:g}",
+            f"{yarn.bend:.3g}°",
+            f"{yarn.twist:.3g}°".replace("-", "−"),
+            f"{yarn.roughness:.3g}",
+            f"{yarn.relief:.3g}",
+            f"{yarn.width:.3g}",
         ]
         colours = [hex_colour([EXPOSURE * c for c in rgb]) for rgb in (yarn.diffuse_rgb, yarn.specular_rgb)]
         yarns.append({"family": family, "cells": numbers, "colours": colours})

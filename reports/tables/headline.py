@@ -80,4 +80,4 @@ def _number(value: float) -> str:
 
 
 def _fabrics(count: int, role: str) -> str:
-    return f"the {role} fabric" if count == 1 else f"the {count} {role} fabrics"
+    return f"one {role} fabric" if count == 1 else f"the {count} {role} fabrics"

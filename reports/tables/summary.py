@@ -17,7 +17,7 @@ import pandas as pd
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
-from reports.over_fabrics import columns_over_fabrics
+from reports.over_fabrics import columns_over_fabrics, over_unseen
 from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -273,11 +273,14 @@ def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float
 def summary_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the whole benchmark as one row a method, for the terminal.
 
-    Index: method and setting. Columns, where measured: MSE and ratio to 2 points on seen and unseen fabrics, flicker,
-    nanoseconds a query and their ratio to 2 points, bytes stored.
+    Index: method and setting. Columns, where measured: MSE and ratio to 2 points on seen and unseen fabrics (on several
+    unseen fabrics the geometric mean of the ratio), flicker, nanoseconds a query and their ratio to 2 points, bytes
+    stored.
     """
     parts = []
     errors = error_table(records)
+    if len(errors):
+        errors["ratio"] = [row.ratio_fabrics if over_unseen(row) else row.ratio for row in rows(errors)]
     for role in ("seen", "unseen"):
         part = errors[errors["role"] == role].set_index(_KEYS)[["mse", "ratio"]] if len(errors) else pd.DataFrame()
         if len(part):

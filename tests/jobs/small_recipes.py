@@ -1,6 +1,6 @@
 """Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators.
 
-Of a population the first 32 members are kept.
+Of a population the first 32 members are kept, of an unseen one the first 4.
 """
 
 import tomllib
@@ -15,6 +15,7 @@ from reports.options import BenchOptions
 
 SCALE = 100
 MOST_MEMBERS = 32
+MOST_UNSEEN = 4
 
 
 def write_small(name, folder):
@@ -25,6 +26,8 @@ def write_small(name, folder):
     dataset["rows"] = _scaled(Rows(**dataset["rows"]).model_dump(), least)
     if "population" in dataset:
         dataset["population"]["count"] = min(dataset["population"]["count"], MOST_MEMBERS)
+    if "unseen_population" in dataset:
+        dataset["unseen_population"]["count"] = min(dataset["unseen_population"]["count"], MOST_UNSEEN)
     dataset["shard_rows"] = 4096  # each shard is a task
     content["models"] = [_model(entry, folder) for entry in content["models"]]
     content["bench"] = _bench(content.get("bench", {}))

@@ -12,7 +12,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.run.ledger import Ledger
 from tests.faults.runs import start
-from tests.jobs.small_recipes import MOST_MEMBERS, write_small
+from tests.jobs.small_recipes import MOST_MEMBERS, MOST_UNSEEN, write_small
 
 KILLED_AFTER = 20  # tasks
 
@@ -22,6 +22,7 @@ def test_small_recipes_keep_fabrics_and_models(name, tmp_path):
     small, whole = load_recipe(write_small(name, tmp_path)), load_recipe(name)
     assert (small.seen, small.unseen) == (whole.seen, whole.unseen)
     assert small.population == whole.population[:MOST_MEMBERS]
+    assert small.unseen_population == whole.unseen_population[:MOST_UNSEEN]
     assert [model.options.name for model in small.models] == [model.options.name for model in whole.models]
     assert small.dataset.truth == whole.dataset.truth and small.bench.runtimes == whole.bench.runtimes
     for split, least in (("train", 128), ("population", 64), ("validation", 64), ("test", 128)):

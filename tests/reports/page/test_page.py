@@ -129,7 +129,7 @@ def test_headline_prints_the_papers_comparison(written):
     """Made up: woven errs 1/9 of one point, 2 points 1/2: 4.5 times lower; it costs 3600 ns to their 830."""
     words = written[1].words
     assert (
-        "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics and 4.5× lower MSE on the "
+        "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics and 4.5× lower MSE on one "
         "unseen fabric, at 4.3× its time; the paper reports 4.1× at 0.83× on its own scene and GPU." in words
     )
     assert "NeuMIP is trained on every fabric by itself" in words

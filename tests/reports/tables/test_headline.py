@@ -59,7 +59,7 @@ def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low,
 def test_headline_says_only_what_was_measured():
     assert headline("woven", "", *tables(math.nan, 1.0)) == ""
     assert "its time" not in headline("woven", "", *tables(3.0), paper=False)
-    assert "on the unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
+    assert "on one unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
 
 
 def test_learnt_leaves_points_out():

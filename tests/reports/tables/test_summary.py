@@ -66,6 +66,7 @@ def test_unseen_fabrics_have_geometric_means():
     assert woven.mse_fabrics == pytest.approx(math.sqrt(1.6))
     assert woven.colour_rrmse_fabrics == pytest.approx(1.6**0.25)
     assert woven.ratio_fabrics_low < 2.5 and woven.ratio_fabrics_high > 10.0
+    assert summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
     groups = over_fabrics_rows(table)
     assert [group["method"] for group in groups] == ["woven", "point_sampled"]
     assert groups[0]["rows"][0]["cells"][0]["text"] == "5×"
