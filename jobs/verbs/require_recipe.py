@@ -100,12 +100,12 @@ def write_recipe(
 
 
 def alone(general: Recipe, names: set[str]) -> Recipe:
-    """Return a general recipe with some of its methods only."""
-    return Recipe(**{**vars(general), "models": tuple(m for m in general.models if m.options.name in names)})
+    """Return a general recipe with some of its methods only, each with its first training."""
+    return Recipe(**{**vars(general), "models": tuple(m.single[0] for m in general.models if m.options.name in names)})
 
 
 def effort_of(recipe: Recipe) -> tuple[int, int]:
-    """Return the rows that a recipe generates, and the queries that its trainings use, with repetitions."""
+    """Return the rows that a recipe generates, and the queries of one training of each model, with repetitions."""
     rows = sum(task.rows for task in plan(recipe) if task.stage == "generate")
     learnt = sum(
         model.training.steps * model.training.batch * (len(recipe.seen + recipe.unseen) if model.of_one_material else 1)

@@ -2,7 +2,8 @@
 
 Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
 errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
-alone: the rows that this method learns from and is measured on, and its own training. Seconds depend on what else a
+alone: the rows that this method learns from and is measured on, and its own first training; its errors are means over
+all its trainings. Seconds depend on what else a
 machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
 frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both models in
 the other scenes of the general recipe: a scene's own model answers for its own domain only.
@@ -183,6 +184,7 @@ def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
 
 def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:
     """Return a method's numbers on a scene from a page, and the time of its frame over that of 2 points."""
+    from reports.over_seeds import mean_over_seeds
     from reports.record import OF_A_PAGE, read_records
     from reports.tables.summary import BASELINE
 
@@ -190,7 +192,8 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     path = out / "report" / page / OF_A_PAGE
     if not path.is_file():
         raise BadInput("savings", "recipe", page, f"it has no page in {out / 'report'}; `twillight run {run}` first")
-    here = [record for record in read_records([path]) if record.scene == scene and not record.fabric]
+    records = mean_over_seeds(read_records([path]))
+    here = [record for record in records if record.scene == scene and not record.fabric]
     found = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
     if lacking := [metric for metric in MEASURED if metric not in found]:
         allowed = f"the page of {page} has no {lacking[0]} of {method} there; `twillight run {run}`"

@@ -1,6 +1,6 @@
 """Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators.
 
-Of a population the first 32 members are kept, of an unseen one the first 4.
+Of a population the first 32 members are kept, of an unseen one the first 4, of several trainings two.
 """
 
 import tomllib
@@ -16,6 +16,7 @@ from reports.options import BenchOptions
 SCALE = 100
 MOST_MEMBERS = 32
 MOST_UNSEEN = 4
+MOST_SEEDS = 2
 
 
 def write_small(name, folder):
@@ -46,6 +47,7 @@ def _model(entry, folder):
         return entry | {"recipe": write_small(entry["recipe"], folder).name}
     defaults = {name: field.default for name, field in CLASSES[entry["model"]].model_fields.items()}
     own = defaults | entry
+    entry |= {"seeds": min(entry["seeds"], MOST_SEEDS)} if "seeds" in entry else {}
     least = {"silhouette_rows": 256, "measured_rows": 16, "samples": 2, "fewest_samples": 1}
     entry |= _scaled({key: own[key] for key in least if key in own}, {key: least[key] for key in least if key in own})
     if CLASSES[entry["model"]].learns:

@@ -12,7 +12,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.run.ledger import Ledger
 from tests.faults.runs import start
-from tests.jobs.small_recipes import MOST_MEMBERS, MOST_UNSEEN, write_small
+from tests.jobs.small_recipes import MOST_MEMBERS, MOST_SEEDS, MOST_UNSEEN, write_small
 
 KILLED_AFTER = 20  # tasks
 
@@ -24,6 +24,7 @@ def test_small_recipes_keep_fabrics_and_models(name, tmp_path):
     assert small.population == whole.population[:MOST_MEMBERS]
     assert small.unseen_population == whole.unseen_population[:MOST_UNSEEN]
     assert [model.options.name for model in small.models] == [model.options.name for model in whole.models]
+    assert [min(model.seeds, MOST_SEEDS) for model in whole.models] == [model.seeds for model in small.models]
     assert small.dataset.truth == whole.dataset.truth and small.bench.runtimes == whole.bench.runtimes
     for split, least in (("train", 128), ("population", 64), ("validation", 64), ("test", 128)):
         assert getattr(small.dataset.rows, split) <= max(getattr(whole.dataset.rows, split) // 100, least)
