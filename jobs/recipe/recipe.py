@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
 
 from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.queries import QueryOptions
@@ -26,6 +26,16 @@ from weaves.population import Population
 if TYPE_CHECKING:
     from pipeline.shards.extra_rows import ExtraRows
     from pipeline.shards.manifest import Role, Split
+
+
+MOST_UNSEEN: Final = 1000
+"""Most fabrics of an unseen population: each is measured by every general model."""
+
+
+def _not_too_many(population: Population) -> Population:
+    if population.count > MOST_UNSEEN:
+        raise ValueError(f"count is {population.count:,}, at most {MOST_UNSEEN:,} are allowed")
+    return population
 
 
 class _Section(BaseModel):
@@ -54,7 +64,7 @@ class DatasetOptions(_Section):
     """Fabrics that general models are measured on and never trained on."""
     population: Population = Population()
     """Random fabrics, only trained on."""
-    unseen_population: Population = Population()
+    unseen_population: Annotated[Population, AfterValidator(_not_too_many)] = Population()
     """Random fabrics that general models are measured on, on held-out queries, and never trained on.
 
     No draft of it is in the population, unless a seen fabric has it too. No design may be chosen by what is measured

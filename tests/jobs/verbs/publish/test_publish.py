@@ -40,6 +40,10 @@ test = 64
 [dataset.population]
 count = 3
 exclude = ["twill 4/4"]
+[dataset.unseen_population]
+count = 2
+families = ["irregular", "large_satin"]
+balanced = true
 [[models]]
 model = "woven"
 {more}
@@ -52,6 +56,7 @@ ROWS = {
     ("seen", "test"): 128,
     ("population", "train"): 288,
     ("unseen", "test"): 64,
+    ("unseen_population", "test"): 128,
 }
 
 
@@ -89,7 +94,13 @@ def test_the_folder_holds_what_it_should_and_its_hashes(published):
     for file, entry in listed.items():
         assert entry["sha256"] == hashlib.sha256(found[file]).hexdigest() and entry["bytes"] == len(found[file])
     assert {"README.md", "croissant.json", "CITATION.cff", "recipe.toml", "load.py"} < listed.keys()
-    assert {"fabrics/denim.toml", "fabrics/own.toml", "fabrics/twill_4_4.toml", "population.toml"} < listed.keys()
+    assert {
+        "fabrics/denim.toml",
+        "fabrics/own.toml",
+        "fabrics/twill_4_4.toml",
+        "population.toml",
+        "unseen_population.toml",
+    } < listed.keys()
     rows = {}
     for entry in manifest["files"]:
         if "role" in entry:
@@ -163,7 +174,8 @@ def test_duckdb_reads_it(published):
         f"SELECT fabric, count(*), avg(diffuse_warp) FROM '{published}/data/*/test-*.parquet' GROUP BY 1"
     )
     rows = {name: (count, round(mean, 6)) for name, count, mean in found.fetchall()}
-    assert rows == {"denim": (64, 0.1), "own": (64, 0.1), "twill_4_4": (64, 0.1)}
+    names = ("denim", "own", "twill_4_4", "unseen_0_irregular", "unseen_1_large_satin")
+    assert rows == dict.fromkeys(names, (64, 0.1))
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the libraries that it uses
@@ -225,7 +237,7 @@ def test_the_same_data_set_gives_the_same_bytes(published, dataset, tmp_path):
 def test_many_fabrics_share_files(published, dataset, tmp_path, monkeypatch):
     monkeypatch.setattr("jobs.verbs.publish.contents.MOST_FILES", 4)
     assert main(["publish", str(dataset), "--to", str(tmp_path / "few"), "--licence", "CC-BY-4.0"]) == 0
-    assert len(list((tmp_path / "few").rglob("*.parquet"))) == 5 < len(list(published.rglob("*.parquet")))
+    assert len(list((tmp_path / "few").rglob("*.parquet"))) == 6 < len(list(published.rglob("*.parquet")))
     assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/few/data/*/*.parquet'").fetchall() == [(sum(ROWS.values()),)]
 
 
