@@ -36,8 +36,8 @@ def alt_texts(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
         + _fronts(tradeoff, "front"),
         "error-against-bytes": "Curves of the relative RMSE of the colour over the bytes stored for one fabric, both "
         "logarithmic." + _fronts(tradeoff, "front_bytes"),
-        "errors": "Mean squared error of every method with its 95 % interval, and of every fabric as a faint mark."
-        + _by_role(errors, "mse", scientific),
+        "errors": "Mean squared error of every method with its 95 % interval, and of every fabric as a faint mark; "
+        "a broad bar is the range over trainings." + _by_role(errors, "mse", scientific),
         "error-by-size": "Curves of the relative RMSE over the time of a query, a column for each size of the "
         "footprint; colour above, specular part below." + _ends(by_size, "colour", percent),
         "scenes": "MSE, HDR-FLIP and distance of the flicker over the time of a frame, a column for each scene."

@@ -121,8 +121,9 @@ def over_fabrics_rows(errors: pd.DataFrame) -> list[Row]:
     lines = []
     for row in rows(errors):
         if over_unseen(row):
-            low, high = row.ratio_fabrics_low, row.ratio_fabrics_high
-            ratio: str | Row = {"text": times(row.ratio_fabrics), "range": f"({interval(low, high)})"}
+            ends = f"({interval(row.ratio_fabrics_low, row.ratio_fabrics_high)})"
+            trainings = span(times, row.ratio_fabrics_least, row.ratio_fabrics_most)
+            ratio: str | Row = {"text": times(row.ratio_fabrics), "range": f"{ends} {trainings}".strip()}
             if (row.method, row.setting) == BASELINE:
                 ratio = "1"
             cells = [ratio, *(_over_fabrics(name, row) for name in ERRORS)]
@@ -131,8 +132,10 @@ def over_fabrics_rows(errors: pd.DataFrame) -> list[Row]:
 
 
 def _over_fabrics(metric: str, row: Any) -> Row:
-    mean, low, high = (getattr(row, f"{metric}_fabrics{end}") for end in ("", "_low", "_high"))
-    return {"text": shown(metric, mean), "range": interval_of(metric, low, high)}
+    """Return a mean over fabrics as a cell, with its interval over fabrics and its range over trainings."""
+    mean, *ends = (getattr(row, f"{metric}_fabrics{end}") for end in ("", "_low", "_high"))
+    trainings = span_of(metric, *(getattr(row, f"{metric}_fabrics{end}") for end in (LEAST, MOST)))
+    return {"text": shown(metric, mean), "range": f"{interval_of(metric, *ends)} {trainings}".strip()}
 
 
 def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) -> dict[str, Row]:

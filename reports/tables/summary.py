@@ -17,7 +17,7 @@ import pandas as pd
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
-from reports.over_fabrics import columns_over_fabrics, over_unseen
+from reports.over_fabrics import ERRORS, columns_over_fabrics, over_unseen
 from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -41,7 +41,7 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
 
 @over_seeds(
     [*_KEYS, "role"],
-    ["mse", "ratio", "ratio_fabrics", "zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)],
+    ["ratio", *ERRORS, "zero_answers", *(f"{name}_fabrics" for name in ("ratio", *ERRORS))],
 )
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.

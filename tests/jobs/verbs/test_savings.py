@@ -22,7 +22,7 @@ from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.measure.pictures import write_picture
 from reports.page.files import write_files
-from reports.record import OF_A_PAGE, Record, this_machine, write_records
+from reports.record import OF_A_PAGE, Provenance, Record, read_records, this_machine, write_records
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -147,6 +147,22 @@ def test_a_model_of_many_fabrics_is_trained_once(runs):
     rows = by_quantity(both(runs, "woven", effort=0.5))
     assert (rows["queries learnt from"].general.value, rows["queries learnt from"].narrow.value) == (3200, 1600)
     assert (rows["training"].general.value, rows["training"].narrow.value) == (2.0, 0.5)
+
+
+def test_of_several_trainings_one_is_charged(runs):
+    """The errors are means over all of them."""
+    runs.general.write_text(GENERAL.replace('model = "woven"\n', 'model = "woven"\nseeds = 3\n'))
+    both(runs, "woven", effort=0.5)
+    page = runs.out / "report" / "wide" / OF_A_PAGE
+    trained = [
+        one.model_copy(update={"value": factor * one.value, "provenance": Provenance(model="net", seed=factor)})
+        for one in read_records([page])
+        for factor in ((1, 2, 3) if one.metric == "mse" else (1,))
+    ]
+    write_records(page, trained, this_machine(1))
+    rows = by_quantity(runs)
+    assert rows["queries learnt from"].general.value == 3200 and rows["training"].general.value == 2.0
+    assert rows["mse"].general.value == pytest.approx(8e-4)
 
 
 def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):

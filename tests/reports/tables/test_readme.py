@@ -57,6 +57,17 @@ def test_several_unseen_fabrics_have_an_interval(records):
     assert "in parentheses its 95 % interval over fabrics" in block
 
 
+def test_several_trainings_have_their_mean_and_range(three_trainings):
+    named = [
+        one.model_copy(update={"provenance": one.provenance.model_copy(update={"recipe": "quick"})})
+        for one in three_trainings
+    ]
+    block = readme_block(named, MACHINE, "", "file")
+    assert f"| {ROWS['woven', '']} | 3.3e−4 | 2.2× [1.5 … 4.5×] | 2.2× [1.5 … 4.5×] | −0.002 | 4.3× |" in block
+    assert f"| {ROWS['neumip', '']} | 1.7e−4 | 4.5× | 4.5× |" in block
+    assert "Networks: means over 1 and 3 trainings, in brackets the least and the most of them." in block
+
+
 def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):
     old = readme_block(records, MACHINE, "", "file")
     assert readme_block(slower(records, "woven", 1.2), MACHINE, old, "file") == old

@@ -21,6 +21,15 @@ def test_the_file_says_where_its_numbers_come_from(made_up):
     assert "## Scenes" not in page, "what was not measured has no section"
 
 
+def test_numbers_of_several_trainings_have_their_range(three_trainings):
+    about = {"recipe": "standard"}
+    named = [r.model_copy(update={"provenance": r.provenance.model_copy(update=about)}) for r in three_trainings]
+    page = results_page(named, MACHINE, "file")
+    assert "| woven | 3.33e−4 [1.67 … 5.00]e−4 | 2.2× [1.5 … 4.5×] |" in page
+    assert "means over 3 trainings with different seeds, in brackets the least and the most" in page
+    assert "| woven | seen | −0.002 [-0.003 … −0.001] |".replace("-", "−") in page
+
+
 def test_without_two_random_points_there_are_no_ratios(made_up):
     named = Provenance(recipe="standard")
     others = [r.model_copy(update={"provenance": named}) for r in made_up if r.method != "point_sampled"]

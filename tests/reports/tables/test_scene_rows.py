@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.record import Record
+from reports.record import Provenance, Record
 from reports.tables.scene_rows import scene_columns, scene_rows
 from reports.tables.summary import scene_table
 
@@ -22,6 +22,24 @@ RECORDS = [
     *measured("woven", flicker=(-0.002, -0.0021, 0.00035), frame_time=12.5, truth_noise=1e-5, psnr_floor=40.0),
     *measured("point_sampled", "k = 2", mse=(8e-3, 7e-3, 1.2e-2), frame_time=5.0, truth_noise=1e-5, psnr_floor=40.0),
 ]
+
+
+def test_a_scene_has_the_range_over_trainings_beside_its_interval():
+    several = [
+        one.model_copy(update={"value": factor * one.value, "provenance": Provenance(model="net", seed=factor)})
+        for one in RECORDS[:4]
+        for factor in (1, 2, 3)
+        if one.metric in ("mse", "psnr", "colour_rrmse", "flicker")
+    ]
+    table = scene_table([*several, *RECORDS[4:]])
+    woven, points = table.to_dict("records")
+    assert (woven["seeds"], woven["mse"], woven["ratio"], woven["frame_time"]) == pytest.approx((3, 4e-3, 2.0, 12.5))
+    titles = [column.title for column in scene_columns(table)]
+    (shown, points) = (group["rows"][0]["cells"] for group in scene_rows(table)["attic"]["groups"])
+    ranges = {title: cell["range"] for title, cell in zip(titles, shown, strict=True)}
+    assert ranges["MSE"] == "[2.00 … 6.00]e−3" and ranges["PSNR, dB"] == "[31.2 … 93.8]"
+    assert ranges["colour"] == "[0 … 0]" and ranges["ms a frame"] == "" and ranges["flicker"] == "[−6.00 … −2.00]e−3"
+    assert not any(cell["range"] for cell in points)
 
 
 @pytest.fixture
