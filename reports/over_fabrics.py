@@ -1,7 +1,8 @@
 """Means of errors over fabrics and their intervals.
 
 Unseen fabrics are a sample: others give other errors. The errors of a method on two fabrics differ by a factor, so the
-mean is that of their logarithms. Named unseen fabrics count like random ones.
+mean is that of their logarithms. Named unseen fabrics count like random ones. Of several trainings the geometric mean
+is taken too, of the means and of the ends of their intervals: an interval that is never too narrow.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ from reports.record import Metric
 
 ERRORS: Final[tuple[Metric, ...]] = ("mse", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS))
 """Metrics on held-out queries that have a mean over fabrics."""
+
+
+OVER_FABRICS: Final = tuple(f"{name}_fabrics" for name in ("ratio", *ERRORS))
+"""Columns of `columns_over_fabrics` that are means."""
 
 
 class OverFabrics(NamedTuple):

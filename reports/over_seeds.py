@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Hashable, Sequence
-from typing import Final
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -27,7 +28,8 @@ MOST: Final = "_most"
 
 Table = Callable[[Sequence[Record]], pd.DataFrame]
 
-Statistic = Callable[[Sequence[float]], float]
+Statistic = Callable[[Any], float]
+"""Function of the numbers of the trainings."""
 
 
 def trainings(records: Sequence[Record]) -> dict[tuple[str, str], int]:
@@ -71,7 +73,9 @@ def by_seed(records: Sequence[Record]) -> list[list[Record]]:
     return [[one for one in records if not one.provenance.model or one.provenance.seed == seed] for seed in seeds]
 
 
-def over_seeds(keys: Sequence[str], ranged: Sequence[str] | None) -> Callable[[Table], Table]:
+def over_seeds(
+    keys: Sequence[str], ranged: Sequence[str] | None, means: Mapping[str, Statistic] = MappingProxyType({})
+) -> Callable[[Table], Table]:
     """Return a decorator of tables, so that they have means over trainings, their number, and ranges.
 
     Parameters
@@ -80,6 +84,9 @@ def over_seeds(keys: Sequence[str], ranged: Sequence[str] | None) -> Callable[[T
         Columns that name a row, `method` and `setting` among them.
     ranged : sequence of str, optional
         Columns of numbers that get a range; None: all but the keys.
+    means : mapping
+        Columns that are no linear function of errors, such as a maximum over fabrics: their number is not that of the
+        mean errors, which may lie outside the range, but this mean of the numbers of the trainings.
 
     Notes
     -----
@@ -99,10 +106,14 @@ def over_seeds(keys: Sequence[str], ranged: Sequence[str] | None) -> Callable[[T
             parts = [part for part in map(table, by_seed(records)) if len(part)]
             if not parts:
                 return found.assign(**{name + end: math.nan for name in names for end in (LEAST, MOST)})
-            groups = pd.concat(parts)[[*keys, *names]].astype(dict.fromkeys(names, float)).groupby([*keys])
-            ends = groups.min().add_suffix(LEAST).join(groups.max().add_suffix(MOST))
+            every = pd.concat(parts).astype(dict.fromkeys((*names, *means), float)).groupby([*keys])
+            ends = every[names].min().add_suffix(LEAST).join(every[names].max().add_suffix(MOST))
             found = found.merge(ends, on=[*keys], how="left")
-            found.loc[found["seeds"] < 2, list(ends.columns)] = math.nan
+            several = found["seeds"] > 1
+            found.loc[~several, list(ends.columns)] = math.nan
+            for name, mean in means.items():
+                of_trainings = every[name].agg(mean).reindex(pd.MultiIndex.from_frame(found[[*keys]]))
+                found[name] = found[name].where(~several, of_trainings.to_numpy())
             return found
 
         return condensed

@@ -76,8 +76,10 @@ def _metric(metric: str, row: Any) -> str | Row:
 
 
 def plain_text(cell: str | Row) -> str:
-    """Return a cell as text, with its range."""
-    return cell if isinstance(cell, str) else " ".join(filter(None, (cell["text"], cell.get("range", ""))))
+    """Return a cell as text, with its interval and its range."""
+    if isinstance(cell, str):
+        return cell
+    return " ".join(filter(None, (cell["text"], cell.get("interval", ""), cell.get("range", ""))))
 
 
 ERROR: Final = (
@@ -123,7 +125,7 @@ def over_fabrics_rows(errors: pd.DataFrame) -> list[Row]:
         if over_unseen(row):
             ends = f"({interval(row.ratio_fabrics_low, row.ratio_fabrics_high)})"
             trainings = span(times, row.ratio_fabrics_least, row.ratio_fabrics_most)
-            ratio: str | Row = {"text": times(row.ratio_fabrics), "range": f"{ends} {trainings}".strip()}
+            ratio: str | Row = {"text": times(row.ratio_fabrics), "interval": ends, "range": trainings}
             if (row.method, row.setting) == BASELINE:
                 ratio = "1"
             cells = [ratio, *(_over_fabrics(name, row) for name in ERRORS)]
@@ -135,7 +137,7 @@ def _over_fabrics(metric: str, row: Any) -> Row:
     """Return a mean over fabrics as a cell, with its interval over fabrics and its range over trainings."""
     mean, *ends = (getattr(row, f"{metric}_fabrics{end}") for end in ("", "_low", "_high"))
     trainings = span_of(metric, *(getattr(row, f"{metric}_fabrics{end}") for end in (LEAST, MOST)))
-    return {"text": shown(metric, mean), "range": f"{interval_of(metric, *ends)} {trainings}".strip()}
+    return {"text": shown(metric, mean), "interval": interval_of(metric, *ends), "range": trainings}
 
 
 def fabric_rows(table: pd.DataFrame, ranges: tuple[pd.DataFrame, pd.DataFrame]) -> dict[str, Row]:

@@ -148,7 +148,7 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
     yield "The last row is what the noise of the truth alone scores."
     for scene, found in scene_rows.scene_rows(table).items():
         yield f"### {plain(scene).capitalize()}"
-        lines = [(row["label"], *_texts(row["cells"])) for group in found["groups"] for row in group["rows"]]
+        lines = [(row["label"], *_texts(_narrow(row["cells"]))) for group in found["groups"] for row in group["rows"]]
         yield markdown_table(("method", *columns), [*lines, ("noise of the truth", *found["noise"])])
 
 
@@ -220,6 +220,11 @@ def _grouped(columns: Sequence[str], groups: Sequence[Any]) -> str:
     """Return a table from the page's groups of rows."""
     lines = [(row["label"], *_texts(row["cells"])) for group in groups for row in group["rows"]]
     return markdown_table(("method", *columns), lines)
+
+
+def _narrow(cells: Sequence[Any]) -> list[Any]:
+    """Return cells without their intervals, which the page has: a table of so many columns has no place for them."""
+    return [cell | {"interval": ""} for cell in cells]
 
 
 def _texts(found: Sequence[Any]) -> list[str]:

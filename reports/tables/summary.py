@@ -13,11 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
-from reports.over_fabrics import ERRORS, columns_over_fabrics, over_unseen
+from reports.over_fabrics import ERRORS, OVER_FABRICS, columns_over_fabrics, over_unseen
 from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 from reports.tables.pareto_front import front
@@ -33,6 +34,8 @@ FRAME: Final = 1920 * 1080
 
 _KEYS: Final = ["method", "setting"]
 
+_ALBEDOS: Final = ["diffuse", "specular", "colour"]  # columns of `energy_table`
+
 
 def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
     """Return which rows of a table with `method` and `setting` are the baseline's."""
@@ -41,7 +44,8 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
 
 @over_seeds(
     [*_KEYS, "role"],
-    ["ratio", *ERRORS, "zero_answers", *(f"{name}_fabrics" for name in ("ratio", *ERRORS))],
+    ["ratio", *ERRORS, "zero_answers", *OVER_FABRICS],
+    {f"{name}{end}": stats.gmean for name in OVER_FABRICS for end in ("", "_low", "_high")},
 )
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.
@@ -49,7 +53,7 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
     Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
     mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
     over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics); geometric means
-    over fabrics with their intervals (`reports.over_fabrics.columns_over_fabrics`).
+    over fabrics, and over trainings, with their intervals (`reports.over_fabrics.columns_over_fabrics`).
     """
     wide = _wide(records, "queries")
     result = []
@@ -192,7 +196,7 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     return wide.rename_axis(columns=None)
 
 
-@over_seeds(_KEYS, ["diffuse", "specular", "colour"])
+@over_seeds(_KEYS, _ALBEDOS, dict.fromkeys(_ALBEDOS, np.mean))
 def energy_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the worst furnace figures over all fabrics, one row a method: diffuse, specular, colour, fabrics."""
     wide = _wide(records, "queries")
@@ -200,7 +204,7 @@ def energy_table(records: Sequence[Record]) -> pd.DataFrame:
     if not names:
         return pd.DataFrame(columns=[*_KEYS, "diffuse", "specular", "colour", "fabrics"])
     groups = wide[wide[names[0]].notna()].groupby(_KEYS, sort=False)
-    worst = {name: (f"furnace_{name}", "max") for name in ("diffuse", "specular", "colour")}
+    worst = {name: (f"furnace_{name}", "max") for name in _ALBEDOS}
     return groups.agg(**worst, fabrics=("fabric", "size")).reset_index()
 
 

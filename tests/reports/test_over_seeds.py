@@ -79,6 +79,23 @@ def test_a_table_is_that_of_means_with_the_range_of_the_trainings():
     assert [name for name in table.columns if is_range(name)] == ["seeds", "ratio_least", "ratio_most"]
 
 
+@over_seeds(["method", "setting"], ["worst"], {"worst": max})
+def worst(records):
+    """The largest value of each method over fabrics."""
+    values = {one.method: [r.value for r in records if r.method == one.method] for one in records}
+    lines = [(method, "", max(found)) for method, found in values.items()]
+    return pd.DataFrame(lines, columns=["method", "setting", "worst"])
+
+
+def test_a_number_that_is_not_linear_has_a_mean_of_its_own():
+    """The worst of two fabrics is 5 in either training; that of the mean errors would be 3."""
+    errors = {("denim", 0): 5.0, ("denim", 1): 1.0, ("basket", 0): 1.0, ("basket", 1): 5.0}
+    records = [trained("a", seed, fabric=fabric, value=value) for (fabric, seed), value in errors.items()]
+    table = worst([*records, Record(method="points", fabric="denim", value=0.5)]).set_index("method")
+    assert table.loc["a", ["worst", "worst_least", "worst_most"]].tolist() == [5.0, 5.0, 5.0]
+    assert table["worst"]["points"] == 0.5
+
+
 def test_one_training_changes_no_number_of_a_table():
     table = ratios(RECORDS[4:])
     assert table["ratio"].tolist() == [1.0, 1.0] and table["ratio_least"].isna().all()

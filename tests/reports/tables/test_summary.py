@@ -211,6 +211,25 @@ def test_trained_numbers_are_means_and_have_ranges():
     assert summary_table(records).loc[("woven", ""), "× lower, seen"] == pytest.approx(2.0)
 
 
+def test_means_over_fabrics_and_albedos_lie_within_the_range_of_the_trainings():
+    """Ratios of 2, 32 and 32, 2 on two fabrics have a geometric mean of 8 in both trainings, not that of 17 and 17."""
+    records = error("point_sampled", "k = 2", "denim", "unseen", 64.0)
+    records += error("point_sampled", "k = 2", "basket", "unseen", 64.0)
+    for seed, errors in enumerate(((2.0, 32.0), (32.0, 2.0))):
+        about = {"provenance": Provenance(model="net", seed=seed)}
+        for fabric, value in zip(("denim", "basket"), errors, strict=True):
+            found = error("net", "", fabric, "unseen", value)
+            found.append(found[0].of("furnace_diffuse", value, 9))
+            found += [found[0].of(f"furnace_{name}", 0.5, 9) for name in ("specular", "colour")]
+            records += [one.model_copy(update=about) for one in found]
+    net = row(error_table(records), method="net")
+    names = ["ratio_fabrics", "ratio_fabrics_least", "ratio_fabrics_most", "mse_fabrics"]
+    assert [getattr(net, name) for name in names] == pytest.approx([8.0] * 4)
+    assert net.ratio == pytest.approx(64 / 17)
+    albedo = row(energy_table(records), method="net")
+    assert (albedo.diffuse, albedo.diffuse_least, albedo.diffuse_most) == (32.0, 32.0, 32.0)
+
+
 def test_pictures_are_of_the_first_training():
     records = seeded(RECORDS, "woven", (0, 1), (1.0, 2.0))
     assert picture_table(records).equals(picture_table(RECORDS))
