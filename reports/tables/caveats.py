@@ -43,7 +43,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         names = " and ".join(display(name) for name in per_material)
         notes.append(
             f"{names} is trained on every fabric by itself, so no fabric is unseen; the rows are for comparison. "
-            "Random fabrics are left out."
+            "Random unseen fabrics, where there are any, are left out."
         )
     return notes
 
