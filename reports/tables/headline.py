@@ -76,7 +76,7 @@ def _ends(ratio: float, low: float, high: float) -> tuple[str, str]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.1f}" if value < 100 else f"{value:,.0f}"
+    return f"{value:.2g}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:,.0f}"
 
 
 def _fabrics(count: int, role: str) -> str:

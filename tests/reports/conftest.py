@@ -105,6 +105,27 @@ def dataset(tmp_path_factory):
     return manifest, folder
 
 
+def with_random_unseen(records):
+    """Return Records with those of a second unseen fabric, held-out queries alone; woven has four times its MSE."""
+    found = [one for one in records if one.fabric == "twill_4_4" and one.scene == "queries"]
+    return records + [
+        one.model_copy(
+            update={
+                "fabric": "unseen_0_irregular",
+                "value": one.value * (4 if (one.method, one.metric) == ("woven", "mse") else 1),
+            }
+        )
+        for one in found
+        if one.method != "neumip"
+    ]
+
+
+@pytest.fixture(scope="session")
+def two_unseen(made_up):
+    """Records of a benchmark with two unseen fabrics, of which neumip knows one."""
+    return with_random_unseen(made_up)
+
+
 METHODS = [("woven", ""), ("neumip", ""), *(("point_sampled", f"k = {k}") for k in (1, 2, 4, 16, 64))]
 
 

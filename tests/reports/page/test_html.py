@@ -108,6 +108,18 @@ def test_several_trainings_have_a_mean_and_a_range(text, three_trainings):
     assert "trainings" not in once.partition("Definitions of the columns")[0]
 
 
+def test_each_unseen_fabric_is_shown_and_the_interval_over_them(text, two_unseen):
+    """Woven has 4.5 and 1.125 times lower MSE: geometric mean 2.25, in an interval of t = 12.7 and one degree."""
+    said = " ".join(re.sub("<[^>]+>", " ", page_of(two_unseen)).split())
+    assert "2.2× lower MSE on the 2 unseen fabrics (geometric mean, 95 % interval over fabrics 0.00034× to 15," in said
+    assert "Means over unseen fabrics, with their 95 % intervals over fabrics" in said
+    table = said.partition("MSE of every unseen fabric")[2]
+    assert "twill 4/4 unseen 0 irregular" in table.partition("woven")[0]
+    assert table.partition("NeuMIP")[2].split()[1] == "–"
+    alone = " ".join(re.sub("<[^>]+>", " ", text).split())
+    assert "Means over unseen fabrics" not in alone and "on one unseen fabric" in alone
+
+
 @pytest.fixture(scope="module")
 def page(text):
     return Reader(text)

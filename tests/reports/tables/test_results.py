@@ -30,6 +30,14 @@ def test_numbers_of_several_trainings_have_their_range(three_trainings):
     assert "| woven | seen | −0.002 [-0.003 … −0.001] |".replace("-", "−") in page
 
 
+def test_several_unseen_fabrics_have_an_interval(two_unseen):
+    named = [r.model_copy(update={"provenance": Provenance(recipe="standard")}) for r in two_unseen]
+    page = results_page(named, MACHINE, "file")
+    section = page.partition("### Over unseen fabrics: geometric means")[2].partition("##")[0]
+    table = "".join(line for line in section.splitlines() if line.startswith("|"))
+    assert "| woven | 2.2× (0.00034 … 15," in table and "NeuMIP" not in table
+
+
 def test_without_two_random_points_there_are_no_ratios(made_up):
     named = Provenance(recipe="standard")
     others = [r.model_copy(update={"provenance": named}) for r in made_up if r.method != "point_sampled"]
