@@ -335,3 +335,18 @@ def test_a_general_model_must_know_yarns_like_those_unseen(asks, files):
     files.recipe = files.recipe.replace('unseen = ["twill_4_4"]', 'unseen = ["voile"]').replace("twill 4/4", "plain")
     with pytest.raises(BadInput, match="woven_sheer was trained on"):
         asks(GENERAL.replace('"organza"]', '"crepe"]'), SHEER, "sheer")
+
+
+@pytest.mark.parametrize(
+    ("family", "words"),
+    [
+        ("plain", "trained there on organza, of the draft of unseen_0_plain, unseen here"),
+        ("irregular", "unseen_0_irregular: .*: the model woven_sheer was trained on"),
+    ],
+)
+def test_random_unseen_drafts_must_be_new_to_a_general_model_and_their_yarns_known(asks, files, family, words):
+    """The trainer knows organza, which is a plain weave, and yarns of relief 1 alone."""
+    unseen = f'[dataset.unseen_population]\ncount = 1\nfamilies = ["{family}"]\n\n[dataset.queries]'
+    files.recipe = files.recipe.replace("[dataset.queries]", unseen).replace('["twill 4/4"]', '["twill 4/4", "plain"]')
+    with pytest.raises(BadInput, match=words):
+        asks(GENERAL, SHEER, "sheer")
