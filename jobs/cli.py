@@ -350,7 +350,10 @@ def compare(
     recipe: Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")] = "",
     other_machine: Annotated[bool, Parameter(help="Allow measurements of different machines.")] = False,
 ) -> None:
-    """Compare two benchmarks and mark significant differences."""
+    """Compare two benchmarks and mark significant differences.
+
+    An error differs if it exceeds the interval over queries and the range over trainings.
+    """
     from jobs.verbs.compare import compare as compared
 
     compared(a, b, recipe, other_machine)

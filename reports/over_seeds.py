@@ -106,14 +106,14 @@ def over_seeds(
             parts = [part for part in map(table, by_seed(records)) if len(part)]
             if not parts:
                 return found.assign(**{name + end: math.nan for name in names for end in (LEAST, MOST)})
-            every = pd.concat(parts).astype(dict.fromkeys((*names, *means), float)).groupby([*keys])
+            lines = pd.concat(parts).astype(dict.fromkeys((*names, *means), float))
+            several = [counts[key] > 1 for key in zip(lines["method"], lines["setting"], strict=True)]
+            every = lines[several].groupby([*keys])
             ends = every[names].min().add_suffix(LEAST).join(every[names].max().add_suffix(MOST))
             found = found.merge(ends, on=[*keys], how="left")
-            several = found["seeds"] > 1
-            found.loc[~several, list(ends.columns)] = math.nan
             for name, mean in means.items():
                 of_trainings = every[name].agg(mean).reindex(pd.MultiIndex.from_frame(found[[*keys]]))
-                found[name] = found[name].where(~several, of_trainings.to_numpy())
+                found[name] = found[name].where(found["seeds"] < 2, of_trainings.to_numpy())
             return found
 
         return condensed
