@@ -259,6 +259,16 @@ def test_pages_have_eight_random_unseen_fabrics_of_every_kind(name):
         assert 1.0 in widths and min(widths) < 1.0
 
 
+def test_trade_trains_the_published_woven_as_long_as_ours():
+    recipe = load_recipe("trade")
+    published = next(one for one in recipe.models if one.options.name == "woven_published")
+    ours = next(one for one in load_recipe("standard").models if one.options.name == "woven")
+    assert not published.options.departures
+    assert published.seeds == ours.seeds == 3
+    assert published.training == ours.training
+    assert recipe.dataset == load_recipe("standard").dataset
+
+
 @pytest.mark.parametrize("name", ["quik", "", "no/such/recipe.toml", "a\0b.toml"])
 def test_a_recipe_that_does_not_exist(name):
     with pytest.raises(BadInput):
