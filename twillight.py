@@ -94,8 +94,8 @@ def evaluate(fabric: Fabric, queries: Queries, *, seed: int = 0, **options: Any)
     Returns
     -------
     Answers
-        `mean` and `standard_error`, float32 (N, 4) in the order of `COMPONENTS`, in 1/sr with the incident cosine;
-        `transparency`, (N,).
+        `mean`, its `standard_error` and `bound` (99.7 % of the errors are smaller), float32 (N, 4) in the order of
+        `COMPONENTS`, in 1/sr with the incident cosine; `transparency`, (N,).
 
     Raises
     ------

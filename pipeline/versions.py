@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Final
 
-TRUTH: Final = 5
+TRUTH: Final = 6
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
-TRAINING: Final = 3
+TRAINING: Final = 4
 """The training loop and the files that it writes."""
 
 MODELS: Final[dict[str, int]] = {
@@ -24,10 +24,7 @@ MODELS: Final[dict[str, int]] = {
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-BOUND: Final = 2
-"""How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
-
-FALLBACK: Final = 3
+FALLBACK: Final = 4
 """Answers to queries outside a method's domain (`pipeline.models.fallback`)."""
 
 SCENES: Final = 1

@@ -61,8 +61,8 @@ def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
         known = TABLE.knows(cloth, columns)
         if known.any():
             rows = rows[known]
-            means, _, _ = TABLE.answer(cloth, columns.take(known), rows, *UNBOUNDED, seed)
-            result[rows], left[rows] = np.maximum(means[:, :4], 0.0), False
+            answers = TABLE.answer(cloth, columns.take(known), rows, *UNBOUNDED, seed)
+            result[rows], left[rows] = np.maximum(answers.mean[:, :4], 0.0), False
     if left.any():
         result[left] = estimate(fabric, flat.take(left), QUADRATURE, seed).mean
     return result

@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.schema import SCHEMAS, STANDARD_ERRORS
+from pipeline.shards.schema import BOUNDS, SCHEMAS, STANDARD_ERRORS
 from pipeline.shards.store import read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import STEEPEST_CURVATURE
@@ -56,10 +56,10 @@ def check_values(path: Path, entry: ShardEntry, repeat: tuple[int, int]) -> list
     ends, picks = repeat
     ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (-1.0, 1.0), "count": (1, np.inf)}
     ranges |= {"angle": (-np.inf, np.inf), "curvature": (0.0, STEEPEST_CURVATURE)}
-    ranges |= {TRANSPARENCY: (0.0, 1.0), f"{TRANSPARENCY}_standard_error": (0.0, np.inf)}
-    ranges |= {"opacity": (0.0, 1.0)}
+    ranges |= {TRANSPARENCY: (0.0, 1.0), "opacity": (0.0, 1.0)}
     positive = ("sigma", "sigma_minor", "opacity_standard_error", "grazing_mean", "grazing_variance")
-    ranges |= dict.fromkeys((*positive, *COMPONENTS, *STANDARD_ERRORS), (0.0, np.inf))
+    through = f"{TRANSPARENCY}_standard_error", f"{TRANSPARENCY}_bound"
+    ranges |= dict.fromkeys((*positive, *COMPONENTS, *STANDARD_ERRORS, *BOUNDS, *through), (0.0, np.inf))
     for name, values in column.items():
         low, high = ranges.get(name, (-1.0, 1.0))
         if not np.isfinite(values).all():

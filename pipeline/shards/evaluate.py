@@ -300,9 +300,10 @@ def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
 
 
 def _arrays(answers: Answers, good: npt.NDArray[np.bool_], errors_known: bool) -> list[pa.Array]:
-    values, errors = [*answers.mean.T], [*answers.standard_error.T]
+    values, errors = [*answers.mean.T], [*answers.standard_error.T, *answers.bound.T]
     mask = None if good.all() else ~good
     unknown = mask if errors_known else np.ones(len(good), np.bool_)
     columns = [(column, mask) for column in values] + [(column, unknown) for column in errors]
-    columns += [(answers.transparency, mask), (answers.transparency_standard_error, unknown), (answers.count, mask)]
+    columns += [(answers.transparency, mask), (answers.transparency_standard_error, unknown)]
+    columns += [(answers.transparency_bound, unknown), (answers.count, mask)]
     return [pa.array(np.ascontiguousarray(column), mask=hidden) for column, hidden in columns]

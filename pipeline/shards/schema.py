@@ -14,7 +14,7 @@ import pyarrow as pa
 from pipeline.shards.extra_rows import Kind
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 
-SCHEMA_VERSION: Final = 2
+SCHEMA_VERSION: Final = 3
 
 _QUERY: Final = {
     "u": "footprint centre along x (weft direction), yarn spacings, in [0, ends of the repeat]",
@@ -36,9 +36,12 @@ _ANSWER: Final = {
     "diffuse_warp": "C_warp, unit colour, incident cosine included, 1/sr",
     "diffuse_weft": "C_weft, unit colour, incident cosine included, 1/sr",
 }
+_STANDARD_ERROR: Final = "standard error of {}: on average over rows, the root mean square of its error"
+_BOUND: Final = "bound of the error of {}: 997 of 1,000 errors are smaller"
 _THROUGH: Final = "share of light from straight behind that reaches the viewer unscattered, in [0, 1]"
 
 STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
+BOUNDS: Final = tuple(f"{name}_bound" for name in COMPONENTS)
 QUERY_COLUMNS: Final = tuple(_QUERY)
 """The columns of a query, as `twillight evaluate` reads them."""
 
@@ -52,9 +55,11 @@ SCHEMA: Final = pa.schema(
         _field("fabric", pa.dictionary(pa.int32(), pa.string()), "name of the fabric in the manifest"),
         *(_field(name, pa.float32(), meaning) for name, meaning in _QUERY.items()),
         *(_field(name, pa.float32(), _ANSWER[name]) for name in COMPONENTS),
-        *(_field(error, pa.float32(), f"standard error of {error.split('_standard')[0]}") for error in STANDARD_ERRORS),
+        *(_field(name, pa.float32(), _STANDARD_ERROR.format(name[:-15])) for name in STANDARD_ERRORS),
+        *(_field(name, pa.float32(), _BOUND.format(name[:-6])) for name in BOUNDS),
         _field(TRANSPARENCY, pa.float32(), _THROUGH),
-        _field(f"{TRANSPARENCY}_standard_error", pa.float32(), "standard error of transparency"),
+        _field(f"{TRANSPARENCY}_standard_error", pa.float32(), _STANDARD_ERROR.format(TRANSPARENCY)),
+        _field(f"{TRANSPARENCY}_bound", pa.float32(), _BOUND.format(TRANSPARENCY)),
         _field("count", pa.int32(), "points evaluated for this row"),
     ]
 )

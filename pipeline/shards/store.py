@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
 from pipeline.shards.extra_rows import Kind
-from pipeline.shards.schema import SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
+from pipeline.shards.schema import BOUNDS, SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
 from pipeline.storage import local_copy
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from pipeline.truth.query import Answers, Queries
@@ -117,21 +117,24 @@ def read_shard(path: Path) -> tuple[Queries, Answers]:
 
 def columns_of(queries: Queries, answers: Answers) -> dict[str, npt.NDArray[Any]]:
     """Return queries and answers by column."""
-    axes = [("wi_x", "wi_y", "wi_z"), ("wo_x", "wo_y", "wo_z"), COMPONENTS, STANDARD_ERRORS]
+    axes = [("wi_x", "wi_y", "wi_z"), ("wo_x", "wo_y", "wo_z"), COMPONENTS, STANDARD_ERRORS, BOUNDS]
+    stacked = queries.wi, queries.wo, answers.mean, answers.standard_error, answers.bound
     columns: dict[str, npt.NDArray[Any]] = {"u": queries.u, "v": queries.v, "sigma": queries.sigma}
-    for names, values in zip(axes, (queries.wi, queries.wo, answers.mean, answers.standard_error), strict=True):
+    for names, values in zip(axes, stacked, strict=True):
         columns |= dict(zip(names, values.T, strict=True))
     columns |= {"sigma_minor": queries.sigma_minor, "angle": queries.angle, "curvature": queries.curvature}
     columns |= {TRANSPARENCY: answers.transparency, "count": answers.count}
-    return columns | {f"{TRANSPARENCY}_standard_error": answers.transparency_standard_error}
+    columns |= {f"{TRANSPARENCY}_standard_error": answers.transparency_standard_error}
+    return columns | {f"{TRANSPARENCY}_bound": answers.transparency_bound}
 
 
 def rows_of(column: Columns) -> tuple[Queries, Answers]:
     """Return the queries and answers that columns hold: the inverse of `columns_of`."""
-    mean = np.stack([column[name] for name in COMPONENTS], axis=-1)
-    standard_error = np.stack([column[name] for name in STANDARD_ERRORS], axis=-1)
-    through = column[TRANSPARENCY], column[f"{TRANSPARENCY}_standard_error"]
-    return queries_of(column), Answers(mean, standard_error, column["count"], *through)
+    mean, error, bound = (
+        np.stack([column[name] for name in names], axis=-1) for names in (COMPONENTS, STANDARD_ERRORS, BOUNDS)
+    )
+    through = (column[TRANSPARENCY + suffix] for suffix in ("", "_standard_error", "_bound"))
+    return queries_of(column), Answers(mean, error, bound, column["count"], *through)
 
 
 def queries_of(column: Mapping[str, npt.NDArray[np.float32]]) -> Queries:

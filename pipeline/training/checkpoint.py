@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,7 +26,7 @@ _KEY: Final = "twillight"
 
 
 class State:
-    """Weights, their running average, the optimiser, the step, and the losses so far.
+    """Weights, their running average, its best state, the optimiser, the step, and the losses so far.
 
     Parameters
     ----------
@@ -50,6 +51,8 @@ class State:
         self._keep = average
         self._learning = [tensor for tensor in network.state_dict().values() if tensor.is_floating_point()]
         self._average = [tensor.clone() for tensor in self._learning]
+        self.best: dict[str, float] = {}  # step and held-out loss of the best state that was looked at
+        self._best = [tensor.clone() for tensor in self._average]
         self._sums = torch.zeros(2, dtype=torch.float64)  # losses and gradient norms since the last mark
         self._since = 0
 
@@ -76,9 +79,33 @@ class State:
         kept = f"; the checkpoint before is kept in {self.path}" if self.path.exists() else ""
         raise WorkFailed(f"the training loss diverged by step {step}: try a lower learning_rate{kept}")
 
+    @contextmanager
+    def averaged(self) -> Iterator[None]:
+        """Give the network its averaged weights within, without gradients."""
+        own = [tensor.clone() for tensor in self._learning]
+        with torch.no_grad():
+            torch._foreach_copy_(self._learning, self._average)
+            try:
+                yield
+            finally:
+                torch._foreach_copy_(self._learning, own)
+
+    def offer(self, step: int, loss: float) -> None:
+        """Keep the averaged weights if their held-out loss is the lowest so far."""
+        if not self.best or loss < self.best["held_out_loss"]:
+            self.best = {"step": step, "held_out_loss": loss}
+            torch._foreach_copy_(self._best, self._average)
+
     def weights(self) -> dict[str, Tensor]:
         """Return the averaged weights by name, on the CPU."""
-        averaged = iter(self._average)
+        return self._named(self._average)
+
+    def best_weights(self) -> dict[str, Tensor]:
+        """Return the averaged weights of the lowest held-out loss; without held-out queries, the last ones."""
+        return self._named(self._best if self.best else self._average)
+
+    def _named(self, learnt: Sequence[Tensor]) -> dict[str, Tensor]:
+        averaged = iter(learnt)
         return {
             name: (next(averaged) if tensor.is_floating_point() else tensor).detach().cpu().contiguous().clone()
             for name, tensor in self.network.state_dict().items()
@@ -89,10 +116,11 @@ class State:
         self.check(step)
         tensors = {f"network/{name}": tensor for name, tensor in self.network.state_dict().items()}
         tensors |= {f"average/{index}": tensor for index, tensor in enumerate(self._average)}
+        tensors |= {f"best/{index}": tensor for index, tensor in enumerate(self._best)}
         for index, entries in self.optimiser.state_dict()["state"].items():
             tensors |= {f"optimiser/{index}/{name}": torch.as_tensor(value) for name, value in entries.items()}
         tensors["sums"] = self._sums
-        about = {"identity": self.identity, "step": step, "curve": self.curve, "since": self._since}
+        about = {"identity": self.identity, "step": step, "curve": self.curve, "since": self._since, "best": self.best}
         with atomic_path(self.path) as temporary:
             copies = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
             about["sha256"] = _sha256(about, copies)
@@ -116,7 +144,8 @@ class State:
         with torch.no_grad():
             for index, average in enumerate(self._average):
                 average.copy_(tensors[f"average/{index}"])
-        self.curve = about["curve"]
+                self._best[index].copy_(tensors[f"best/{index}"])
+        self.curve, self.best = about["curve"], about["best"]
         self._sums, self._since = tensors["sums"].to(device), int(about["since"])
         return int(about["step"])
 

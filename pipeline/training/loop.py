@@ -2,9 +2,9 @@
 
 A step: take the batch that (seed, step) names, set the rate, let the model adjust its schedule, descend, average the
 weights. Every N steps all state goes into a checkpoint; nothing else is remembered, so that a training that was killed
-gives, on the CPU, the same bits as one that was not. Now and then the averaged weights answer held-out queries: a model
-whose own error has sunk below the truth's noise has nothing more to learn from it and stops. The files say nothing of
-when and where they were made.
+gives, on the CPU, the same bits as one that was not. Now and then the averaged weights answer held-out queries. The
+state whose loss there is the lowest is shipped; a model whose own error has sunk below the truth's noise has nothing
+more to learn from it and stops. The files say nothing of when and where they were made.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from weaves.errors import BadInput, nearest
 ROWS = "rows.npy"
 
 _START_ROWS = 65_536  # rows whose mean the last bias starts at
+_WATCH = 2**40  # a step that no training has: it names the random numbers of the held-out loss
 
 
 def train(
@@ -97,6 +98,7 @@ def train(
         learnt = torch.compile(network.loss) if training.compile else network.loss
         card = _card(options, training, manifest, fabrics) | {"architecture": network.architecture()}
         held_out = HeldOut(options, card, manifest, manifest_folder, training.validation_rows)
+        watched = held_out.batch(device)
 
         # Go on from the last checkpoint of this very training.
         state = State(network, optimiser, training.average, identity, folder / CHECKPOINT)
@@ -115,9 +117,13 @@ def train(
             done = step + 1
             if done % interval == 0 or done == training.steps:
                 state.mark(done)
-            if done % looks == 0 and done < training.steps and (seen := held_out.error_and_noise(state.weights())):
-                error, noise = seen
-                state.curve[-1] |= {"held_out_mse": error, "held_out_noise": noise}
+            if watched is not None and (done % looks == 0 or done == training.steps):
+                with state.averaged():
+                    held_out_loss = float(network.loss(watched, order.random(_WATCH)))
+                state.offer(done, held_out_loss)
+                error, noise = held_out.error_and_noise(state.weights())
+                figures = {"held_out_loss": held_out_loss, "held_out_mse": error, "held_out_noise": noise}
+                state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
                 if training.stop_at_noise and error <= 2.0 * noise:
                     break
             if done % training.checkpoint_every == 0 and done < training.steps:
@@ -126,13 +132,21 @@ def train(
                 progress(done / training.steps)
         state.check(training.steps)
 
-        weights = state.weights()
-        card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"])}
+        weights = state.best_weights()
+        card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"]), "kept": _kept(state)}
         card["validation"] = held_out.figures(weights)
     _write(folder, weights, card, identity)
     (folder / CHECKPOINT).unlink(missing_ok=True)
     (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
+
+
+def _kept(state: State) -> dict[str, Any]:
+    """Describe which weights are shipped, and the figure that chose them."""
+    if not state.best:
+        return {"weights": "running average of the last step", "watched": "nothing: there are no held-out queries"}
+    watched = "held_out_loss: the loss of the training on held-out queries of the fabrics it learns from"
+    return {"weights": "running average of the step with the lowest held_out_loss", "watched": watched, **state.best}
 
 
 def _set_rate(optimiser: torch.optim.Optimizer, peaks: Sequence[float], factor: float) -> None:

@@ -7,14 +7,16 @@ are on the card.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import torch
 from torch import Tensor
 
+from pipeline.models.method import Batch
 from pipeline.models.registry import module_of
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.conventions import COMPONENTS
@@ -45,18 +47,32 @@ class HeldOut:
         names = [entry["name"] for entry in card["fabrics"] if entry["name"] in held_out]
         self._rows = {name: manifest.read(folder, name, "validation") for name in names}
         self._share = max(rows // max(len(names), 1), 1)
+        self._look = max(min(self._share, _LOOK_ROWS // max(len(names), 1)), 1)
 
-    def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float] | None:
-        """Return the mean squared error over all components, as measured, and the truth's own; None without queries."""
+    def batch(self, device: torch.device) -> Batch | None:
+        """Return held-out queries with their targets as a step of the training sees them; None without queries."""
         if not self._rows:
             return None
-        share = max(min(self._share, _LOOK_ROWS // len(self._rows)), 1)
+        each = min(self._look, *(len(queries.u) for queries, _ in self._rows.values()))
+        order = [entry["name"] for entry in self._card["fabrics"]]
+        fabric = torch.tensor([order.index(name) for name in self._rows], device=device)
+
+        def stacked(columns: Iterable[npt.NDArray[np.float32]]) -> Tensor:
+            return torch.from_numpy(np.stack([column[:each] for column in columns])).to(device)
+
+        rows = self._rows.values()
+        query = {name: stacked(getattr(queries, name) for queries, _ in rows) for name in Queries._fields}
+        target = stacked(answers.mean for _, answers in rows)
+        return Batch(fabric, **query, target=target, transparency=stacked(a.transparency for _, a in rows))
+
+    def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
+        """Return the mean squared error over all components, as measured, and the truth's own; not without queries."""
         sums = np.zeros(2)
-        for name, prediction, _, answers in self._answered(weights, share):
+        for name, prediction, _, answers in self._answered(weights, self._look):
             del name
             sums += [np.square(prediction - answers.mean).mean(), np.square(answers.standard_error).mean()]
         error, noise = (sums / len(self._rows)).tolist()
-        return float(f"{error:.6g}"), float(f"{noise:.6g}")
+        return error, noise
 
     def figures(self, weights: dict[str, Tensor]) -> dict[str, Any]:
         """Return ``{fabric: {component: figures, "footprints": {bin: {component: figures}}}}``."""

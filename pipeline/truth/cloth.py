@@ -22,9 +22,6 @@ AREA: Final = 5
 SUMS: Final = 6
 """Columns of every array of sums."""
 
-Raw = tuple[Float64, Float64, Index]
-"""Means and standard errors (N, 5) of the components and the transparency, and points used (N,)."""
-
 FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
 
 
@@ -68,6 +65,39 @@ class Columns(NamedTuple):
     def take(self, index: npt.NDArray[np.integer] | Mask) -> Columns:
         """Return the queries at `index`."""
         return Columns(*(np.ascontiguousarray(column[index]) for column in self))
+
+
+class Raw(NamedTuple):
+    """Answers of an estimator, before the calibration of their errors.
+
+    Attributes
+    ----------
+    mean, error : float64 (N, 5)
+        Components and transparency, and the error that the estimator reports of each.
+    count : int64 (N,)
+        Points or nodes evaluated.
+    stage : int64 (N,)
+        The computation that gave the answer: a stage of pipeline.truth.calibration.
+    """
+
+    mean: Float64
+    error: Float64
+    count: Index  # type: ignore[assignment]  # the field's word, though tuples have a count too
+    stage: Index
+
+    @classmethod
+    def empty(cls, rows: int) -> Raw:
+        """Return so many answers of 0, to be filled."""
+        return cls(np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64), np.zeros(rows, np.int64))
+
+    def take(self, index: Index | Mask) -> Raw:
+        """Return the answers at `index`."""
+        return Raw(*(column[index] for column in self))  # type: ignore[arg-type]
+
+    def put(self, index: Index | Mask, mean: Float64, error: Float64, count: Index, stage: Index | int) -> None:
+        """Write answers at `index`; their points are added to those that were spent before."""
+        self.mean[index], self.error[index], self.stage[index] = mean, error, stage
+        self.count[index] += count
 
 
 def columns_of(queries: Queries, behind: bool = False) -> Columns:

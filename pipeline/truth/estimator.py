@@ -1,4 +1,4 @@
-"""The estimators of the patch BSDF behind one interface: means, standard errors, points used.
+"""The estimators of the patch BSDF behind one interface: means, calibrated errors, points used.
 
 `mc`, `jittered`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
 `node_table` sums over nodes with horizons; `auto` takes `node_table` where its error is small enough, and samples the
@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Index
 from pipeline.truth import monte_carlo
+from pipeline.truth.calibration import SAMPLED, calibrate
 from pipeline.truth.cloth import ClothSide, Columns, Raw, cloth_side, columns_of
 from pipeline.truth.node_table.cascade import auto_rows, node_table_rows
 from pipeline.truth.options import EstimatorName, TruthOptions
@@ -24,7 +25,7 @@ from weaves.fabric import Fabric
 
 
 def _sampled(method: int, cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
-    return monte_carlo.sample_rows(
+    rows = monte_carlo.sample_rows(
         cloth,
         columns,
         index,
@@ -35,6 +36,7 @@ def _sampled(method: int, cloth: ClothSide, columns: Columns, index: Index, opti
         options.max_count,
         np.uint64(seed),
     )
+    return Raw(*rows, np.full(len(index), SAMPLED))
 
 
 Estimator = Callable[[ClothSide, Columns, Index, TruthOptions, int], Raw]
@@ -73,15 +75,18 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
         If a query has no answer; see `pipeline.truth.query.faults`.
     """
     validate(queries)
-    rows = len(queries.u)
-    mean, error, count = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    raw = uncalibrated(fabric, queries, options, seed, start)
+    mean, error, bound = (values.astype(np.float32) for values in (raw.mean, *calibrate(raw, queries.behind)))
+    through = mean[:, 4], error[:, 4], bound[:, 4]
+    return Answers(mean[:, :4], error[:, :4], bound[:, :4], raw.count.astype(np.int32), *through)
+
+
+def uncalibrated(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0) -> Raw:
+    """Return answers with the errors that the estimator itself reports; parameters as for `estimate`."""
+    answers = Raw.empty(len(queries.u))
     for behind in (False, True):
         index = np.flatnonzero((queries.wo[:, 2] < 0) == behind)
         if index.size:
             cloth, columns = cloth_side(fabric, options, behind), columns_of(queries.take(index), behind)
-            answer = ESTIMATORS[options.estimator](cloth, columns, start + index, options, seed)
-            mean[index], error[index], count[index] = answer
-    single_mean, single_error = mean.astype(np.float32), error.astype(np.float32)
-    return Answers(
-        single_mean[:, :4], single_error[:, :4], count.astype(np.int32), single_mean[:, 4], single_error[:, 4]
-    )
+            answers.put(index, *ESTIMATORS[options.estimator](cloth, columns, start + index, options, seed))
+    return answers

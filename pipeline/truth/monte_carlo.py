@@ -17,10 +17,10 @@ import numpy as np
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns
+from pipeline.truth.footprint.hidden import conceal
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.scattering.point import Directions, directions_of, point_share
 
 RANDOMISATIONS: Final = 16
@@ -54,14 +54,15 @@ def place_point(
 @inlined_kernel
 def add_point(
     cloth: ClothSide, x: float, y: float, weight: float, directions: Directions, sums: Float64, r: int
-) -> None:
-    """Add the weighted share of a point to row r of the sums, (rows, SUMS)."""
+) -> bool:
+    """Add the weighted share of a point to row r of the sums, (rows, SUMS); return whether the viewer sees it."""
     family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
     if family != GAP:
         sums[r, family] += weight * specular
         sums[r, 2 + family] += weight * diffuse
     sums[r, 4] += weight * through
     sums[r, AREA] += weight * (directions.viewer.z if cloth.projected else area)
+    return area > 0.0
 
 
 @kernel
@@ -94,6 +95,19 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
                 # The ratio of a few visible randomisations follows them: their spread alone would look too small.
                 error[c] = math.hypot(error[c], mean[c] / math.sqrt(seen))
     return seen
+
+
+@kernel
+def visible_share(sums: Float64, whole: float) -> tuple[float, float]:
+    """Return the visible share of a patch, and its standard error.
+
+    `sums` is (RANDOMISATIONS, SUMS), `whole` the sum of areas of one randomisation of a patch that is wholly visible.
+    """
+    mean = sums[:, AREA].sum() / RANDOMISATIONS
+    square = 0.0
+    for r in range(RANDOMISATIONS):
+        square += (sums[r, AREA] - mean) ** 2
+    return mean / whole, math.sqrt(square / (RANDOMISATIONS * (RANDOMISATIONS - 1))) / whole
 
 
 @allocating_kernel
@@ -130,7 +144,7 @@ def sample_rows(
         directions = query_directions(columns, row)
         mean, error = means[row], errors[row]
         sums[:] = 0.0
-        done, target = 0, min_count // RANDOMISATIONS
+        done, target, visible = 0, min_count // RANDOMISATIONS, 0
         while True:
             # Extend every randomisation from `done` to `target` points.
             for r in range(RANDOMISATIONS):
@@ -145,7 +159,7 @@ def sample_rows(
                     else:
                         first, second = independent_pair(randomisation, k)
                     x, y, weight = place_point(columns, row, cloth, first, second)
-                    add_point(cloth, x, y, weight, directions, sums, r)
+                    visible += add_point(cloth, x, y, weight, directions, sums, r)
             done = target
 
             # Stop when the requested error is reached, or the points are spent.
@@ -153,6 +167,9 @@ def sample_rows(
             size, squares = 0.0, 0.0
             for c in range(4):
                 size += mean[c] * mean[c]
+            for c in range(4):
+                # One more visible point may show what none has shown so far.
+                error[c] = math.hypot(error[c], math.sqrt(size) / max(visible, 1))
                 squares += error[c] * error[c]
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
@@ -165,9 +182,6 @@ def sample_rows(
                 break
             target = 2 * done
         counts[row] = done * RANDOMISATIONS
-        area = 0.0
-        for r in range(RANDOMISATIONS):
-            area += sums[r, AREA]
-        if area < HIDDEN_SHARE * directions.viewer.z * counts[row]:
-            mean[:], error[:] = 0.0, 0.0
+        share, doubt = visible_share(sums, directions.viewer.z * done)
+        conceal(share, doubt, mean, error)
     return means, errors, counts

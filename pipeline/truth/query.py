@@ -93,24 +93,27 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    mean, standard_error : float32 (N, 4)
-        Components with unit colour and the standard error of each.
+    mean, standard_error, bound : float32 (N, 4)
+        Components with unit colour, the standard error of each, and a bound of its error (pipeline.truth.calibration).
     count : int32 (N,)
         Points evaluated.
-    transparency, transparency_standard_error : float32 (N,)
+    transparency, transparency_standard_error, transparency_bound : float32 (N,)
         Share of light from straight behind that reaches the viewer unscattered, through gaps and yarns.
     """
 
     mean: Float32
     standard_error: Float32
+    bound: Float32
     count: npt.NDArray[np.int32]  # type: ignore[assignment]  # the field's word, though tuples have a count too
     transparency: Float32
     transparency_standard_error: Float32
+    transparency_bound: Float32
 
     @classmethod
     def opaque(cls, mean: Float32, standard_error: Float32, count: npt.NDArray[np.int32]) -> Answers:
-        """Return answers of a cloth that lets nothing straight through."""
-        return cls(mean, standard_error, count, np.zeros(len(mean), np.float32), np.zeros(len(mean), np.float32))
+        """Return answers of a cloth that lets nothing straight through, bounded by three standard errors."""
+        through = (np.zeros(len(mean), np.float32) for _ in range(3))
+        return cls(mean, standard_error, 3 * standard_error, count, *through)
 
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Answers:
         """Return the answers at `index`."""

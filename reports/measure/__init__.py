@@ -1,6 +1,6 @@
 """Measurements of methods; functions return Records, none plots.
 
-On held-out queries: held_out (errors, time, memory), by_size, timing, memory, truth_noise. On views of one fabric:
+On held-out queries: held_out (errors, time, memory), by_size, timing, memory. On views of one fabric:
 pictures, frames and aliasing, silhouette. Properties of a method: furnace (energy), extremes, latents. Statistics:
 block_bootstrap, paired_error. In scenes: the folder scene, which also has FLIP, SSIM and PSNR (scene.flip_ssim).
 """

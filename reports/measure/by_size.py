@@ -21,11 +21,9 @@ import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.manifest import Manifest
-from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.timing import Contender, affordable, time_side_by_side
-from reports.measure.truth_noise import with_noise
 from reports.options import TimingOptions
 from reports.record import Metric, Provenance, Record
 from weaves.fabric import Fabric
@@ -121,8 +119,7 @@ def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Rows], dict
     classes: dict[float, _Rows] = {}
     counts: dict[float, int] = {}
     for name in manifest.names("seen", "unseen"):
-        queries, stated = manifest.read(folder, name, "test")
-        answers = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+        queries, answers = manifest.read(folder, name, "test")
         size = np.sqrt(queries.sigma * queries.sigma_minor)
         for low, high in itertools.pairwise(EDGES):
             chosen = np.flatnonzero((size >= low) & (size < high))

@@ -19,7 +19,6 @@ from pipeline.truth.estimator import estimate
 from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
-from reports.measure.truth_noise import with_noise
 from reports.options import FrameOptions, Role
 from reports.record import TRUTH, Provenance, Record
 from weaves.colour import LUMINANCE
@@ -55,7 +54,7 @@ def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
         gbuffer = _view(options, index)
         seed = int(fingerprint(["frame", fabric.name, index, options.seed]), 16)
         queries = gbuffer.queries(fabric.weave.repeat)
-        answers = with_noise(estimate(fabric, queries, options.frame_truth, seed), queries, options.frame_truth)
+        answers = estimate(fabric, queries, options.frame_truth, seed)
         values.append(_spread(gbuffer, answers.mean @ weights))
         errors.append(_spread(gbuffer, colour_noise(answers, weights)))
     channels = {"Y": np.concatenate(values), "error.Y": np.concatenate(errors)}

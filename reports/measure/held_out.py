@@ -29,7 +29,6 @@ from reports.catalogue import enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
-from reports.measure.truth_noise import with_noise
 from reports.options import ErrorOptions, Role, TimingOptions
 from reports.record import TRUTH, Metric, Provenance, Record
 from weaves.fabric import Fabric
@@ -124,9 +123,8 @@ def measure_added(
 def _answered(
     method: Method, manifest: Manifest, folder: Path, fabric: str, options: ErrorOptions
 ) -> tuple[Fabric, Queries, Answers, npt.NDArray[np.float32]]:
-    """Return a fabric, its held-out queries, the truth with errors that are right on average, and a method's values."""
-    cloth, queries, stated = _held_out(manifest, folder, fabric, options)
-    truth = with_noise(stated, queries, TruthOptions.model_validate(manifest.about["truth"]))
+    """Return a fabric, its held-out queries, the truth, and a method's values."""
+    cloth, queries, truth = _held_out(manifest, folder, fabric, options)
     method.prepare(cloth)
     return cloth, queries, truth, method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
 

@@ -26,7 +26,6 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.timing import milliseconds, quartiles
-from reports.measure.truth_noise import with_noise
 from reports.options import LATENT_PAIRS
 from reports.record import Metric, Provenance, Record
 from weaves.fabric import Fabric, load_fabric
@@ -180,7 +179,7 @@ def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:
 
 
 def _truth(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> Answers:
-    return with_noise(estimate(fabric, queries, options, seed), queries, options)
+    return estimate(fabric, queries, options, seed)
 
 
 def _faded(first: Answers, second: Answers, share: float) -> Answers:

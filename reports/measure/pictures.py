@@ -22,7 +22,6 @@ from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
-from reports.measure.truth_noise import with_noise
 from reports.options import PictureOptions, Role
 from reports.record import TRUTH, Provenance, Record
 from weaves.fabric import Fabric
@@ -39,7 +38,7 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
     queries = gbuffer.queries(fabric.weave.repeat)
-    answers = with_noise(estimate(fabric, queries, options.truth, seed), queries, options.truth)
+    answers = estimate(fabric, queries, options.truth, seed)
     noise = compose(gbuffer, colour_noise(answers, colours(fabric)))
     picture = compose(gbuffer, shade(fabric, answers.mean))
     write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)

@@ -32,7 +32,7 @@ from reports.tables.sentences import (
     least_flicker_sentences,
     scene_sentences,
 )
-from reports.truth import accuracy, bias, effort, sampling
+from reports.truth import accuracy, bias, calibration, effort, sampling
 from reports.truth.finding import RECORDS as FINDINGS
 
 SECTIONS: Final = {
@@ -165,7 +165,7 @@ def _pictures(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, 
 
 
 def _truth(page: PageInput) -> dict[str, Any]:
-    """Return rows about the truth itself: rounding, speed, accuracy, bias, effort, and the sampler of directions."""
+    """Return rows about the truth itself: rounding, speed, accuracy, calibration, bias, effort; directions' sampler."""
     measured = truth_measurements(page.records)
     accuracies = truth_rows.accuracy_rows(measured["truth_accuracy"])
     return {
@@ -174,6 +174,9 @@ def _truth(page: PageInput) -> dict[str, Any]:
         "accuracies": accuracies,
         "reference": percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         "accuracy_count": max((row.count for row in measured["truth_accuracy"]), default=0),
+        "calibrations": truth_rows.calibration_rows(measured["truth_calibration"]),
+        "calibration_count": sum(row.count for row in measured["truth_calibration"]),
+        "exceeded": percent(calibration.EXCEEDED),
         "biases": truth_rows.bias_rows(measured["truth_bias"]),
         "efforts": truth_rows.effort_rows(measured["truth_effort"]),
         "samplers": truth_rows.sampler_rows(measured["sampler"]),
@@ -181,6 +184,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
         "target": percent(effort.RELATIVE_ERROR),
         "columns": {
             "accuracy": truth_rows.ACCURACY,
+            "calibration": truth_rows.CALIBRATION,
             "bias": truth_rows.BIAS,
             "effort": truth_rows.EFFORT,
             "sampler": truth_rows.SAMPLERS,
@@ -217,9 +221,10 @@ def untrained(page: PageInput) -> set[str]:
 
 
 def truth_measurements(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
-    """Return accuracy, bias and effort of the truth and the sampler's variance, by the names of their tables."""
+    """Return the measurements of the truth itself and of the sampler, by the names of their tables."""
     return {
         "truth_accuracy": accuracy.RECORDS.from_records(records),
+        "truth_calibration": calibration.RECORDS.from_records(records),
         "truth_bias": bias.RECORDS.from_records(records),
         "truth_effort": effort.RECORDS.from_records(records),
         "sampler": sampling.RECORDS.from_records(records),

@@ -13,8 +13,8 @@ _WORDS: Final = {
     "( … )": "95 % interval over unseen fabrics of the geometric mean beside it: Student's t interval of the mean "
     "logarithm. It holds for fabrics drawn at random, as most of them are.",
     "noise": "Mean squared error of the truth in the same colours, as a share of the MSE as measured. The standard "
-    "error of every component is a column of the data set; of tabulated answers, which state an error that covers, "
-    "the square counts by a third: that is their mean squared error. Components are taken to be uncorrelated.",
+    "error of every component is a column of the data set, calibrated against true errors. Components are taken to be "
+    "uncorrelated.",
     "× lower": "MSE of point sampling at 2 points over the method's, on the very fabrics that the method covers, with "
     "a 95 % interval (delta method). Above 1 the method is better.",
     "in scenes": "Colour: relative RMSE of the colour measure over the queries of all frames. Flicker and excess "

@@ -13,7 +13,7 @@ from reports.over_seeds import trainings
 from reports.record import TRUTH, Machine, Record
 from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.equal_time import equal_time_table, size_table
-from reports.tables.headline import BOUNDED, headline
+from reports.tables.headline import headline
 from reports.tables.markdown import markdown_table
 from reports.tables.number_format import (
     NONE,
@@ -30,7 +30,7 @@ from reports.tables.number_format import (
 )
 from reports.tables.readme import three_decimals
 from reports.tables.sentences import equal_time_sentences
-from reports.truth import accuracy, bias, effort, sampling
+from reports.truth import accuracy, bias, calibration, effort, sampling
 from weaves.errors import BadInput
 
 
@@ -157,6 +157,7 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     rates, accuracies = truth_rows.rate_rows(records), accuracy.RECORDS.from_records(records)
     biases, efforts = bias.RECORDS.from_records(records), effort.RECORDS.from_records(records)
     samplers = sampling.RECORDS.from_records(records)
+    calibrations = calibration.RECORDS.from_records(records)
     if rates or accuracies or biases or efforts:
         yield "## The ground truth (`twillight bench truth`)"
     if rates:
@@ -165,6 +166,9 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     for fabric, lines in truth_rows.accuracy_rows(accuracies).items():
         yield f"### Accuracy on {plain(fabric)}"
         yield markdown_table(("estimator", *truth_rows.ACCURACY), lines)
+    if calibrations:
+        yield "### Calibration of errors: rms(error) / rms(standard error) · share beyond the bound"
+        yield markdown_table(("estimator", *truth_rows.CALIBRATION), truth_rows.calibration_rows(calibrations))
     if biases:
         yield "### Bias of tabulated answers: mean of each component against sampling"
         yield markdown_table(("fabric", *truth_rows.BIAS), truth_rows.bias_rows(biases))
@@ -178,9 +182,9 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _methods(errors: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return every method without a setting or under the energy bound: no number of points, no other runtime."""
+    """Return every method without a setting: neither a number of points nor another way to run a network."""
     keys = list(dict.fromkeys(zip(errors["method"], errors["setting"], strict=True)))
-    return [key for key in keys if key[1] in ("", BOUNDED)]
+    return [key for key in keys if not key[1]]
 
 
 def _name(row: Any) -> str:

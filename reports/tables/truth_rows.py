@@ -10,6 +10,7 @@ from reports.record import Record
 from reports.tables.number_format import NONE, missing, percent, plain, times
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias
+from reports.truth.calibration import Calibration
 from reports.truth.effort import Effort
 from reports.truth.finding import Finding
 from reports.truth.sampling import SETTINGS, Saving
@@ -64,6 +65,27 @@ def accuracy_rows(found: Sequence[Accuracy]) -> dict[str, list[list[str]]]:
         numbers += [f"{row.points:,.0f}", f"{row.rate:,.0f}", times(row.saved)]
         result.setdefault(row.fabric, []).append([row.setting, *numbers])
     return result
+
+
+CALIBRATION: Final = ("cloth", "components", "transparency")
+"""Columns of `calibration_rows` after the estimator."""
+
+
+def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
+    """Return the rows of the table of calibration: estimator, then `CALIBRATION`; ✗ if errors are not calibrated."""
+
+    def cell(ratio: float, exceeded: float) -> str:
+        return f"{ratio:.2f} · {percent(exceeded, 2)}"
+
+    return [
+        [
+            plain(row.estimator),
+            row.kind,
+            cell(row.ratio, row.exceeded) + ("" if row.holds else " ✗"),
+            cell(row.ratio_through, row.exceeded_through),
+        ]
+        for row in sorted(found, key=lambda row: row.estimator)
+    ]
 
 
 BIAS: Final = ("light", *COMPONENT_TITLES)

@@ -1,9 +1,4 @@
-"""Effort of `auto`: the shares of queries that it answers by tables alone, by refined borders, and by sampling.
-
-Answers do not name their source, so it is found by three runs. A query is sampled as a whole if it takes more points
-when the least number of points is raised. Of the other queries, those whose answers depend on the seed were refined,
-and the rest are tables' own.
-"""
+"""Effort of `auto`: the shares of queries that it answers by tables alone, by refined borders, and by sampling."""
 
 from __future__ import annotations
 
@@ -13,12 +8,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
+from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED
+from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Answers, Queries
+from pipeline.truth.query import Queries
 from reports.measure.timing import set_threads
 from reports.truth.row_records import RowRecords
 from reports.truth.throughput import FABRICS
@@ -33,7 +28,7 @@ RELATIVE_ERROR: Final = 0.01
 _ROWS = 1000
 _REPEATS = 3
 _SEED = 23
-_FEW, _MANY = 32, 2048  # hidden patches take up to 16 times as many: no count of the one is a count of the other
+_CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}
 
 
 @dataclass(frozen=True)
@@ -69,30 +64,18 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Eff
         fabric = load_fabric(name)
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
         options = TruthOptions(relative_error=RELATIVE_ERROR, max_count=1 << 14)
-        kinds = classify(fabric, queries, options, _SEED)
-        counts = estimate(fabric, queries, options, _SEED).count
+        answers = uncalibrated(fabric, queries, options, _SEED)
+        kinds = np.array([_CLASS_OF[stage] for stage in answers.stage.tolist()])
         for number, kind in enumerate(CLASSES):
             chosen = np.flatnonzero(kinds == number)
             yield Effort(
                 kind=kind,
                 fabric=name,
                 share=chosen.size / rows,
-                points=float(counts[chosen].mean()) if chosen.size else 0.0,
+                points=float(answers.count[chosen].mean()) if chosen.size else 0.0,
                 seconds=_seconds(fabric, queries.take(chosen), options) if chosen.size else 0.0,
                 count=rows,
             )
-
-
-def classify(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> npt.NDArray[np.int64]:
-    """Return for each query the place in `CLASSES` of the way in which `auto` answers it."""
-
-    def answers(count: int, seed: int) -> Answers:
-        fixed = options.model_copy(update={"estimator": "auto", "min_count": count, "max_count": count})
-        return estimate(fabric, queries, fixed, seed)
-
-    few, many, other = answers(_FEW, seed), answers(_MANY, seed), answers(_FEW, seed + 1)
-    random = (few.mean != other.mean).any(axis=1)
-    return np.where(few.count != many.count, 2, np.where(random, 1, 0)).astype(np.int64)
 
 
 def _seconds(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:

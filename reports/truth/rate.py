@@ -51,6 +51,7 @@ def evaluate_points(model: ClothSide, table: Table, columns: Columns, visibility
                 shares.speculars[start:stop],
                 shares.margins[start:stop],
                 shares.lit_margins[start:stop],
+                shares.undecided[start:stop],
             )
             if visibility:
                 area, diffuse = weigh(

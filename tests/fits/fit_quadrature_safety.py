@@ -36,7 +36,7 @@ def main() -> None:
         exact = integrate_rows(cloth, columns, first_cells(cloth.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
         for tolerance in (0.02, 0.003):
             options = TruthOptions(relative_error=tolerance, absolute_error=0.0, max_count=1 << 14)
-            mean, error, _ = quadrature_rows(cloth, columns, np.arange(rows), options, 0)
+            mean, error, _, _ = quadrature_rows(cloth, columns, np.arange(rows), options, 0)
             wrong, estimated = (np.linalg.norm(v[:, :4], axis=1) for v in (mean - exact, error / SAFETY))
             ratios.append(wrong / np.maximum(estimated, 1e-12))
     ratio = np.concatenate(ratios)

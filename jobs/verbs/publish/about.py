@@ -42,7 +42,7 @@ class About(NamedTuple):
         return (
             f"{self.rows:,} queries of the patch BSDF of {len(self.manifest.fabrics)} woven fabrics: a footprint, a "
             "direction to the light and one to the viewer, and the light that the cloth returns, computed from its "
-            "weave and its yarns. Every answer has a standard error."
+            "weave and its yarns. Every answer has a standard error and a bound of its error."
         )
 
     @property

@@ -72,7 +72,7 @@ Options of the ground truth:
 
 {options}
 
-Each standard error is that of its own row.
+The standard error of a row is calibrated: over many rows, it is the root mean square of the true errors. 99.7 % of the errors are below the bound.
 
 ## Licence and citation
 

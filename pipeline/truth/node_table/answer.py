@@ -14,9 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float64, Index
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
 from pipeline.truth.cloth import ClothSide, Columns
+from pipeline.truth.footprint.hidden import conceal
 from pipeline.truth.footprint.mixture import Line
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.footprint.sequences import derive
@@ -38,9 +39,11 @@ from pipeline.truth.node_table.kernels import (
 from pipeline.truth.node_table.refine import UNSEEN, refine
 from pipeline.truth.node_table.shares import NodeShares, no_shares, with_weight
 from pipeline.truth.node_table.weights import any_weight, fill_weights
-from pipeline.truth.query import HIDDEN_SHARE
 
 _SUBDIVISIONS: Final = (2, 4)
+
+UNDECIDED: Final = 0.3
+"""Error by nodes whose horizons disagree, relative to the components of the patch and to the share of the nodes."""
 
 _0 = np.float32(0.0)
 
@@ -55,14 +58,15 @@ def sum_rows(
     absolute_error: float,
     seed: np.uint64,
     line: Line,
-) -> tuple[Float64, Float64, Index]:
-    """Answer every row: means and standard errors (N, 5), and nodes visited; rotated ellipses by a `line`.
+) -> tuple[Float64, Float64, Index, Mask]:
+    """Answer every row: means and errors (N, 5), nodes visited, and whether it was refined; ellipses by a `line`.
 
     Footprints are Gaussian or lie along the axes, the cloth is flat, cosines go to the ply normal, points hide one
     another, and there is light from behind only if the table has horizons there.
     """
     rows = len(columns.u)
     means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    refined = np.zeros(rows, np.bool_)
     own = no_shares(table.normal.shape[1])
     everywhere = with_weight(own, table.evenly)
     cells = max(table.repeat[0], table.repeat[1])
@@ -77,16 +81,23 @@ def sum_rows(
             fill_weights(table, cloth.shape, columns, row, scratch, touched, line, points, own.weight)
         shares = everywhere if even else own
 
-        area, area_error, moved_area, nodes = _sum_pieces(cloth, table, towards, shares, means[row], moved, errors[row])
+        area, area_error, moved_area, undecided, nodes = _sum_pieces(
+            cloth, table, towards, shares, means[row], moved, errors[row]
+        )
         counts[row] += nodes
         cosine = columns.wo[row, 2]
-        if area < HIDDEN_SHARE * cosine:
+        if area <= 0.0:
             means[row], errors[row] = 0.0, 0.0
             continue
         _divide(cloth.projected, cosine, area, area_error, moved_area, moved, means[row], errors[row])
+        add_undecided(undecided / (area + undecided), means[row], errors[row])
+        share, share_error = area / cosine, (math.hypot(moved_area, math.sqrt(area_error)) + undecided) / cosine
+        if conceal(share, share_error, means[row], errors[row]):
+            continue
         size, doubt = _squared_norm(means[row]), _squared_norm(errors[row])
         target = max(relative_error**2 * size, absolute_error**2)
         if doubt > target:
+            refined[row] = True
             known[:], known_error[:] = means[row], errors[row]
             directions, key = query_directions(columns, row), derive(seed, index[row])
             below = cosine if cloth.projected else area
@@ -95,7 +106,18 @@ def sum_rows(
                 counts[row] += refine(cloth, table, directions, key, side, shares, below, means[row], errors[row])
                 if _squared_norm(errors[row]) <= target:
                     break
-    return means, errors, counts
+    return means, errors, counts, refined
+
+
+@kernel
+def add_undecided(share: float, mean: Float64, error: Float64) -> None:
+    """Raise the errors of the components by what nodes with such a share of the area may change.
+
+    They lie side by side and change together: they are all visible and lit, or none is.
+    """
+    change = UNDECIDED * share * math.sqrt(_squared_norm(mean))
+    for q in range(4):
+        error[q] = math.hypot(error[q], change)
 
 
 @kernel
@@ -116,17 +138,17 @@ def _sum_pieces(
     sums: Float64,
     moved: Float64,
     squares: Float64,
-) -> tuple[float, float, float, int]:
+) -> tuple[float, float, float, float, int]:
     """Write the sums over all nodes, their changes by borders, and their squared errors.
 
     Returns
     -------
-    area, area_error, moved_area : float
-        The denominator, its squared error, and its change by borders.
+    area, area_error, moved_area, undecided : float
+        The denominator, its squared error, its change by borders, and the share of undecided nodes in it.
     nodes : int
         Nodes visited.
     """
-    area, area_error, moved_area = np.float64(0.0), np.float64(0.0), np.float64(0.0)
+    area, area_error, moved_area, undecided = np.float64(0.0), np.float64(0.0), np.float64(0.0), np.float64(0.0)
     nodes = 0
     moved[:] = 0.0
     for p in range(len(table.pieces)):
@@ -144,6 +166,7 @@ def _sum_pieces(
             shares.speculars[start:stop],
             shares.margins[start:stop],
             shares.lit_margins[start:stop],
+            shares.undecided[start:stop],
         )
         normal = Normals(
             table.normal[0, start:stop],
@@ -165,16 +188,20 @@ def _sum_pieces(
             if lit:
                 sums[2 + family] += c / math.pi
         area += a
+        undecided += own.undecided.sum()
         a1, _, a2, _ = borders(own.areas, own.areas, own.margins, across)
         c1, s1, c2, s2 = borders(own.diffuses, own.speculars, own.lit_margins, across)
         moved_area += a1
         area_error += a2
-        if family != GAP:
+        if family == GAP:
+            moved[4] += a1
+            squares[4] += a2
+        else:
             moved[family] += s1
             moved[2 + family] += c1 / math.pi
             squares[family] += s2
             squares[2 + family] += c2 / (math.pi * math.pi)
-    return area, area_error, moved_area, nodes
+    return area, area_error, moved_area, undecided, nodes
 
 
 @inlined_kernel
@@ -256,7 +283,6 @@ def _divide(
 ) -> None:
     """Replace the sums in `mean` by ratios, and the squared errors in `error` by standard errors."""
     below = cosine if projected else area
-    error[4] = area_error * (mean[4] / area) ** 2
     for q in range(5):
         ratio = mean[q] / below
         inner = 0.0 if projected else ratio

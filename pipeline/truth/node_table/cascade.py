@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
+from pipeline.truth.calibration import SAMPLED
 from pipeline.truth.cloth import ClothSide, Columns, Raw
 from pipeline.truth.monte_carlo import OWEN, sample_rows
 from pipeline.truth.node_table.tables import ALLOWED, COARSE, FINE, UNBOUNDED
@@ -30,24 +31,22 @@ samples, so that three of them cover as much as three of a normal distribution."
 
 def auto_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer each query by the first that reaches the requested error: a coarse table, a fine one, sampling."""
-    rows = len(index)
-    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    answers = Raw.empty(len(index))
     known, wide = FINE.knows(cloth, columns), _wide(columns)
     requested = options.relative_error, options.absolute_error
-    left = np.ones(rows, np.bool_)
+    left = np.ones(len(index), np.bool_)
     for table, chosen, bound in ((COARSE, known & wide, UNBOUNDED), (FINE, known, requested)):
         here = np.flatnonzero(chosen & left)
         if not here.size:
             continue
-        mean, error, count = table.answer(cloth, columns.take(here), index[here], *bound, seed)
-        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (mean, error))
+        found = table.answer(cloth, columns.take(here), index[here], *bound, seed)
+        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (found.mean, found.error))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
-        means[here], errors[here] = mean, error
-        counts[here] += count
+        answers.put(here, *found)
         left[here[good]] = False
     missing = np.flatnonzero(left)
     if missing.size:
-        mean, error, count = sample_rows(
+        sampled = sample_rows(
             cloth,
             columns.take(missing),
             index[missing],
@@ -58,9 +57,8 @@ def auto_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOp
             options.max_count,
             np.uint64(seed),
         )
-        means[missing], errors[missing] = mean, _STUDENT * error
-        counts[missing] += count
-    return means, errors, counts
+        answers.put(missing, *sampled, SAMPLED)
+    return answers
 
 
 def node_table_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
@@ -75,15 +73,12 @@ def node_table_rows(cloth: ClothSide, columns: Columns, index: Index, options: T
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
         raise BadInput("options", "estimator", f"node_table (row {index[row]})", ALLOWED)
-    rows = len(index)
-    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
+    answers = Raw.empty(len(index))
     for table, chosen in ((COARSE, wide), (FINE, ~wide)):
         here = np.flatnonzero(chosen)
         if here.size:
-            means[here], errors[here], counts[here] = table.answer(
-                cloth, columns.take(here), index[here], *UNBOUNDED, seed
-            )
-    return means, errors, counts
+            answers.put(here, *table.answer(cloth, columns.take(here), index[here], *UNBOUNDED, seed))
+    return answers
 
 
 def _wide(columns: Columns) -> Mask:

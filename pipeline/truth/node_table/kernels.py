@@ -19,6 +19,9 @@ from pipeline.truth.scattering.slab_float32 import reflection, transmission, uns
 SMOOTH: Final = np.float32(0.0005)
 """Squared error of a node's share from curvature within it, relative to its square."""
 
+STEP: Final = np.float32(0.1)
+"""Difference of a node's horizons at two azimuths between which they are not interpolated: another yarn's edge."""
+
 _EDGE: Final = np.float32(0.01)
 _EDGE_JUMP: Final = np.float32(0.1)
 
@@ -81,7 +84,8 @@ def weigh(
 ) -> tuple[np.float32, np.float32]:
     """Write which nodes are lit, their shares of area and diffuse, and their margins; return the sums of both shares.
 
-    The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not.
+    The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not. A node
+    is undecided if a direction clears the horizon at one of the two azimuths beside it and the horizon makes a `STEP`.
     """
     area, diffuse = _0, _0
     for k in range(len(shares.weight)):
@@ -89,7 +93,9 @@ def weigh(
         cos_i = light.x * normal.x[k] + light.y * normal.y[k] + light.z * normal.z[k]
         low, high = viewer_horizon.first[k], viewer_horizon.second[k]
         margin_o = viewer.slope - low - viewer.turn * (high - low)
+        seen_between = min(low, high) < viewer.slope and viewer.slope < max(low, high) and abs(high - low) > STEP
         low, high = light_horizon.first[k], light_horizon.second[k]
+        lit_between = min(low, high) < light.slope and light.slope < max(low, high) and abs(high - low) > STEP
         margin_i = min(min(light.slope - low - light.turn * (high - low), cos_i), margin_o)
         visible = shares.weight[k] if margin_o > _0 else _0
         both = shares.weight[k] if margin_i > _0 else _0
@@ -98,6 +104,8 @@ def weigh(
         c = both * projected * (blend * cos_i + (_1 - blend) * light.z)
         shares.lit[k], shares.areas[k], shares.diffuses[k] = both, a, c
         shares.margins[k], shares.lit_margins[k] = margin_o, margin_i
+        undecided = seen_between or (lit_between and margin_o > _0 and cos_i > _0)
+        shares.undecided[k] = shares.weight[k] * projected if undecided else _0
         area += a
         diffuse += c
     return area, diffuse

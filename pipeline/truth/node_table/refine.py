@@ -1,4 +1,4 @@
-"""Refinement of an answer: nodes that a border of a shadow crosses are sampled with exact visibility.
+"""Refinement of an answer: nodes that a border of a shadow crosses, or may cross, are sampled with exact visibility.
 
 All other nodes keep their share from the table. A few hundred points are then as accurate as thousands over the whole
 footprint.
@@ -54,16 +54,18 @@ def refine(
         piece = table.pieces[p]
         start, across, family = piece[START], piece[COLUMNS], piece[FAMILY]
         stop = start + across * piece[ROWS]
-        if family == GAP:
-            continue
+        gap = family == GAP
         end, pick = table.copies[p, 0, 0], table.copies[p, 0, 1]
         x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
         for k in range(start, stop):
-            a, c = np.float64(shares.areas[k]), np.float64(shares.diffuses[k]) / math.pi
+            a, c = np.float64(shares.areas[k]), np.float64(0.0 if gap else shares.diffuses[k]) / math.pi
             s, share = np.float64(shares.speculars[k]), np.float64(weight[k])
             if share <= 0.0:
                 continue
-            if not (_on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)):
+            border = _on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)
+            if not border and shares.undecided[k] == 0.0:
+                if gap:
+                    continue
                 # Error from curvature within the node.
                 for kind, part in ((0, s), (2, c)):
                     residual = part - mean[kind + family] * a
@@ -95,8 +97,9 @@ def refine(
                 variance[q] += max(spread, 0.0) / (subsamples * (subsamples - 1.0))
                 change[q] += first[q] / subsamples
             change[AREA] += first[AREA] / subsamples - a
-            change[family] -= s
-            change[2 + family] -= c
+            if not gap:
+                change[family] -= s
+                change[2 + family] -= c
     total = below if cloth.projected else below + change[AREA]
     for q in range(4):
         mean[q] = max((mean[q] * below + change[q]) / total, 0.0)

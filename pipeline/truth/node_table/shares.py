@@ -23,6 +23,8 @@ class NodeShares(NamedTuple):
         Share in the denominator, and in the diffuse (times pi) and specular numerators.
     margins, lit_margins : float32 (N,)
         Slope by which the viewer, and viewer and light, lie above the horizon; negative below it.
+    undecided : float32 (N,)
+        Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0.
     """
 
     weight: Float32
@@ -32,12 +34,14 @@ class NodeShares(NamedTuple):
     speculars: Float32
     margins: Float32
     lit_margins: Float32
+    undecided: Float32
 
 
 @allocating_kernel
 def no_shares(nodes: int) -> NodeShares:
     """Return arrays for so many nodes, all 0."""
     return NodeShares(
+        np.zeros(nodes, np.float32),
         np.zeros(nodes, np.float32),
         np.zeros(nodes, np.float32),
         np.zeros(nodes, np.float32),
@@ -52,5 +56,12 @@ def no_shares(nodes: int) -> NodeShares:
 def with_weight(shares: NodeShares, weight: Float32) -> NodeShares:
     """Return shares that use other weights; the remaining arrays are the same."""
     return NodeShares(
-        weight, shares.lit, shares.areas, shares.diffuses, shares.speculars, shares.margins, shares.lit_margins
+        weight,
+        shares.lit,
+        shares.areas,
+        shares.diffuses,
+        shares.speculars,
+        shares.margins,
+        shares.lit_margins,
+        shares.undecided,
     )

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
+from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED
 from pipeline.truth.cloth import ClothSide, Columns, Raw
 from pipeline.truth.footprint.mixture import FINE_LINE, Line, axes
 from pipeline.truth.footprint.place import GAUSSIAN
@@ -56,10 +57,12 @@ class NodeTable:
         Directions in which horizons are known.
     line : Line
         Points of the mixture that a rotated footprint is.
+    stage : int
+        Stage of the answers that are not refined (pipeline.truth.calibration).
     """
 
-    def __init__(self, nodes: Callable[[int], int], azimuths: int, line: Line) -> None:
-        self._nodes, self._azimuths, self._line = nodes, azimuths, line
+    def __init__(self, nodes: Callable[[int], int], azimuths: int, line: Line, stage: int = FINE_TABLE) -> None:
+        self._nodes, self._azimuths, self._line, self._stage = nodes, azimuths, line, stage
         # The height field is kept beside its table: an identity is another object's once its own is gone.
         self._tables: dict[tuple[int, bool], tuple[HeightField, Table]] = {}
         self._building = Lock()
@@ -84,7 +87,9 @@ class NodeTable:
         `index` and `seed` name the random numbers of these samples.
         """
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
-        return sum_rows(cloth, table, columns, index, relative_error, absolute_error, np.uint64(seed), self._line)
+        bounds = relative_error, absolute_error
+        mean, error, count, refined = sum_rows(cloth, table, columns, index, *bounds, np.uint64(seed), self._line)
+        return Raw(mean, error, count, np.where(refined, REFINED, self._stage))
 
     def table(self, cloth: ClothSide, behind: bool) -> Table:
         """Return the table of one side of a cloth, with horizons `behind` it if there is light."""
@@ -122,5 +127,5 @@ def _coarse_nodes(cells: int) -> int:
 FINE: Final = NodeTable(_fine_nodes, AZIMUTHS, FINE_LINE)
 """The truth's table for any footprint."""
 
-COARSE: Final = NodeTable(_coarse_nodes, AZIMUTHS, FINE_LINE)
+COARSE: Final = NodeTable(_coarse_nodes, AZIMUTHS, FINE_LINE, COARSE_TABLE)
 """The truth's table for footprints of `cascade.WIDE`; at 1 % it costs a half to a fifth of the time."""

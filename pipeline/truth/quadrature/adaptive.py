@@ -22,6 +22,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.truth.calibration import QUADRATURE, QUADRATURE_CURVED, SAMPLED
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, Raw
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.symmetry import first_cells
@@ -38,7 +39,6 @@ from pipeline.truth.quadrature.parts import (
     rectangles,
 )
 from pipeline.truth.quadrature.rules import LEVELS, integrate
-from pipeline.truth.query import HIDDEN_SHARE
 
 SAFETY: Final = 1.5
 """Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""
@@ -50,6 +50,7 @@ _EVEN: Final = 1.0  # in repeats: a Gaussian this wide covers the repeat evenly,
 _HIGHLIGHT: Final = 14.0  # n nodes miss 2 exp(-14 n alpha / angle) of a highlight, fitted for alpha .1 to .3
 _FADING: Final = 0.25  # share of the change before that the last one counts for at least: it may be small by chance
 _SLIVER: Final = 2.0  # n nodes an axis miss slivers of light and shade of 2 n^-3 of a part
+_BARELY: Final = 0.02  # visible share of a patch below which rules may step over most of what is visible
 _WORST: Final = 0.0625  # parts with this share of the worst one's squared error are refined with it
 
 
@@ -65,8 +66,8 @@ def integrate_rows(
     split: int,
     first: int,
     last: int,
-) -> Raw:
-    """Answer every row; all footprints have axes along x and y.
+) -> tuple[Float64, Float64, Index, Mask]:
+    """Answer every row: means, errors, points, and whether it is barely visible; footprints lie along x and y.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def integrate_rows(
     """
     rows = len(columns.u)
     means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
-    counts = np.zeros(rows, np.int64)
+    counts, barely = np.zeros(rows, np.int64), np.zeros(rows, np.bool_)
     picks, ends = cloth.front.top.shape
     everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
     kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
@@ -146,12 +147,11 @@ def integrate_rows(
             if not refined or (reached and counts[row] >= min_count):
                 break
             cut = _WORST * worst
-        area = 0.0
+        share = 0.0
         for p in range(total):
-            area += sums[p, AREA]
-        if area < HIDDEN_SHARE * directions.viewer.z:
-            means[row], errors[row] = 0.0, 0.0
-    return means, errors, counts
+            share += sums[p, AREA] / directions.viewer.z
+        barely[row] = share < _BARELY
+    return means, errors, counts, barely
 
 
 @allocating_kernel
@@ -222,7 +222,8 @@ def _estimate_errors(
 def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every row: means and error bounds (N, 5), and points used.
 
-    Rotated footprints are no product in x and y; they are sampled as `owen` does, and only they depend on `seed`.
+    Rotated footprints are no product in x and y. Of patches that are almost hidden, rules may step over all that is
+    visible. Both are sampled as `owen` does, and only they depend on `seed`.
 
     Parameters
     ----------
@@ -237,16 +238,17 @@ def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: T
     """
     quarter = np.sin(2.0 * columns.angle)
     aligned = (np.abs(quarter) < 1e-6) | ((cloth.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
-    rows = len(index)
-    means, errors, counts = np.zeros((rows, AREA)), np.zeros((rows, AREA)), np.zeros(rows, np.int64)
+    answers = Raw.empty(len(index))
     limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
     if aligned.any():
-        found = integrate_rows(
+        mean, error, count, barely = integrate_rows(
             cloth, columns.take(aligned), first_cells(cloth.front), *limits, _SPLIT, _FIRST, LEVELS - 1
         )
-        means[aligned], errors[aligned], counts[aligned] = found
+        curved = columns.curvature[aligned] > 0.0
+        answers.put(aligned, mean, error, count, np.where(curved, QUADRATURE_CURVED, QUADRATURE))
+        aligned[aligned] = ~barely
     if not aligned.all():
-        rotated = ~aligned
-        found = sample_rows(cloth, columns.take(rotated), index[rotated], OWEN, *limits, np.uint64(seed))
-        means[rotated], errors[rotated], counts[rotated] = found
-    return means, errors, counts
+        rest = ~aligned
+        sampled = sample_rows(cloth, columns.take(rest), index[rest], OWEN, *limits, np.uint64(seed))
+        answers.put(rest, *sampled, SAMPLED)
+    return answers

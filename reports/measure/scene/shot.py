@@ -27,7 +27,6 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.shade import colours_of, compose
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
-from reports.measure.truth_noise import with_noise
 from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -180,7 +179,7 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             truth = options.frame_truth if frame else options.truth
             seed = int(fingerprint(["scene", loaded.scene.name, key, frame, options.seed]), 16)
             queries = gbuffer.queries(fabric.weave.repeat)
-            answers = with_noise(estimate(fabric, queries, truth, seed), queries, truth)
+            answers = estimate(fabric, queries, truth, seed)
             dark = np.zeros((len(gbuffer.place), 3))
             base = compose(gbuffer, dark, base, transparency=_transparency(gbuffer, answers.transparency))
             columns = {"frame": np.full(len(gbuffer.place), frame), "pixel": gbuffer.pixel[gbuffer.place]}

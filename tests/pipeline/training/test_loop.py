@@ -128,8 +128,39 @@ def test_the_card_tells_what_was_trained_and_how_well(folder, tmp_path):
 
     curve = card["curve"]
     assert card["steps_taken"] == 30
-    assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in curve[:-1])
+    assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in curve)
     assert set(card["validation"]["cotton_twill"]["footprints"]) <= set(footprint_labels())
+
+
+def test_the_state_of_the_lowest_held_out_loss_is_shipped(folder, tmp_path, monkeypatch):
+    """The rate of learning falls to 0 only in the end: without an average, a high one makes the loss go up and down."""
+    training = TrainingOptions(
+        steps=60, batch=64, fabrics=1, learning_rate=0.3, warm_up=0, average=0, curve_points=20, held_out_points=20,
+        device="cpu",
+    )  # fmt: skip
+    manifest, seen = Manifest.load(folder), []
+    begin = HeldOut.__init__
+
+    def noted(self, *arguments):
+        begin(self, *arguments)
+        seen.append(self)
+
+    monkeypatch.setattr(HeldOut, "__init__", noted)
+    monkeypatch.setattr("pipeline.training.loop.rate_factor", lambda step, training: 1.0)
+    train(NEUMIP, training, folder, FABRICS["neumip"], tmp_path)
+    card = json.loads((tmp_path / "card.json").read_text())
+    losses = {point["step"]: point["held_out_loss"] for point in card["curve"]}
+    best = min(losses, key=losses.__getitem__)
+    assert card["kept"]["step"] == best < 60
+    assert "held_out_loss" in card["kept"]["watched"]
+
+    # The loss of the shipped weights, from the file.
+    network = module_of("neumip").build(NEUMIP, [manifest.fabrics[name] for name in FABRICS["neumip"]])
+    network.load_state_dict(safetensors.torch.load_file(tmp_path / "model.safetensors"))
+    network.schedule(best / 60)
+    with torch.no_grad():
+        loss = network.loss(seen[0].batch(torch.device("cpu")), np.random.default_rng(0))
+    assert float(loss) == pytest.approx(losses[best], rel=1e-3)
 
 
 def test_a_training_stops_where_the_truth_is_all_noise(folder, tmp_path, monkeypatch):
@@ -152,6 +183,20 @@ def test_the_average_follows_its_closed_form(tmp_path):
         keep = min(0.5, (1 + step) / (10 + step))
         expected = keep * expected + (1 - keep) * (step + 1)
     assert state.weights()["weight"].item() == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_best_state_survives_a_checkpoint(tmp_path):
+    network = torch.nn.Linear(1, 1)
+    states = [State(network, torch.optim.AdamW(network.parameters()), 0.0, "one", tmp_path / "file") for _ in range(2)]
+    for step, (weight, loss) in enumerate([(1.0, 3.0), (2.0, 1.0), (3.0, 2.0)]):
+        torch.nn.init.constant_(network.weight, weight)
+        states[0].add(step, torch.tensor(1.0), torch.tensor(1.0))
+        states[0].offer(step, loss)
+    states[0].save(3)
+    assert states[1].restore(torch.device("cpu")) == 3
+    assert states[1].best == {"step": 1, "held_out_loss": 1.0}
+    assert states[1].best_weights()["weight"].item() == 2.0
+    assert states[1].weights()["weight"].item() == 3.0
 
 
 def test_weights_survive_the_file(folder, tmp_path):

@@ -256,12 +256,11 @@ def test_bad_queries_are_named(field, value, words):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", preset_names())
-def test_the_adaptive_estimate_states_its_error_on_every_preset(name):
-    """Default options and query distribution against 32,768 points, every preset.
+def test_bounds_of_adaptive_estimates_hold_on_every_preset(name):
+    """Default options and query distribution against 32,768 points: .3 % beyond the bound by its definition.
 
-    Stopping by its own noisy error, and slivers that no point has seen, put more z-scores beyond 3 than Student's t
-    would (.9 %): 3 to 4 % were found, and 6 % are allowed. A typical query must be calibrated: the median of |z| is .69
-    for Student's t. Sums of squares are no test here: single queries dominate them (reports/LOG.md).
+    1 % of 1,600 components are allowed: errors of one query are correlated, and presets differ. Stopping by its own
+    noisy error makes more outliers than Student's t has.
     """
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 11, 0, 400)
@@ -272,10 +271,8 @@ def test_the_adaptive_estimate_states_its_error_on_every_preset(name):
         12,
     )
     answers = estimate(fabric, queries, TruthOptions(estimator="owen"), 13)
-    spread = np.hypot(answers.standard_error, exact.standard_error)
-    difference = answers.mean - exact.mean
-    assert (np.abs(difference) > 3 * spread + 1e-6).mean() < 0.06
-    assert 0.55 < np.median(np.abs(difference[spread > 1e-5]) / spread[spread > 1e-5]) < 0.85
+    beyond = np.abs(answers.mean - exact.mean) > answers.bound + 3 * exact.standard_error
+    assert beyond.mean() < 0.01
 
 
 def test_every_name_has_an_estimator():

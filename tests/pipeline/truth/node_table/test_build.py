@@ -102,22 +102,6 @@ def test_answers_match_converged_ones(fabric, behind, footprint):
     assert np.median(np.abs(answers.transparency - exact.transparency)) < 1e-3
 
 
-@pytest.mark.parametrize("name", ["polyester_lining", "silk_charmeuse"])
-def test_auto_is_right_about_its_own_error(name):
-    """At most 2 % of 300 random queries beyond three stated errors: 99 % hold over many fabrics (the slow test)."""
-    fabric = load_fabric(name)
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 33, 0, 300)
-    exact = estimate(fabric, queries, CONVERGED, 4)
-    answers = estimate(fabric, queries, TruthOptions(relative_error=0.02), 5)
-    error, stated, reference = (
-        np.linalg.norm(v, axis=1) for v in (answers.mean - exact.mean, answers.standard_error, exact.standard_error)
-    )
-    assert (error > 3 * np.hypot(stated, reference) + 1e-6).mean() <= 0.02
-    size = np.linalg.norm(answers.mean, axis=1)
-    reached = stated <= np.maximum(0.02 * size, 1e-5) * (1 + 1e-6)
-    assert reached.mean() > 0.97
-
-
 def test_rows_do_not_depend_on_each_other():
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 60)

@@ -1,67 +1,51 @@
-"""Errors that `auto` reports against true ones, over ten thousand queries of random fabrics."""
-
-import json
+"""The stages of `auto`: which computation answers a query, and the error that it reports."""
 
 import numpy as np
 import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
+from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED
+from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.options import TruthOptions
-from weaves.fabric import load_fabric, preset_names
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
 from weaves.population import Population, Ranges, population_fabrics
 
-WILD = Ranges(
-    roughness_warp=(0.01, 0.8),
-    roughness_weft=(0.01, 0.8),
-    relief=(0.3, 2.0),
-    bend=(5.0, 60.0),
-    twist=(-35.0, 35.0),
-    width=(0.7, 1.0),
-)
-# Not the fabrics and queries that the table's doubts were fitted to (seeds 77 and 78).
-RANDOM = population_fabrics(Population(count=10, seed=2031, plain=WILD, twill=WILD, satin=WILD))
+FABRIC = load_fabric("denim")
+OPTIONS = TruthOptions(relative_error=0.01, max_count=1 << 12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kinds", "relative_error"),
-    [(QueryOptions(), 0.02), (QueryOptions(), 0.01), (QueryOptions(stretch=10.0, behind=0.3), 0.03)],
-)
-def test_ten_thousand_true_errors_lie_within_three_stated_ones(kinds, relative_error, tmp_path):
-    """Ten random fabrics, most with gaps, and the presets, 500 queries each, against 32,768 points or more.
+def test_stages_are_those_of_the_answers():
+    """Tables alone know no seed, and a least count of points concerns what is sampled only."""
+    queries = draw_queries(QueryOptions(), FABRIC.weave.repeat, 4, 0, 300)
+    auto = uncalibrated(FABRIC, queries, OPTIONS, 4)
+    assert set(auto.stage.tolist()) == {COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED}
+    alone = np.isin(auto.stage, (COARSE_TABLE, FINE_TABLE))
+    other = uncalibrated(FABRIC, queries, OPTIONS, 99)
+    np.testing.assert_array_equal((auto.mean == other.mean).all(axis=1), alone)
+    more = uncalibrated(FABRIC, queries, OPTIONS.model_copy(update={"min_count": 1 << 12}), 4)
+    np.testing.assert_array_equal(auto.mean[auto.stage != SAMPLED], more.mean[auto.stage != SAMPLED])
+    assert (auto.count[auto.stage == SAMPLED] < more.count[auto.stage == SAMPLED]).any()
 
-    The error of a query is the norm over its four components; 99 % must lie within three stated ones, the reference's
-    own included.
-    """
-    beyond, reached, asked, worst = 0, 0, 0, []
-    for number, fabric in enumerate([*RANDOM, *(load_fabric(name) for name in preset_names())]):
-        queries = draw_queries(kinds, fabric.weave.repeat, 900 + number, 0, 500)
-        converged = TruthOptions(
-            estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1 << 15, max_count=1 << 15
-        )
-        exact = estimate(fabric, queries, converged, 4)
-        answers = estimate(fabric, queries, TruthOptions(relative_error=relative_error), 5)
-        error, stated, reference = (
-            np.linalg.norm(v.astype(np.float64), axis=1)
-            for v in (answers.mean - exact.mean, answers.standard_error, exact.standard_error)
-        )
-        z = error / np.maximum(np.hypot(stated, reference), 1e-7)
-        size = np.linalg.norm(answers.mean, axis=1)
-        beyond += int((z > 3).sum())
-        reached += int((stated <= np.maximum(relative_error * size, 1e-5) * 1.0001).sum())
-        asked += len(z)
-        worst += [(float(z[k]), fabric.name, int(k), float(error[k]), float(size[k])) for k in np.argsort(-z)[:3]]
-    worst.sort(reverse=True)
-    (tmp_path / "worst.json").write_text(json.dumps(worst[:30]))
-    assert asked >= 10_000
-    assert beyond / asked <= 0.01, (beyond, worst[:10])
-    assert reached / asked >= 0.95, reached
+
+def test_every_answer_is_a_table_s_own_at_an_error_of_100_per_cent():
+    queries = draw_queries(QueryOptions(), FABRIC.weave.repeat, 4, 0, 50)
+    answers = uncalibrated(FABRIC, queries, OPTIONS.model_copy(update={"relative_error": 1.0}), 4)
+    assert np.isin(answers.stage, (COARSE_TABLE, FINE_TABLE)).mean() > 0.95
+
+
+@pytest.mark.parametrize("name", ["polyester_lining", "gauze"])
+def test_auto_reaches_the_requested_error(name):
+    fabric = load_fabric(name)
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 33, 0, 300)
+    answers = uncalibrated(fabric, queries, TruthOptions(relative_error=0.02), 5)
+    size, reported = (np.linalg.norm(values[:, :4], axis=1) for values in (answers.mean, answers.error))
+    assert (reported <= np.maximum(0.02 * size, 1e-5) * (1 + 1e-6)).mean() > 0.95
 
 
 @pytest.mark.parametrize(("name", "behind"), [("cotton_twill", 0.0), ("gauze", 0.5)])
 def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
-    """96 % lie within three reported errors of 8,192 points; 64 to 128 points have four times the error."""
+    """97 % of the components lie within their bounds; 64 to 128 points have four times the error."""
     fabric = load_fabric(name)
     kinds = QueryOptions(sigma=(0.3, 3.0), stretch=6.0, behind=behind, max_angle=75.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 12, 0, 100)
@@ -71,10 +55,33 @@ def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
     for estimator in ("auto", "owen"):
         options = TruthOptions(estimator=estimator, relative_error=0.1, min_count=64, max_count=128)
         answers = estimate(fabric, queries, options, 5)
-        wrong, stated, reference = (
-            np.linalg.norm(v.astype(np.float64), axis=1)
-            for v in (answers.mean - exact.mean, answers.standard_error, exact.standard_error)
-        )
-        assert (wrong <= 3 * np.hypot(stated, reference) + 1e-6).mean() >= 0.96
+        wrong = np.abs(answers.mean - exact.mean)
+        assert (wrong <= answers.bound + exact.bound).mean() >= 0.97
         found[estimator] = np.sqrt(np.mean(wrong**2))
     assert found["auto"] < 0.25 * found["owen"]
+
+
+def test_a_shadow_edge_between_two_azimuths_is_reported():
+    """The edge of a yarn hides part of the next one from this viewer at one of the two azimuths beside it.
+
+    A table that interpolated the horizons in between was 38 % off here, and reported .6 %.
+    """
+    yarns = Ranges(
+        roughness_warp=(0.05, 0.7),
+        roughness_weft=(0.05, 0.7),
+        relief=(0.5, 1.5),
+        bend=(10.0, 60.0),
+        twist=(-35.0, 35.0),
+        width=(0.6, 0.95),
+    )
+    fabric = population_fabrics(Population(count=12, seed=951, plain=yarns, twill=yarns, satin=yarns))[11]
+    wi, wo = np.float32([[0.7100, 0.2397, 0.6621]]), np.float32([[0.8969, 0.0632, 0.4376]])
+    queries = Queries.round([5.5051], [2.9416], [0.1756], wi, wo)._replace(
+        sigma_minor=np.float32([0.0791]), angle=np.float32([3.025])
+    )
+    many = TruthOptions(estimator="owen", relative_error=1e-9, min_count=1 << 14, max_count=1 << 14)
+    exact = estimate(fabric, queries, many, 1).mean[0]
+    table, auto = (estimate(fabric, queries, TruthOptions(estimator=name), 1) for name in ("node_table", "auto"))
+    assert np.abs(table.mean[0] - exact).max() > 0.3 * np.linalg.norm(exact)
+    assert (np.abs(table.mean[0] - exact) <= table.bound[0]).all()
+    assert np.abs(auto.mean[0] - exact).max() < 0.05 * np.linalg.norm(exact)

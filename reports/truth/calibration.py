@@ -1,0 +1,184 @@
+"""Calibration of the truth's errors: true errors against standard errors and bounds, by estimator and class of cloth.
+
+Fabrics and queries are random; no factor of pipeline.truth.calibration was fitted on them. The reference of a query is
+`owen` with many points; its own variance is subtracted from squared errors, and three of its standard errors are
+allowed beyond a bound. Over the queries and the four components of a class,
+
+    ratio     = rms(answer - reference) / rms(standard error), 1 if errors are calibrated,
+    exceeded  = share of |answer - reference| > bound, .3 % at most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.arrays import Mask
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.calibration import calibrate
+from pipeline.truth.cloth import Raw, cloth_side, columns_of
+from pipeline.truth.estimator import ESTIMATORS, uncalibrated
+from pipeline.truth.node_table.tables import FINE
+from pipeline.truth.options import EstimatorName, TruthOptions
+from reports.truth.row_records import RowRecords
+from weaves.population import Population, Ranges, population_fabrics
+
+RATIOS: Final = (0.8, 1.25)
+"""Ratios of calibrated errors."""
+
+EXCEEDED: Final = 0.003
+"""Largest share of errors beyond their bound."""
+
+_SIGMA: Final = (0.05, 32.0)
+_OPTICS: Final = {
+    "roughness_warp": (0.05, 0.7),
+    "roughness_weft": (0.05, 0.7),
+    "relief": (0.5, 1.5),
+    "bend": (10.0, 60.0),
+    "twist": (-35.0, 35.0),
+}
+_SOLID: Final = Ranges(width=(1.0, 1.0), **_OPTICS)
+_OPEN: Final = Ranges(width=(0.6, 0.95), **_OPTICS)
+_NARROW: Final = Ranges(width=(0.2, 0.6), **_OPTICS)
+
+CLASSES: Final = {
+    "solid": (_SOLID, QueryOptions(sigma=_SIGMA)),
+    "open": (_OPEN, QueryOptions(sigma=_SIGMA)),
+    "narrow yarns": (_NARROW, QueryOptions(sigma=_SIGMA)),
+    "curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3))),
+    "light behind": (_OPEN, QueryOptions(sigma=_SIGMA, behind=1.0)),
+    "rotated footprints": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0)),
+}
+"""Classes of cloth and queries."""
+
+SEED: Final = 1_000
+"""Seed of the fabrics and queries; those of the fit (tests/fits) are others."""
+
+_FABRICS, _ROWS, _REFERENCE = 4, 40, 1 << 15
+_PRECISE = 0.03
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Errors of one estimator on one class of cloth."""
+
+    estimator: str
+    """Name of the estimator."""
+    kind: str
+    """One of `CLASSES`."""
+    ratio: float
+    """rms(error) / rms(standard error), over the four components."""
+    exceeded: float
+    """Share of errors beyond their bound."""
+    ratio_through: float
+    """`ratio` of the transparency."""
+    exceeded_through: float
+    """`exceeded` of the transparency."""
+    count: int
+    """Queries."""
+
+    @property
+    def holds(self) -> bool:
+        """True if the errors of the components are calibrated, and within their bounds."""
+        return RATIOS[0] <= self.ratio <= RATIOS[1] and self.exceeded <= EXCEEDED
+
+
+def measure(
+    fabrics: int = _FABRICS,
+    rows: int = _ROWS,
+    estimators: Sequence[EstimatorName] = tuple(ESTIMATORS),
+    reference: int = _REFERENCE,
+    seed: int = SEED,
+    kinds: Sequence[str] = tuple(CLASSES),
+) -> Iterator[Calibration]:
+    """Measure the calibration of estimators with their default options; parameters as for `samples`."""
+    for kind, name, behind, found, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
+        error, bound = calibrate(found, behind)
+        doubt, _ = calibrate(exact, behind)
+        wrong = found.mean - exact.mean
+        components, through = (compared(wrong[:, c], error[:, c], bound[:, c], doubt[:, c]) for c in (slice(4), 4))
+        yield Calibration(name, kind, *components, *through, len(wrong))
+
+
+def samples(
+    fabrics: int,
+    rows: int,
+    estimators: Sequence[EstimatorName],
+    reference: int,
+    seed: int,
+    kinds: Sequence[str] = tuple(CLASSES),
+) -> Iterator[tuple[str, EstimatorName, Mask, Raw, Raw]]:
+    """Yield which queries see the cloth's back, answers and reference answers, for each class and estimator.
+
+    Queries whose reference is not known to `_PRECISE` of its value are left out: hidden patches, hardly ever others.
+
+    Parameters
+    ----------
+    fabrics : int
+        Random fabrics a class.
+    rows : int
+        Queries a fabric.
+    estimators : sequence of EstimatorName
+        Estimators; queries that one cannot answer are left out.
+    reference : int
+        Fewest points of a reference answer, a power of two; doubtful ones take four times as many.
+    seed : int
+        Seed of fabrics, queries and points.
+    kinds : sequence of str
+        Names of classes.
+    """
+    precise = TruthOptions(
+        estimator="owen", relative_error=0.001, absolute_error=1e-6, min_count=reference, max_count=4 * reference
+    )
+    for number, (kind, (ranges, options)) in enumerate(CLASSES.items()):
+        if kind not in kinds:
+            continue
+        population = Population(count=fabrics, seed=seed + number, plain=ranges, twill=ranges, satin=ranges)
+        parts: dict[EstimatorName, list[tuple[Mask, Raw, Raw]]] = {}
+        for place, fabric in enumerate(population_fabrics(population)):
+            queries = draw_queries(options, fabric.weave.repeat, seed + number, place * rows, rows)
+            exact = uncalibrated(fabric, queries, precise, seed + 1)
+            size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (exact.mean, exact.error))
+            decided = doubt <= np.maximum(_PRECISE * size, precise.absolute_error)
+            for name in estimators:
+                known = decided
+                if name == "node_table":
+                    known = decided & FINE.knows(cloth_side(fabric, precise), columns_of(queries))
+                if known.any():
+                    answers = uncalibrated(fabric, queries.take(known), TruthOptions(estimator=name), seed)
+                    parts.setdefault(name, []).append((queries.behind[known], answers, exact.take(known)))
+        for name, found in parts.items():
+            behind, answered, truths = zip(*found, strict=True)
+            yield kind, name, np.concatenate(behind), _joined(answered), _joined(truths)
+
+
+def _joined(parts: Sequence[Raw]) -> Raw:
+    return Raw(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def compared(wrong: Floats, error: Floats, bound: Floats, doubt: Floats) -> tuple[float, float]:
+    """Return the ratio and the share beyond bounds of errors, all of one shape; `doubt` is that of the reference."""
+    square = max(float(np.mean(wrong**2 - doubt**2)), 0.0)
+    ratio = math.sqrt(square / float(np.mean(error**2)))
+    return ratio, float(np.mean(np.abs(wrong) > bound + 3.0 * doubt))
+
+
+RECORDS: Final = RowRecords(
+    Calibration,
+    {
+        "ratio": "error_ratio",
+        "exceeded": "bound_exceeded",
+        "ratio_through": "error_ratio_through",
+        "exceeded_through": "bound_exceeded_through",
+    },
+    setting=("estimator", "kind"),
+    joint=": ",
+)
+"""Calibrations as Records."""

@@ -1,0 +1,55 @@
+"""The calibration itself; reports/truth/calibration.py compares its errors with true ones."""
+
+import numpy as np
+import pytest
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.calibration import BEHIND, COMPONENTS, SAMPLED, THROUGH, calibrate
+from pipeline.truth.cloth import Raw
+from pipeline.truth.estimator import ESTIMATORS, estimate, uncalibrated
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import load_fabric
+
+
+@pytest.mark.parametrize("stage", list(COMPONENTS))
+@pytest.mark.parametrize("behind", [False, True])
+def test_errors_are_factors_of_the_reported_ones(stage, behind):
+    mean, reported = np.array([[0.3, 0.0, 0.4, 0.0, 0.2]]), np.array([[0.01, 0.0, 0.02, 0.03, 0.04]])
+    error, bound = calibrate(Raw(mean, reported, np.array([64]), np.array([stage])), np.array([behind]))
+    own = (BEHIND if behind else COMPONENTS)[stage]
+    for factors, columns, size in ((own, slice(4), 0.5), (THROUGH[stage], slice(4, 5), 1.0)):
+        scaled = factors.reported * reported[:, columns]
+        limited = scaled / (1.0 + scaled / (factors.largest * size))
+        expected = np.sqrt(limited**2 + (factors.missed * size) ** 2)
+        np.testing.assert_allclose(error[:, columns], expected, rtol=1e-12)
+        np.testing.assert_allclose(bound[:, columns], factors.cover * expected, rtol=1e-12)
+
+
+def test_a_hidden_patch_has_no_error():
+    nothing = np.zeros((5, 5))
+    error, bound = calibrate(Raw(nothing, nothing, np.ones(5, np.int64), np.arange(5)), np.zeros(5, np.bool_))
+    assert not error.any() and not bound.any()
+
+
+@pytest.mark.parametrize("estimator", list(ESTIMATORS))
+def test_every_answer_has_a_stage_and_both_errors(estimator):
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 40)
+    raw = uncalibrated(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
+    answers = estimate(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
+    assert np.isin(raw.stage, list(COMPONENTS)).all()
+    np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))
+    assert (answers.bound >= answers.standard_error).all()
+    assert (answers.transparency_bound >= answers.transparency_standard_error).all()
+
+
+def test_a_component_that_no_point_has_shown_has_an_error():
+    """One family of yarns fills a narrow footprint: the other one may still have been missed."""
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(sigma=(0.05, 0.08), max_angle=30.0), fabric.weave.repeat, 5, 0, 60)
+    raw = uncalibrated(fabric, queries, TruthOptions(estimator="mc", min_count=64, max_count=64), 1)
+    size = np.linalg.norm(raw.mean[:, :4], axis=1, keepdims=True)
+    assert (raw.stage == SAMPLED).all()
+    unseen = (raw.mean[:, :4] == 0.0) & (size > 0.0)
+    assert unseen.sum() > 20
+    assert (raw.error[:, :4] >= size / 64 * (1 - 1e-12))[unseen].all()

@@ -1,0 +1,47 @@
+"""Errors and bounds of every estimator against true errors, on random fabrics that no factor was fitted on."""
+
+import json
+
+import numpy as np
+import pytest
+
+from reports.truth.calibration import CLASSES, RECORDS, Calibration, compared, measure
+
+
+def test_the_comparison_of_normal_errors():
+    """Errors of the stated size have ratio 1 and exceed 2.9677 standard errors in .3 % of all cases."""
+    rng = np.random.default_rng(1)
+    error = rng.uniform(0.5, 2.0, (200_000, 1))
+    wrong, nothing = error * rng.standard_normal(error.shape), np.zeros_like(error)
+    ratio, exceeded = compared(wrong, error, 2.9677 * error, nothing)
+    assert ratio == pytest.approx(1.0, rel=0.01)
+    assert exceeded == pytest.approx(0.003, rel=0.15)
+    # The reference's own error is subtracted.
+    noisy = wrong + error * rng.standard_normal(error.shape)
+    ratio, _ = compared(noisy, error, error, error)
+    assert ratio == pytest.approx(1.0, rel=0.02)
+
+
+def test_records_bring_calibrations_back():
+    found = list(measure(fabrics=1, rows=8, estimators=("owen", "node_table"), reference=1 << 10))
+    assert {row.kind for row in found if row.estimator == "owen"} == set(CLASSES)
+    assert "curved" not in {row.kind for row in found if row.estimator == "node_table"}
+    assert RECORDS.from_records(RECORDS.to_records(found)) == found
+
+
+def test_a_row_holds_within_its_limits():
+    good = Calibration("auto", "solid", 0.9, 0.002, 1.0, 0.0, 100)
+    assert good.holds
+    assert not Calibration("auto", "solid", 0.7, 0.002, 1.0, 0.0, 100).holds
+    assert not Calibration("auto", "solid", 1.0, 0.004, 1.0, 0.0, 100).holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(CLASSES))
+def test_errors_of_all_estimators_are_calibrated(kind, tmp_path):
+    """1,920 queries of 20 fabrics, each answered by all estimators that know it; 11,520 in all classes."""
+    found = list(measure(fabrics=20, rows=96, kinds=(kind,)))
+    (tmp_path / "calibration.json").write_text(json.dumps([vars(row) for row in found], indent=1))
+    assert sum(row.count for row in found if row.estimator == "owen") >= 1_800
+    wrong = [row for row in found if not row.holds]
+    assert not wrong, wrong
