@@ -24,6 +24,9 @@ MODELS: Final[dict[str, int]] = {
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
+BOUND: Final = 2
+"""How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
+
 FALLBACK: Final = 4
 """Answers to queries outside a method's domain (`pipeline.models.fallback`)."""
 

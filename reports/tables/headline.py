@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Any
+from typing import Any, Final
 
 import pandas as pd
 
@@ -16,6 +16,9 @@ from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, PAPER, rows
+
+BOUNDED: Final = "bounded"
+"""Setting of a network under the energy bound (`pipeline.models.bounded`)."""
 
 
 def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
@@ -40,10 +43,19 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
 
 
 def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
-    """Return the first setting of each method that is neither the truth nor among those that nothing is trained for."""
-    first = errors.drop_duplicates("method")
-    keys = zip(first["method"], first["setting"], strict=True)
-    return [key for key in keys if key[0] not in untrained and key[0] != TRUTH]
+    """Return the setting of each method that the headline names.
+
+    It is the form under the energy bound where that was measured: it errs less on validation cloths. Otherwise it is
+    the first. The truth, and methods that nothing is trained for, are left out.
+    """
+    settings: dict[str, list[str]] = {}
+    for method, setting in zip(errors["method"], errors["setting"], strict=True):
+        settings.setdefault(method, []).append(setting)
+    return [
+        (method, BOUNDED if BOUNDED in found else found[0])
+        for method, found in settings.items()
+        if method not in untrained and method != TRUTH
+    ]
 
 
 def _comparison(ratio: float) -> str:

@@ -13,7 +13,7 @@ from reports.over_seeds import trainings
 from reports.record import TRUTH, Machine, Record
 from reports.tables import method_rows, scene_rows, summary, truth_rows
 from reports.tables.equal_time import equal_time_table, size_table
-from reports.tables.headline import headline
+from reports.tables.headline import BOUNDED, headline
 from reports.tables.markdown import markdown_table
 from reports.tables.number_format import (
     NONE,
@@ -182,9 +182,9 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _methods(errors: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return every method without a setting: neither a number of points nor another way to run a network."""
+    """Return every method without a setting or under the energy bound: no number of points, no other runtime."""
     keys = list(dict.fromkeys(zip(errors["method"], errors["setting"], strict=True)))
-    return [key for key in keys if not key[1]]
+    return [key for key in keys if key[1] in ("", BOUNDED)]
 
 
 def _name(row: Any) -> str:

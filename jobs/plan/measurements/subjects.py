@@ -12,6 +12,7 @@ from jobs.plan.dataset import Shard, fingerprint_of, folder_of
 from jobs.plan.task import PLACE, Made, Part, Place
 from jobs.plan.training import Training, seed_title
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline import versions
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint
 from reports.options import BenchOptions, Role, RunOptions, select
@@ -91,6 +92,11 @@ class Trained(Part):
 
         others = [counterpart(one) for one in methods if ways.bounds]
         return others + [run for one in methods for run in runs(one, ways.runtimes)]
+
+
+def bound_version(ways: RunOptions) -> dict[str, int]:
+    """Return the version of the energy bound where networks are measured under it, else nothing."""
+    return {"bound": versions.BOUND} if ways.bounds else {}
 
 
 @dataclass(frozen=True)

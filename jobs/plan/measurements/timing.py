@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.subjects import Dataset, Subjects, Trained
+from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, bound_version
 from jobs.plan.task import Part, Progress
 from pipeline import versions
 from reports.options import RunOptions, TimingOptions, select
@@ -108,9 +108,10 @@ class Timing(Measurement):
         return max(thread_counts(self.options.threads))
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of the truth, which is timed too, the benchmark and every model."""
+        """Return the versions of the truth, which is timed too, the benchmark, the energy bound and every model."""
         models = {one.model.options.name: one.model.options.version for one in self.models}
-        return {"truth": versions.TRUTH, "bench": versions.BENCH, **models}
+        bound = {key: value for one in self.models for key, value in bound_version(one.ways).items()}
+        return {"truth": versions.TRUTH, "bench": versions.BENCH, **bound, **models}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all queries, then queries by the size of their footprints."""

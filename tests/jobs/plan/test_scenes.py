@@ -31,5 +31,5 @@ def test_answers_of_the_fallback_have_a_version_of_their_own(files, monkeypatch)
 
 @pytest.mark.parametrize("version", [name for name in vars(versions) if name.isupper() and name != "MODELS"])
 def test_every_version_changes_some_identity(files, monkeypatch, version):
-    path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
+    path = files.exchange("frames = 4", 'frames = 4\nbounds = true\nscenes = { names = ["sphere"] }').write()
     assert changed_by(version, path, monkeypatch)

@@ -3,7 +3,9 @@ import math
 import pandas as pd
 import pytest
 
-from reports.tables.headline import headline, learnt
+from pipeline.models.bounded import Bounded
+from pipeline.models.soft_nodes.model import SoftNodes
+from reports.tables.headline import BOUNDED, headline, learnt
 
 
 def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=math.nan, most=math.nan):
@@ -68,3 +70,15 @@ def test_learnt_leaves_points_out():
     )
     assert learnt(errors) == [("woven", "")]
     assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1")]
+
+
+def test_the_headline_names_the_bounded_form_where_it_was_measured():
+    errors = pd.DataFrame(
+        {
+            "method": ["woven", "neumip", "woven", "selvage", "selvage"],
+            "setting": ["", "", "bounded", "", "unbounded"],
+            "role": "seen",
+        }
+    )
+    assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
+    assert Bounded(SoftNodes()).setting == BOUNDED

@@ -35,6 +35,10 @@ def test_rows_hold_the_numbers_of_the_records(records):
     assert (
         "`woven` has 4.5× lower MSE than two points on seen fabrics, 4.5× on unseen ones, at 4.3× their time" in block
     )
+    bounded = [one.model_copy(update={"setting": "bounded"}) for one in records if one.method == "woven"]
+    both = readme_block([*records, *bounded], MACHINE, "", "file")
+    assert f"| {ROWS['woven', '']} |" in both and f"| {ROWS['woven', 'bounded']} |" in both
+    assert "\n`woven` under the energy bound has 4.5× lower MSE" in both and "\n`woven` has" not in both
     assert "Recipe `quick`" in block and "1,200 held-out queries of 2 seen and 1 unseen fabrics" in block
 
 
