@@ -10,6 +10,7 @@ from pipeline.scenes.options import ViewOptions
 from reports.images.tiles import DIFFERENCE_RANGE, EXPOSURE
 from reports.options import BenchOptions
 from reports.record import Record
+from reports.tables.headline import BOUNDED
 from reports.tables.number_format import display, listed
 from reports.tables.summary import of_baseline, rows
 
@@ -26,6 +27,7 @@ def caveats(options: BenchOptions, per_material: Sequence[str], errors: pd.DataF
         "of a GPU renderer. Compare only ratios within one column.",
         *_trainings(errors),
         *_unseen(errors),
+        *_bounded(errors),
         _footprint_note(view),
         f"Pictures are shown alike: linear values times {EXPOSURE}, cut at 1, sRGB encoding. Their MSE is over the lit "
         f"pixels, in linear radiance under an irradiance of {view.irradiance:.3g}. Difference images show luminance, "
@@ -82,6 +84,17 @@ def _unseen(errors: pd.DataFrame) -> list[str]:
             "made. Intervals over fabrics hold for that sample."
         ]
     return []
+
+
+def _bounded(errors: pd.DataFrame) -> list[str]:
+    """Return a sentence on the energy bound, if any network was measured under it."""
+    if not len(errors) or BOUNDED not in set(errors["setting"]):
+        return []
+    return [
+        "Bounded: no component exceeds that of the soft nodes without shadows, and what one yarn has above goes to the "
+        "other yarn. The headline names this form. The bound is computed from the fabric, not learnt, and is a good "
+        "answer by itself where a network does not know the fabric."
+    ]
 
 
 def lacking(records: Sequence[Record]) -> list[str]:

@@ -32,6 +32,13 @@ def test_caveats_name_the_number_of_unseen_fabrics(count, words):
     assert [text.startswith(words) for text in found].count(True) == 1
 
 
+def test_caveats_explain_the_energy_bound_where_networks_were_measured_under_it():
+    errors = pd.DataFrame({"method": "woven", "setting": ["", "bounded"], "zero_answers": 0.0, "seeds": 0})
+    errors["role"] = "seen"
+    assert "Bounded: no component exceeds" in " ".join(caveats(BenchOptions(), [], errors))
+    assert "Bounded" not in " ".join(caveats(BenchOptions(), [], errors[:1]))
+
+
 def test_a_measure_that_was_not_installed_is_said_where_scenes_were_measured():
     frame = Record(method="woven", scene="attic", metric="frame_time", value=20.0)
     (text,) = unseen_by_eye([frame])
