@@ -160,13 +160,14 @@ def _note(
 ) -> ModelNote:
     """Return the page's note on a model; `trainings` are those of its first seed."""
     options, training = model.options, model.training
-    about = "nothing is trained" if options.name == options.model else f"{options.model}: nothing is trained"
+    kind = "" if options.name == options.model else f"{options.model}: "
+    about = f"{kind}nothing is trained"
     if isinstance(options, AddedMethod):
         about = f"from outside this package: {options.origin}"
+        kind = f"{about}; "
     if trainings:
         first = next(iter(trainings.values()))
         what = "each fabric by itself" if model.of_one_material else f"{len(first.fabrics)} fabrics at once"
-        kind = "" if options.name == options.model else f"{options.model}: "
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"

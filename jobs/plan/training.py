@@ -10,6 +10,7 @@ from jobs.plan.dataset import Shard, folder_of
 from jobs.plan.task import Made, Place, Progress, Stage, Task
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
+from pipeline.models.added.added_method import AddedMethod
 from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.extra_rows import set_name
 from pipeline.training.options import TrainingOptions
@@ -90,10 +91,18 @@ class Training(Task):
         return content | {"training": training}
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Train."""
-        from pipeline.training.loop import train
+        """Train; a network from outside in a process that can be ended.
 
-        train(self.options, self.training, out / self.dataset, list(self.fabrics), out / self.folder, progress)
+        Raises
+        ------
+        MethodFailed
+            If the code of a network from outside fails.
+        """
+        if isinstance(self.options, AddedMethod):
+            from pipeline.models.added.apart import run_apart
+
+            return run_apart(_train, self, out, progress=progress)
+        return _train(self, out, progress)
 
 
 def seed_title(seed: int) -> str:
@@ -128,3 +137,9 @@ def _training(model: ModelRecipe, fabrics: Sequence[str], parts: Sequence[Shard]
         shards=tuple(part.id for part in read),
         dataset=folder_of(parts),
     )
+
+
+def _train(task: Training, out: Path, progress: Progress) -> None:
+    from pipeline.training.loop import train
+
+    train(task.options, task.training, out / task.dataset, list(task.fabrics), out / task.folder, progress)

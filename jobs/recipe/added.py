@@ -21,7 +21,7 @@ from weaves.errors import BadInput, nearest
 from weaves.renamed import replacement
 from weaves.validation import validated
 
-_BESIDE: Final = ("model", "name", "version", "limit", "training", "runtimes")
+_BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "runtimes")
 """Keys of a recipe's entry that are no options of the method."""
 
 
@@ -102,7 +102,7 @@ class Added:
             raise BadInput(where, f"{key}.model", model, "is the entry point of a metric; a method is needed")
         if "version" in entry and str(entry["version"]) != method.stated:
             raise BadInput(where, f"{key}.version", entry["version"], f"the method given has version {method.stated}")
-        rest = {name: entry[name] for name in ("training", "runtimes") if name in entry}
+        rest = {name: entry[name] for name in ("training", "seeds", "runtimes") if name in entry}
         return method.model_dump() | rest
 
 

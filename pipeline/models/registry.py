@@ -18,12 +18,14 @@ from pydantic import BaseModel
 from safetensors import SafetensorError
 from torch import Tensor
 
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.fingerprint import IDENTITY
+from pipeline.models.added.added_method import ADDED, AddedMethod
 from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
-from pipeline.models.method import Method
+from pipeline.models.method import Method, Trained
 from pipeline.storage import place
-from weaves.errors import BadInput, nearest
+from weaves.errors import BadInput, WorkFailed, nearest
+from weaves.fabric import Fabric
 from weaves.validation import validated
 
 
@@ -72,6 +74,44 @@ def model_folder(model: str, where: str, key: str) -> Path:
     return folder
 
 
+def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Sequence[Any] = ()) -> Any:
+    """Return an untrained `pipeline.models.method.Network`.
+
+    Parameters
+    ----------
+    options : model options
+        The design; it must be one that learns.
+    fabrics : sequence of Fabric
+        What it learns; one for a model of one material.
+    extra : sequence
+        One list for each set that ``options.extra_rows`` declares: the columns of its rows, fabric by fabric.
+
+    Raises
+    ------
+    MethodFailed
+        If the code of a network from outside is not the planned one, or fails.
+    """
+    if isinstance(options, AddedMethod):
+        from pipeline.models.added.network import build_added
+
+        return build_added(options, fabrics)
+    return module_of(options.model).build(options, fabrics, *extra)
+
+
+def restore_methods(options: ModelOptions, trained: Trained) -> list[Method]:
+    """Return the methods that options and trained models describe; RuntimeError or KeyError if they do not fit."""
+    if isinstance(options, AddedMethod):
+        if options.learns:
+            from pipeline.models.added.network import restore_added
+
+            return [restore_added(options, trained)]
+        from pipeline.models.added.guarded import load_added
+
+        return [load_added(options)]
+    methods: list[Method] = module_of(options.model).restore(options, trained)
+    return methods
+
+
 def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:
     """Return the methods that options describe.
 
@@ -94,32 +134,30 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     MethodFailed
         If the code of a method from outside is not the planned one, or fails.
     """
-    if isinstance(options, AddedMethod):
-        from pipeline.models.added.guarded import load_added
-
-        return [load_added(options)]
     trained = [_read(folder, options) for folder in folders]
     try:
-        methods: list[Method] = module_of(options.model).restore(options, trained)
-    except BadInput:
+        return restore_methods(options, trained)
+    except (BadInput, WorkFailed):
         raise
     except (RuntimeError, KeyError, ValueError) as error:
         where = ", ".join(str(folder) for folder in folders)
         raise BadInput(
             where, "", "not a whole model", "card and weights do not fit together: train it again"
         ) from error
-    return methods
 
 
 def load_model(folder: Path) -> list[Method]:
     """Return the methods of one trained folder, options read from its card."""
     card = read_card(folder)
+    if isinstance(about := card.get("options"), dict) and about.get("model") == ADDED:
+        allowed = "is a network from outside the package, whose code is not here: measure it with --add"
+        raise BadInput(str(folder / CARD), "name", card.get("name"), allowed)
     return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])
 
 
 def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:
     card = read_card(folder)
-    if card.get("options") != options.model_dump(mode="json"):
+    if card.get("options") != options.model_dump(mode="json", context=IDENTITY):
         raise BadInput(str(folder / CARD), "options", card.get("options"), "trained with other options; train it again")
     version = card.get("version", {}).get("model")
     if version != options.version:

@@ -21,11 +21,12 @@ import torch
 from torch import nn
 
 from pipeline import versions
-from pipeline.fingerprint import fingerprint
+from pipeline.fingerprint import IDENTITY, fingerprint
+from pipeline.models.added.network import calls_of
 from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
-from pipeline.models.registry import module_of
+from pipeline.models.registry import build_network
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows
@@ -70,6 +71,8 @@ def train(
         If rows are missing, the folder cannot be written, or a requested GPU is missing.
     WorkFailed
         If the loss diverges; the last good checkpoint stays.
+    MethodFailed
+        If a network from outside fails.
     """
     device = chosen_device(training.device)
     manifest = Manifest.load(manifest_folder)
@@ -86,7 +89,8 @@ def train(
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
         extra = [[manifest.read_extra(manifest_folder, name, one) for name in fabrics] for one in options.extra_rows]
-        network: Any = module_of(options.model).build(options, members, *extra)
+        network: Any = build_network(options, members, extra)
+        call = calls_of(network)
         del extra
         stride = max(len(rows.table) // _START_ROWS, 1)
         network.start_at(torch.from_numpy(rows.table[::stride, TARGET].copy()))
@@ -108,9 +112,11 @@ def train(
         for step in range(first, training.steps):
             _set_rate(optimiser, peaks, rate_factor(step, training))
             network.schedule(step / training.steps)
-            with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
-                loss = learnt(batches.step(step), order.random(step))
-            norm = _descend(network, optimiser, loss, training.gradient_clip)
+            batch, random = batches.step(step), order.random(step)
+            with call("loss"):
+                with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
+                    loss = learnt(batch, random)
+                norm = _descend(network, optimiser, loss, training.gradient_clip)
 
             # Note the loss; look at it only now and then, because looking waits for the device.
             state.add(step, loss.detach(), norm)
@@ -118,7 +124,7 @@ def train(
             if done % interval == 0 or done == training.steps:
                 state.mark(done)
             if watched is not None and (done % looks == 0 or done == training.steps):
-                with state.averaged():
+                with state.averaged(), call("loss"):
                     held_out_loss = float(network.loss(watched, order.random(_WATCH)))
                 state.offer(done, held_out_loss)
                 error, noise = held_out.error_and_noise(state.weights())
@@ -219,7 +225,7 @@ def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: 
         "name": options.name,
         "domain": Domain.of(manifest.about, members).model_dump(mode="json"),
         "version": {"model": options.version, "training": versions.TRAINING},
-        "options": options.model_dump(mode="json"),
+        "options": options.model_dump(mode="json", context=IDENTITY),
         "training": training.model_dump(mode="json", exclude={"device", "checkpoint_every"}),
         "dataset": {"name": manifest.name, "fingerprint": manifest.fingerprint},
         "fabrics": [

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from pipeline.models.method import Batch
-from pipeline.models.registry import module_of
+from pipeline.models.registry import restore_methods
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.query import Answers, Queries
@@ -90,7 +90,7 @@ class HeldOut:
     def _answered(
         self, weights: dict[str, Tensor], share: int
     ) -> Iterator[tuple[str, npt.NDArray[np.float32], Queries, Answers]]:
-        (method,) = module_of(self._options.model).restore(self._options, [(self._card, weights)])
+        (method,) = restore_methods(self._options, [(self._card, weights)])
         for name, (queries, answers) in self._rows.items():
             few = queries.take(slice(share))
             yield name, method.predict(self._manifest.fabrics[name], few), few, answers.take(slice(share))

@@ -27,4 +27,4 @@ class ModelNote:
     def learns(self) -> bool:
         """True if there is anything to train."""
         model = CLASSES.get(self.kind or self.name)
-        return self.kind != ADDED and (model is None or model.learns)
+        return bool(self.fingerprint) if self.kind == ADDED else model is None or model.learns

@@ -1,4 +1,4 @@
-"""A method from outside, entered as pipeline/models/README.md says, from the text alone; then methods that fail."""
+"""Methods and a network from outside, entered as pipeline/models/README.md says, from the text alone; then faults."""
 
 import json
 import os
@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
 (METRIC,) = re.findall(r"^`largest_error.py`:\n\n```python\n(.*?)^```$", TEXT, re.M | re.S)
 SECTION = TEXT.partition("\n## A method of your own\n")[2].partition("\n## ")[0]
+NETWORK = TEXT.partition("\n## A network of your own\n")[2].partition("\n## ")[0]
 
 LATE = """
 import numpy as np
@@ -69,8 +70,13 @@ def run(command, folder):
     )
 
 
-FILES = dict(re.findall(r"^`(\S+)`:\n\n```\w+\n(.*?)^```$", SECTION, re.M | re.S))
-(COMMAND,) = re.findall(r"^```sh\n(.*)\n```$", SECTION, re.M)
+def files_and_command(section):
+    """Return the files of a section of the text by their names, and its command."""
+    (command,) = re.findall(r"^```sh\n(.*)\n```$", section, re.M)
+    return dict(re.findall(r"^`(\S+)`:\n\n```\w+\n(.*?)^```$", section, re.M | re.S)), command
+
+
+FILES, COMMAND = files_and_command(SECTION)
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +103,60 @@ def test_the_text_is_enough(entered):
     without = run(COMMAND.partition(" --add")[0], entered)
     assert without.returncode == 2
     assert "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
+
+
+@pytest.fixture(scope="module")
+def learnt(tmp_path_factory):
+    """Return a folder with the network of the text, in which its command was run, and the command."""
+    folder = tmp_path_factory.mktemp("learnt")
+    files, command = files_and_command(NETWORK)
+    for name, content in files.items():
+        (folder / name).write_text(content, encoding="utf-8")
+    done = run(command, folder)
+    assert done.returncode == 0, done.stderr
+    return folder, command
+
+
+def test_the_text_is_enough_for_a_network(learnt):
+    folder, command = learnt
+    page = folder / "out" / "report" / "learnt"
+    html = (page / "index.html").read_text(encoding="utf-8")
+    records = [one for one in read_records([page / "records.json"]) if one.method == "perceptron"]
+    assert {one.metric for one in records} >= {"mse", "flicker", "time", "prepare_time", "size_colour", "extreme_error"}
+    errors = [one for one in records if one.metric == "mse" and not one.component]
+    assert {one.provenance.seed for one in records if one.metric == "mse"} == {0, 1}
+    (origin,) = {one.provenance.origin for one in errors or records}
+    assert origin in html and "each fabric by itself, 200 steps of 128 queries, 2 trainings" in html
+    cards = [json.loads(path.read_text()) for path in sorted((folder / "out" / "models").glob("*/card.json"))]
+    assert [card["training"]["seed"] for card in sorted(cards, key=lambda card: card["training"]["seed"])] == [0, 1]
+    for card in cards:
+        assert card["options"]["sha256"] in origin and card["curve"][-1]["loss"] < card["curve"][0]["loss"]
+    assert "nothing to do" in run(command, folder).stdout
+
+
+def test_a_network_that_fails_leaves_the_others_their_trainings(learnt):
+    """One hangs in its loss, one raises; each is one sentence, and the sound network has what it had."""
+    folder, _ = learnt
+    text = (folder / "perceptron.py").read_text(encoding="utf-8")
+    loss = "        return (self(batch) - batch.target)"
+    assert loss in text
+    for name, fault in (("hangs", "__import__('time').sleep(600)"), ("raises", "raise OSError('full')")):
+        changed = text.replace(loss, f"        {fault}\n{loss}").replace('"perceptron"', f'"{name}"')
+        (folder / f"{name}.py").write_text(changed, encoding="utf-8")
+    recipe = (folder / "learnt.toml").read_text(encoding="utf-8")
+    more = '\n[[models]]\nmodel = "hangs"\nlimit = 5\n\n[[models]]\nmodel = "raises"\nname = "broken"\n'
+    (folder / "more.toml").write_text(recipe.replace('"learnt"', '"more"') + more, encoding="utf-8")
+    done = run(
+        "twillight train more.toml --add perceptron.py:Perceptron --add hangs.py:Perceptron --add raises.py:Perceptron",
+        folder,
+    )
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    ledger = [json.loads(path.read_text()) for path in (folder / "out" / "ledger").glob("*.failed.json")]
+    failed = {one["title"]: str(one) for one in ledger}
+    assert failed.keys() == {"hangs on denim", "broken on denim"}
+    assert "hangs: loss took longer than 5 s, its limit" in failed["hangs on denim"]
+    assert "broken: loss: OSError: full (raises.py, line 28)" in failed["broken on denim"]
+    assert len(list((folder / "out" / "models").glob("perceptron-*/model.safetensors"))) == 2
 
 
 @pytest.mark.slow

@@ -22,11 +22,14 @@ LOADING: Final = 60.0
 _FUNCTIONS: Final = ("covers", "prepare", "predict", "bytes_stored")
 """Functions of `pipeline.models.method.Method`."""
 
-_TRAINED: Final = ("build", "loss", "start_at", "schedule", "parameter_groups", "architecture")
-"""Functions of models that are trained (`pipeline.models.method.Network`)."""
+_TRAINED: Final = ("network", "load")
+"""Functions of methods whose network is trained (`pipeline.models.added.network`)."""
 
-_STATED: Final = ("name", "setting", "version", "kinds")
-"""Attributes; the last may be missing."""
+_STATED: Final = ("name", "setting", "version")
+"""Attributes that every method has."""
+
+_MAY_STATE: Final = ("kinds", "of_one_material")
+"""Attributes that may be missing."""
 
 METRIC_PARAMETERS: Final = ("fabric", "queries", "answers", "truth", "standard_error")
 """Parameters of a metric: the cloth, N queries about it, the method's answers, the truth's and their errors, (N, 4)."""
@@ -87,7 +90,8 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     with faults_of(source.name, "__init__", LOADING, source.root):
         method = make(**own)
     with faults_of(source.name, "its attributes", LOADING, source.root):
-        has = {name: getattr(method, name) for name in (*_STATED, *_FUNCTIONS, *_TRAINED) if hasattr(method, name)}
+        names = (*_STATED, *_MAY_STATE, *_FUNCTIONS, *_TRAINED)
+        has = {name: getattr(method, name) for name in names if hasattr(method, name)}
         if not isinstance(has.get("kinds", ""), str):
             has["kinds"] = list(has["kinds"])
     return {**_stated(has, text), **code, "own": own}
@@ -129,12 +133,9 @@ def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) 
 
 def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Return what a method says of itself, from its attributes; BadInput if one is missing or cannot be used."""
-    if taught := [name for name in _TRAINED if callable(has.get(name))]:
-        allowed = f"has {taught[0]!r}: a network cannot be trained from outside yet; load trained weights in __init__"
-        raise BadInput(WHERE, "", text, allowed)
     if lacks := [name for name in _FUNCTIONS if not callable(has.get(name))]:
         raise BadInput(WHERE, "", text, f"lacks the function {lacks[0]!r} of pipeline.models.method.Method")
-    if lacks := [name for name in _STATED[:-1] if name not in has]:
+    if lacks := [name for name in _STATED if name not in has]:
         raise BadInput(WHERE, "", text, f"lacks the attribute {lacks[0]!r}")
     name, setting, version = has["name"], has["setting"], has["version"]
     if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -146,4 +147,17 @@ def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     kinds, known = has.get("kinds", []), get_args(Kind)
     if isinstance(kinds, str) or not all(kind in known for kind in kinds):
         raise BadInput(WHERE, "", text, f"kinds = {brief(kinds)} must be some of {', '.join(known)}")
-    return {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}
+    stated = {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}
+    return stated | _stated_of_network(has, text)
+
+
+def _stated_of_network(has: Mapping[str, Any], text: str) -> dict[str, Any]:
+    """Return whether a method is trained, and on a single fabric; BadInput if it has one of two functions alone."""
+    learns, one_fabric = callable(has.get("network")), has.get("of_one_material", False)
+    if learns and not callable(has.get("load")):
+        raise BadInput(WHERE, "", text, "has a function 'network' and lacks 'load', which receives the trained network")
+    if not isinstance(one_fabric, bool):
+        raise BadInput(WHERE, "", text, f"of_one_material = {brief(one_fabric)} must be True or False")
+    if one_fabric and not learns:
+        raise BadInput(WHERE, "", text, "has of_one_material = True and lacks a function 'network', which is trained")
+    return {"has_network": learns, "has_one_fabric": one_fabric}

@@ -168,17 +168,21 @@ class Guarded:
         Its file, or the folder of its package.
     values : bool
         Refuse answers that are negative or not finite. Without it, only their form is checked.
+    domain : Domain, optional
+        Domain of its training; any query if left out.
     """
 
-    def __init__(self, method: Method, options: AddedMethod, root: Path, values: bool = True) -> None:
+    def __init__(
+        self, method: Method, options: AddedMethod, root: Path, values: bool = True, domain: Domain | None = None
+    ) -> None:
         self.name, self.setting = options.name, options.setting
         self._method, self._options, self._root, self._values = method, options, root, values
         self._first = True
-        self.domain: Domain | None = None
+        self.domain = domain
 
     def unchecked(self) -> Guarded:
         """Return the method with answers of any value, for measurements that count wrong ones."""
-        return Guarded(self._method, self._options, self._root, values=False)
+        return Guarded(self._method, self._options, self._root, values=False, domain=self.domain)
 
     def covers(self, fabric: Fabric) -> bool:
         """Return whether the method covers a fabric."""
@@ -262,7 +266,7 @@ def load_function(options: AddedFunction) -> Callable[..., float]:
 
 
 def load_added(options: AddedMethod) -> Guarded:
-    """Import the code of a method from outside and make it.
+    """Import the code of a method from outside that is not trained, and make it.
 
     Raises
     ------
@@ -271,11 +275,36 @@ def load_added(options: AddedMethod) -> Guarded:
     MethodFailed
         If it cannot be imported, or the method cannot be made.
     """
+    make, root = imported(options)
+    return Guarded(make(), options, root)
+
+
+def imported(options: AddedMethod) -> tuple[Callable[[], Method], Path]:
+    """Import the code of a method from outside.
+
+    Returns
+    -------
+    callable
+        Makes the method; raises MethodFailed if that fails.
+    Path
+        Its file, or the folder of its package.
+
+    Raises
+    ------
+    WorkFailed
+        If the code is not the planned one.
+    MethodFailed
+        If it cannot be imported.
+    """
     source = locate(options.source, options.folder)
     source.verify(options.sha256)
     with faults_of(options.name, "import", options.limit, source.root):
         module = source.imported()
-    make = source.of(module)
-    with faults_of(options.name, "__init__", options.limit, source.root):
-        method = make(**options.own)
-    return Guarded(method, options, source.root)
+    found = source.of(module)
+
+    def make() -> Method:
+        with faults_of(options.name, "__init__", options.limit, source.root):
+            method: Method = found(**options.own)
+        return method
+
+    return make, source.root

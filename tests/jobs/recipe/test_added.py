@@ -5,6 +5,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from jobs.plan.plan import plan
+from jobs.plan.training import Training
 from jobs.recipe import added
 from jobs.recipe.load import load_recipe
 from pipeline.models.added.added_method import GROUP
@@ -28,6 +29,8 @@ def largest(fabric, queries, answers, truth, standard_error):
     """Largest error."""
     return abs(answers - truth).max()
 '''
+
+NETWORK = METHOD + "    network = load = covers\n"
 
 HERE = '\n[[models]]\nmodel = "theirs"\n'
 
@@ -61,6 +64,45 @@ def test_a_changed_file_is_measured_again_and_nothing_else(files, theirs, tmp_pa
     after = ids(load_recipe(path, [theirs]))
     changed = {title for title in before if after[title] != before[title]}
     assert changed == {title for title in before if "theirs" in title or "timing" in title or "page" in title}
+
+
+@pytest.mark.parametrize("one_material", [False, True])
+def test_a_network_is_trained_and_measured_of_each_seed(files, theirs, tmp_path, one_material):
+    (tmp_path / "theirs.py").write_text(NETWORK + f"    of_one_material = {one_material}\n")
+    training = "[models.training]\nsteps = 20\nseed = 4\n"
+    before = ids(load_recipe(files.write()))
+    files.text += HERE + "rows = 9\nseeds = 2\n" + training
+    path = files.write()
+    (model,) = [one for one in load_recipe(path, [theirs]).models if one.options.model == "added"]
+    assert (model.seeds, model.training.steps, model.of_one_material) == (2, 20, one_material)
+    assert model.options.own == {"rows": 9}
+
+    recipe = load_recipe(path, [theirs])
+    tasks = plan(recipe)
+    trained = [task for task in tasks if isinstance(task, Training) and task.options.model == "added"]
+    groups = [("denim",), ("own",), ("twill_4_4",)]
+    general = [tuple(fabric.name for fabric in (*recipe.seen, *recipe.population))]
+    assert [task.fabrics for task in trained] == 2 * (groups if one_material else general)
+    assert [task.training.seed for task in trained] == sorted([4, 5] * (3 if one_material else 1))
+    measured = [task for task in tasks if task.stage == "bench" and task.group == "theirs"]
+    assert measured and all({task.id for task in trained} & set(task.needs) for task in measured)
+    (note,) = [note for note in tasks[-1].models if note.name == "theirs"]
+    assert note.learns and note.about.startswith("from outside this package: theirs.py, version 3, SHA-256 ")
+    what = "each fabric by itself" if one_material else "5 fabrics at once"
+    assert f"; {what}, 20 steps of 1,024 queries, 2 trainings with the seeds 4 to 5" in note.about
+    changed = {title for title, one in ids(recipe).items() if before.get(title, one) != one}
+    assert changed == {"bench timing of all methods", "report page of tiny"}
+
+
+def test_a_changed_network_is_trained_again(files, theirs, tmp_path):
+    (tmp_path / "theirs.py").write_text(NETWORK)
+    path = files.write()
+    before = ids(load_recipe(path, [theirs]))
+    (tmp_path / "theirs.py").write_text(NETWORK + "\n")
+    after = ids(load_recipe(path, [theirs]))
+    changed = {title for title in before if after[title] != before[title]}
+    assert changed == {title for title in before if "theirs" in title or "timing" in title or "page" in title}
+    assert any(title.startswith("train theirs") for title in changed)
 
 
 def test_a_recipe_has_its_options_and_its_name(files, theirs):

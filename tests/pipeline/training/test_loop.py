@@ -6,6 +6,9 @@ import pytest
 import safetensors.torch
 import torch
 
+from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.guarded import MethodFailed
+from pipeline.models.added.source import locate
 from pipeline.models.method import Method
 from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
@@ -16,6 +19,7 @@ from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
 from pipeline.training.loop import rate_factor, train
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut, footprint_labels
+from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput, WorkFailed
 
 # The closed form of conftest is small in value: its loss is weighted for it, whatever suits real cloth.
@@ -28,6 +32,64 @@ FABRICS = {
     "selvage": ["polyester_lining", "cotton_twill"],
 }
 OPTIONS = {"woven": WOVEN, "neumip": NEUMIP, "selvage": SelvageOptions(width=16, measured_rows=64)}
+
+
+THEIRS = """
+import torch
+from torch import nn
+
+
+class Network(nn.Module):
+    def __init__(self, width):
+        super().__init__()
+        self.layers = nn.Sequential(nn.Linear(7, width), nn.ReLU(), nn.Dropout(0.1), nn.Linear(width, 4), nn.Softplus())
+
+    def forward(self, queries):
+        return self.layers(torch.cat([queries.wi, queries.wo, queries.sigma.log()[..., None]], dim=-1))
+
+    def loss(self, batch, random):
+        return (self(batch) - batch.target).square().mean()
+
+
+class Theirs:
+    name, version, setting = "theirs", 1, ""
+
+    def __init__(self, width=16):
+        self.width = width
+
+    def network(self, fabrics):
+        return Network(self.width)
+
+    def load(self, network):
+        self.trained = network
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        pass
+
+    def predict(self, fabric, queries, seed=0):
+        with torch.inference_mode():
+            return self.trained(queries._make(torch.tensor(column) for column in queries)).numpy()
+
+    def bytes_stored(self, fabric):
+        return 0
+"""
+"""A network from outside, with random numbers of torch."""
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    """Options of the network above, in which a part of the text is another."""
+
+    def of(old="", new=""):
+        assert old in THEIRS
+        (tmp_path / "theirs.py").write_text(THEIRS.replace(old, new))
+        source = locate(f"{tmp_path / 'theirs.py'}:Theirs")
+        return AddedMethod(name="theirs", source=source.text, sha256=source.sha256(), stated="1", has_network=True)
+
+    return of
 
 
 class Killed(KeyboardInterrupt):
@@ -59,6 +121,59 @@ def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path):
     assert shares[0] == pytest.approx(17 / 30)
     assert contents(resumed) == contents(whole)
     assert set(contents(whole)) == {"model.safetensors", "card.json"}
+
+
+def test_a_killed_training_from_outside_goes_on_to_the_same_bytes(folder, tmp_path, theirs):
+    """Its dropout reads the random numbers of torch; the code may lie elsewhere when it goes on."""
+    whole, resumed, fabrics = tmp_path / "whole", tmp_path / "resumed", FABRICS["woven"]
+    train(theirs(), SHORT, folder, fabrics, whole)
+    with pytest.raises(Killed):
+        train(theirs(), SHORT, folder, fabrics, resumed, killed_at(20 / 30))
+    (tmp_path / "elsewhere").mkdir()
+    moved = (tmp_path / "theirs.py").rename(tmp_path / "elsewhere" / "theirs.py")
+    options = theirs().model_copy(update={"source": f"{moved}:Theirs", "limit": 50.0})
+    (tmp_path / "theirs.py").unlink()
+    assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
+    shares = []
+    train(options, SHORT, folder, fabrics, resumed, shares.append)
+    assert shares[0] == pytest.approx(17 / 30)
+    assert contents(resumed) == contents(whole)
+    card = json.loads(contents(whole)["card.json"])
+    assert (card["name"], card["options"]["sha256"]) == ("theirs", options.sha256)
+    assert str(tmp_path) not in contents(whole)["card.json"].decode()
+
+
+def test_a_network_from_outside_learns_and_answers(folder, tmp_path, theirs):
+    train(theirs(), SHORT, folder, FABRICS["woven"], tmp_path / "out")
+    (method,) = load_methods(theirs(), [tmp_path / "out"])
+    card = json.loads((tmp_path / "out" / "card.json").read_text())
+    assert card["curve"][-1]["held_out_mse"] < card["curve"][0]["held_out_mse"]
+    manifest = Manifest.load(folder)
+    queries, answers = manifest.read(folder, "cotton_twill", "validation")
+    found = method.predict(manifest.fabrics["cotton_twill"], queries)
+    mse = np.square(found[:, 1] - answers.mean[:, 1]).mean()
+    assert mse == pytest.approx(card["validation"]["cotton_twill"][COMPONENTS[1]]["mse"], rel=1e-4)
+    assert method.domain.kinds == frozenset()
+    with pytest.raises(BadInput, match="whose code is not here: measure it with --add"):
+        load_model(tmp_path / "out")
+    with pytest.raises(BadInput, match="trained with other options; train it again"):
+        load_methods(theirs("16", "17"), [tmp_path / "out"])
+
+
+@pytest.mark.parametrize(
+    ("loss", "error", "sentence"),
+    [
+        ("1 / 0", MethodFailed, r"^theirs: loss: ZeroDivisionError: division by zero \(theirs.py, line 15\)$"),
+        ("self(batch)", MethodFailed, r"^theirs: loss returned a tensor float32 \(2, 128, 4\); one number"),
+        ("self(batch).sum() * torch.nan", WorkFailed, "the training loss diverged by step 6: try a lower"),
+        ("self(batch).exp().mul_(2).exp_().sum()", MethodFailed, "^theirs: loss: RuntimeError: one of the variables"),
+    ],
+)
+def test_a_fault_of_a_loss_from_outside_is_a_sentence(folder, tmp_path, theirs, loss, error, sentence):
+    options = theirs("(self(batch) - batch.target).square().mean()", loss)
+    with pytest.raises(error, match=sentence):
+        train(options, SHORT, folder, FABRICS["woven"], tmp_path / "out")
+    assert not (tmp_path / "out" / "card.json").exists()
 
 
 def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path):

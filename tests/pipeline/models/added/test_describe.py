@@ -39,6 +39,19 @@ def test_a_file_says_what_it_holds(path):
     assert not list(path.parent.glob("__pycache__"))
 
 
+def test_a_class_with_a_network_is_trained(path):
+    assert not describe(f"{path}:Theirs", {}, {}).learns
+    network = "    def network(self, fabrics): ...\n    def load(self, network): ...\n"
+    path.write_text(METHOD + network)
+    found = describe(f"{path}:Theirs", {}, {})
+    assert found.learns and not found.of_one_material
+    path.write_text(METHOD + network + "    of_one_material = True\n")
+    assert describe(f"{path}:Theirs", {}, {}).of_one_material
+    path.write_text(METHOD + network + "    of_one_material = 1\n")
+    with pytest.raises(BadInput, match="of_one_material = 1 must be True or False"):
+        describe(f"{path}:Theirs", {}, {})
+
+
 def test_a_module_of_the_current_folder_is_its_file(path, monkeypatch):
     monkeypatch.chdir(path.parent)
     assert describe("theirs:Theirs", {}, {}) == describe(f"{path}:Theirs", {}, {})
@@ -81,7 +94,12 @@ def test_an_installed_module_has_its_distribution():
         ),
         ('"theirs", "2.1"', '"../theirs", "2.1"', "name = '../theirs' must be letters"),
         ('{"stretch"}', '{"sideways"}', "kinds = ['sideways'] must be some of behind, stretch, curvature"),
-        ("def prepare", "def loss(self): ...\n    def prepare", "a network cannot be trained from outside yet"),
+        (
+            "def prepare",
+            "def network(self, fabrics): ...\n    def prepare",
+            "has a function 'network' and lacks 'load'",
+        ),
+        ("    def covers", "    of_one_material = True\n\n    def covers", "and lacks a function 'network'"),
         ("rows=8", "rows", "its option 'rows' has no default; every option needs one"),
         ("rows=8", "rows=800", "__init__: AssertionError: too many rows (theirs.py, line 6)"),
     ],

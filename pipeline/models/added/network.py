@@ -1,0 +1,200 @@
+"""A network from outside: its training behind a guard, and the method that its trained weights are loaded into.
+
+The class from outside has two functions more than `pipeline.models.method.Method`: ``network(fabrics)`` returns an
+untrained torch module with the function ``loss``, and ``load(network)`` receives the trained one. Both see fabrics
+without colours, which the components do not depend on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from pipeline.compiled.arrays import Float32
+from pipeline.fingerprint import fingerprint
+from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported
+from pipeline.models.domain import joined_domain
+from pipeline.models.method import Batch, Method, Trained
+from pipeline.models.per_fabric import PerFabric
+from pipeline.truth.query import Queries
+from weaves.draft import Matrix
+from weaves.fabric import Fabric
+
+Calls = Callable[[str], AbstractContextManager[None]]
+"""Marks a call of a function, given by its name, and turns its faults into sentences."""
+
+
+class GuardedNetwork(nn.Module):
+    """A network from outside with the interface of `pipeline.models.method.Network`.
+
+    Parameters
+    ----------
+    network : nn.Module
+        The network; of its functions ``loss`` is needed, the others have defaults.
+    name : str
+        Name of the method in tables.
+    fabrics : sequence of Fabric
+        Fabrics that it learns.
+    call : Calls
+        Guard of its functions. The training loop guards ``loss``, together with the gradients.
+    """
+
+    def __init__(self, network: nn.Module, name: str, fabrics: Sequence[Fabric], call: Calls) -> None:
+        super().__init__()
+        self.network, self.name, self.fabrics, self.call = network, name, fabrics, call
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the loss of a batch; torch's own random numbers depend on seed and step alone, too."""
+        torch.manual_seed(int(random.integers(2**63)))
+        loss: object = self.network.loss(batch, random)  # type: ignore[operator]
+        if not isinstance(loss, Tensor):
+            raise MethodFailed(self.name, f"loss returned {type(loss).__name__}; a tensor with one number is needed")
+        if loss.ndim or not loss.is_floating_point():
+            form = f"{str(loss.dtype).removeprefix('torch.')} {tuple(loss.shape)}"
+            raise MethodFailed(self.name, f"loss returned a tensor {form}; one number, shape (), is needed")
+        if torch.is_grad_enabled() and not loss.requires_grad:
+            raise MethodFailed(self.name, "loss returned a number that does not depend on the network's parameters")
+        return loss
+
+    def start_at(self, target: Tensor) -> None:
+        """Show the network some targets (M, 4) before the first step; nothing by default."""
+        with self.call("start_at"):
+            self._own("start_at", lambda target: None)(target)
+
+    def schedule(self, progress: float) -> None:
+        """Adjust scheduled parameters; nothing by default."""
+        with self.call("schedule"):
+            self._own("schedule", lambda progress: None)(progress)
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return the optimiser's parameter groups; by default all parameters learn at the same rate."""
+        with self.call("parameter_groups"):
+            default = [{"params": list(self.network.parameters()), "lr": rate}]
+            groups: list[dict[str, Any]] = self._own("parameter_groups", lambda rate: default)(rate)
+            torch.optim.AdamW(groups)  # refuses what is no group here, where the fault has a name
+            return groups
+
+    def architecture(self) -> dict[str, Any]:
+        """Return parameters and layers for the model card, what the network says of itself, and its fabrics."""
+        layers = {name: list(weight.shape) for name, weight in self.network.named_parameters()}
+        counted = {"parameters": {"total": sum(weight.numel() for weight in self.network.parameters())}}
+        with self.call("architecture"):
+            own = dict(self._own("architecture", dict)())
+            json.dumps(own, allow_nan=False)
+        fabrics = [{"name": fabric.name, **fabric.optics()} for fabric in self.fabrics]
+        return {**counted, "layers": layers, **own, "fabrics": fabrics}
+
+    def _own(self, function: str, default: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function of the network, or its default."""
+        own: Callable[..., Any] = getattr(self.network, function, default)
+        return own
+
+
+class PerFabricMethod:
+    """Methods from outside that know one fabric each, as one method.
+
+    Parameters
+    ----------
+    methods : mapping
+        From the fingerprint of a fabric's optics to the method that learnt it.
+    """
+
+    name = setting = ""
+
+    def __init__(self, methods: Mapping[str, Method]) -> None:
+        self._methods = methods
+        self._known = PerFabric(lambda fabric: methods[fingerprint(fabric.optics())])
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return whether a network learnt the fabric, and its method covers it."""
+        return fingerprint(fabric.optics()) in self._methods and self._known.of(fabric).covers(fabric)
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Prepare the method of the fabric."""
+        self._known.of(fabric).prepare(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Return the components of N queries, float32 (N, 4)."""
+        return self._known.of(fabric).predict(fabric, queries, seed)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes that a renderer stores for the fabric."""
+        return self._known.of(fabric).bytes_stored(fabric)
+
+
+def calls_of(network: nn.Module) -> Calls:
+    """Return the guard of a network's functions; that of a network of the package does nothing."""
+    return network.call if isinstance(network, GuardedNetwork) else lambda function: nullcontext()
+
+
+def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwork:
+    """Return an untrained network from outside.
+
+    Raises
+    ------
+    WorkFailed
+        If the code is not the planned one.
+    MethodFailed
+        If it fails, or its function `network` returns none that can be trained.
+    """
+    make, root = imported(options)
+    return _built(make(), options, root, [_uncoloured(fabric.name, fabric.optics()) for fabric in fabrics])
+
+
+def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
+    """Return the method from outside with its trained networks: one, or one a fabric.
+
+    Raises
+    ------
+    WorkFailed
+        If the code is not the planned one.
+    MethodFailed
+        If it fails, or its network does not take the weights.
+    """
+    make, root = imported(options)
+    methods = {}
+    for card, weights in trained:
+        method: Any = make()
+        fabrics = [
+            _uncoloured(about["name"], {key: value for key, value in about.items() if key != "name"})
+            for about in card["architecture"]["fabrics"]
+        ]
+        network = _built(method, options, root, fabrics)
+        with network.call("network"):
+            network.load_state_dict(weights)
+        with network.call("load"):
+            method.load(network.network.eval())
+        methods[fingerprint(fabrics[0].optics())] = method
+    domain = joined_domain([card for card, _ in trained])
+    (*_, last) = methods.values()
+    return Guarded(PerFabricMethod(methods) if options.of_one_material else last, options, root, domain=domain)
+
+
+def _built(method: Any, options: AddedMethod, root: Path, fabrics: Sequence[Fabric]) -> GuardedNetwork:
+    """Return the network of a method; MethodFailed if it cannot be trained."""
+
+    def call(function: str) -> AbstractContextManager[None]:
+        return faults_of(options.name, function, options.limit, root)
+
+    with call("network"):
+        network = method.network(list(fabrics))
+    if not isinstance(network, nn.Module):
+        raise MethodFailed(options.name, f"network returned {type(network).__name__}; a torch.nn.Module is needed")
+    if not callable(getattr(network, "loss", None)):
+        raise MethodFailed(options.name, f"network returned {type(network).__name__}, which lacks the function 'loss'")
+    if not any(weight.requires_grad for weight in network.parameters()):
+        raise MethodFailed(options.name, f"network returned {type(network).__name__}, which has nothing to train")
+    return GuardedNetwork(network, options.name, fabrics, call)
+
+
+def _uncoloured(name: str, optics: Mapping[str, Any]) -> Fabric:
+    """Return the fabric of a name and of these optics, in the colours of a file that gives none."""
+    return Fabric.model_validate({**optics, "name": name, "draft": Matrix(rows=tuple(optics["draft"]))})

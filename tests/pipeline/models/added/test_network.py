@@ -1,0 +1,231 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from pipeline.fingerprint import fingerprint
+from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.guarded import MethodFailed
+from pipeline.models.added.network import build_added, restore_added
+from pipeline.models.added.source import locate
+from pipeline.models.method import Batch
+from pipeline.truth.query import Queries
+from weaves.errors import WorkFailed
+from weaves.fabric import load_fabric
+
+CLOTHS = load_fabric("denim"), load_fabric("cotton_twill")
+
+THEIRS = """
+import torch
+from torch import nn
+
+
+class Network(nn.Module):
+    def __init__(self, fabrics):
+        super().__init__()
+        self.names = [fabric.name for fabric in fabrics]
+        self.answer = nn.Parameter(torch.ones(4))
+
+    def loss(self, batch, random):
+        return (torch.rand(()) * self.answer - batch.target).square().mean()
+
+
+class Theirs:
+    name, version, setting = "theirs", 1, ""
+
+    def network(self, fabrics):
+        return Network(fabrics)
+
+    def load(self, network):
+        self.trained = network
+
+    def covers(self, fabric):
+        return True
+
+    def prepare(self, fabric):
+        assert fabric.name in self.trained.names and not self.trained.training
+
+    def predict(self, fabric, queries, seed=0):
+        return self.trained.answer.detach().repeat(len(queries.u), 1).numpy()
+
+    def bytes_stored(self, fabric):
+        return 16
+"""
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    """Options of the method above, in which a part of the text is another."""
+
+    def of(old="", new="", **fields):
+        assert old in THEIRS
+        path = tmp_path / "theirs.py"
+        path.write_text(THEIRS.replace(old, new))
+        source = locate(f"{path}:Theirs")
+        return AddedMethod(
+            name="theirs", source=source.text, sha256=source.sha256(), stated="1", has_network=True, **fields
+        )
+
+    return of
+
+
+def batch():
+    """Two fabrics, three queries each."""
+    columns = {name: torch.ones(2, 3) for name in Batch._fields}
+    columns |= {"fabric": torch.arange(2), "target": torch.full((2, 3, 4), 0.5)}
+    return Batch(**columns | {name: torch.ones(2, 3, 3) for name in ("wi", "wo")})
+
+
+def queries(count):
+    one = np.ones(count, np.float32)
+    up = np.tile(np.float32([0, 0, 1]), (count, 1))
+    return Queries.round(one, one, one, up, up)
+
+
+def trained(network, cloths, answer):
+    """The card and the weights that a training of the network would leave."""
+    optics = [{"name": cloth.name, "optics": fingerprint(cloth.optics())} for cloth in cloths]
+    card = {"architecture": network.architecture(), "fabrics": optics}
+    return json.loads(json.dumps(card)), {"network.answer": torch.full((4,), float(answer))}
+
+
+def test_functions_that_are_missing_have_defaults(theirs):
+    network = build_added(theirs(), CLOTHS)
+    network.start_at(torch.ones(5, 4))
+    network.schedule(0.5)
+    (group,) = network.parameter_groups(0.25)
+    assert group["lr"] == 0.25 and group["params"][0] is network.network.answer
+    about = network.architecture()
+    assert (about["parameters"], about["layers"]) == ({"total": 4}, {"answer": [4]})
+
+
+def test_its_own_functions_are_used(theirs):
+    own = """
+    def start_at(self, target):
+        self.answer.data = target.mean(dim=0)
+
+    def schedule(self, progress):
+        self.answer.data = self.answer.data * progress
+
+    def parameter_groups(self, rate):
+        return [{"params": [self.answer], "lr": rate / 2}]
+
+    def architecture(self):
+        return {"note": "tiny"}
+
+    def loss"""
+    network = build_added(theirs("    def loss", own), CLOTHS)
+    network.start_at(torch.tensor([[1.0, 2, 3, 4], [3, 4, 5, 6]]))
+    network.schedule(0.5)
+    assert network.network.answer.tolist() == [1.0, 1.5, 2.0, 2.5]
+    assert network.parameter_groups(1.0)[0]["lr"] == 0.5
+    assert network.architecture()["note"] == "tiny"
+
+
+def test_random_numbers_of_torch_are_those_of_the_step(theirs):
+    network = build_added(theirs(), CLOTHS)
+    losses = [network.loss(batch(), np.random.default_rng(seed)).item() for seed in (1, 2, 1)]
+    assert losses[0] == losses[2] != losses[1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("return Network(fabrics)", "return 5", "network returned int; a torch.nn.Module is needed"),
+        ("return Network(fabrics)", "raise KeyError('x')", "network: KeyError: 'x' (theirs.py, line 20)"),
+        ("def loss", "def los", "network returned Network, which lacks the function 'loss'"),
+        ("nn.Parameter(torch.ones(4))", "torch.ones(4)", "network returned Network, which has nothing to train"),
+    ],
+)
+def test_what_is_no_network_gets_a_sentence(theirs, old, new, sentence):
+    with pytest.raises(MethodFailed) as failure:
+        build_added(theirs(old, new), CLOTHS)
+    assert str(failure.value) == f"theirs: {sentence}"
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        ("5.0", "float; a tensor with one number is needed"),
+        ("None", "NoneType; a tensor with one number is needed"),
+        ("self.answer", "a tensor float32 (4,); one number, shape (), is needed"),
+        ("self.answer[:1]", "a tensor float32 (1,); one number, shape (), is needed"),
+        ("torch.tensor(1)", "a tensor int64 (); one number, shape (), is needed"),
+        ("self.answer.detach().sum()", "a number that does not depend on the network's parameters"),
+    ],
+)
+def test_a_loss_is_one_number(theirs, value, sentence):
+    network = build_added(theirs("(torch.rand(()) * self.answer - batch.target).square().mean()", value), CLOTHS)
+    with pytest.raises(MethodFailed) as failure:
+        network.loss(batch(), np.random.default_rng(0))
+    assert str(failure.value) == f"theirs: loss returned {sentence}"
+
+
+@pytest.mark.parametrize(
+    ("function", "body", "sentence"),
+    [
+        ("start_at(self, target)", "raise ValueError('no')", "start_at: ValueError: no"),
+        ("schedule(self, progress)", "raise SystemExit", "schedule: SystemExit"),
+        ("parameter_groups(self, rate)", "return [{'lr': rate}]", "parameter_groups: KeyError: 'params'"),
+        ("parameter_groups(self, rate)", "return 5", "parameter_groups: TypeError"),
+        ("architecture(self)", "return {'a': torch.ones(1)}", "architecture: TypeError"),
+        ("architecture(self)", "return 5", "architecture: TypeError"),
+    ],
+)
+def test_a_fault_of_another_function_names_it(theirs, function, body, sentence):
+    network = build_added(theirs("    def loss", f"    def {function}:\n        {body}\n\n    def loss"), CLOTHS)
+    with pytest.raises(MethodFailed, match=f"^theirs: {sentence}"):
+        network.start_at(torch.ones(1, 4))
+        network.schedule(0.0)
+        network.parameter_groups(0.1)
+        network.architecture()
+
+
+def test_weights_are_loaded_into_the_method(theirs):
+    options = theirs()
+    network = build_added(options, CLOTHS)
+    method = restore_added(options, [trained(network, CLOTHS, 3)])
+    method.prepare(CLOTHS[1])
+    assert method.predict(CLOTHS[0], queries(2)).tolist() == [[3.0] * 4] * 2
+    assert (method.name, method.domain, method.bytes_stored(CLOTHS[0])) == ("theirs", None, 16)
+
+
+def test_fabrics_come_back_from_the_card_without_their_colours(theirs):
+    options = theirs("self.names =", "self.seen = fabrics; self.names =")
+    network = build_added(options, CLOTHS)
+    assert [cloth.optics() for cloth in network.network.seen] == [cloth.optics() for cloth in CLOTHS]
+    assert network.network.seen[0].warp.diffuse != CLOTHS[0].warp.diffuse
+    method = restore_added(options, [trained(network, CLOTHS, 3)])
+    assert method._method.trained.seen == network.network.seen
+
+
+def test_networks_of_one_fabric_answer_for_theirs(theirs):
+    options = theirs(has_one_fabric=True)
+    parts = [trained(build_added(options, [cloth]), [cloth], index + 1) for index, cloth in enumerate(CLOTHS)]
+    method = restore_added(options, parts)
+    for index, cloth in enumerate(CLOTHS):
+        blue = cloth.warp.model_copy(update={"diffuse": (0.0, 0.0, 0.5)})
+        for one in (cloth, cloth.model_copy(update={"warp": blue})):
+            assert method.covers(one)
+            assert method.predict(one, queries(1)).tolist() == [[index + 1.0] * 4]
+    assert not method.covers(load_fabric("polyester_lining"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("self.trained = network", "raise OSError('full')", "load: OSError: full"),
+        ("torch.ones(4)", "torch.ones(len(fabrics) + 1)", "network: RuntimeError: Error.s. in loading state_dict"),
+    ],
+)
+def test_a_fault_of_loading_is_a_sentence(theirs, old, new, sentence):
+    network = build_added(theirs(), CLOTHS)
+    part = trained(network, CLOTHS, 1)
+    with pytest.raises(MethodFailed, match=f"^theirs: {sentence}"):
+        restore_added(theirs(old, new), [part])
+
+
+def test_code_that_is_not_the_planned_one_is_refused(theirs):
+    with pytest.raises(WorkFailed, match="000000000000… was planned"):
+        build_added(theirs().model_copy(update={"sha256": "0" * 64}), CLOTHS)
