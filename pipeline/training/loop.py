@@ -70,9 +70,7 @@ def train(
     BadInput
         If rows are missing, the folder cannot be written, or a requested GPU is missing.
     WorkFailed
-        If the loss diverges; the last good checkpoint stays.
-    MethodFailed
-        If a network from outside fails.
+        If the loss diverges, or the code of a network from outside fails; the last good checkpoint stays.
     """
     device = chosen_device(training.device)
     manifest = Manifest.load(manifest_folder)
@@ -95,9 +93,8 @@ def train(
         stride = max(len(rows.table) // _START_ROWS, 1)
         network.start_at(torch.from_numpy(rows.table[::stride, TARGET].copy()))
         network.to(device).train()
-        optimiser = torch.optim.AdamW(
-            network.parameter_groups(training.learning_rate), weight_decay=training.weight_decay, fused=True
-        )
+        groups = network.parameter_groups(training.learning_rate)
+        optimiser = torch.optim.AdamW(groups, weight_decay=training.weight_decay, fused=True)
         peaks = [group["lr"] for group in optimiser.param_groups]
         learnt = torch.compile(network.loss) if training.compile else network.loss
         card = _card(options, training, manifest, fabrics) | {"architecture": network.architecture()}
@@ -127,9 +124,7 @@ def train(
                 with state.averaged(), call("loss"):
                     held_out_loss = float(network.loss(watched, order.random(_WATCH)))
                 state.offer(done, held_out_loss)
-                error, noise = held_out.error_and_noise(state.weights())
-                figures = {"held_out_loss": held_out_loss, "held_out_mse": error, "held_out_noise": noise}
-                state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
+                error, noise = _noted(state, held_out, held_out_loss)
                 if training.stop_at_noise and error <= 2.0 * noise:
                     break
             if done % training.checkpoint_every == 0 and done < training.steps:
@@ -145,6 +140,14 @@ def train(
     (folder / CHECKPOINT).unlink(missing_ok=True)
     (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
+
+
+def _noted(state: State, held_out: HeldOut, loss: float) -> tuple[float, float]:
+    """Put the held-out loss on the curve, with the error of the averaged weights and the noise; return these two."""
+    error, noise = held_out.error_and_noise(state.weights())
+    figures = {"held_out_loss": loss, "held_out_mse": error, "held_out_noise": noise}
+    state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
+    return error, noise
 
 
 def _kept(state: State) -> dict[str, Any]:
