@@ -83,7 +83,7 @@ class Added:
             return dict(content)
         models = [self._entry(entry, f"models.{index}", where) for index, entry in enumerate(entries)]
         if all_given:
-            named = [entry.get("model") for entry in entries if isinstance(entry, Mapping)]
+            named = [entry.get("model", entry.get("name")) for entry in entries if isinstance(entry, Mapping)]
             models += [method.model_dump() for name, method in self._given.items() if name not in named]
         return {**content, "models": models} if models else dict(content)
 
@@ -91,6 +91,8 @@ class Added:
         """Return an entry of a recipe's models, written out if the method is from outside."""
         if not isinstance(entry, Mapping) or not isinstance(model := entry.get("model"), str) or model in CLASSES:
             return entry
+        if "recipe" in entry:
+            return entry  # it is written out in that recipe (`jobs.recipe.trained_by`)
         given, installed = self._given.get(model), _installed().get(model)
         if given is None and installed is None:
             raise BadInput(where, f"{key}.model", model, _unknown(model, [*CLASSES, *self._given, *_installed()]))

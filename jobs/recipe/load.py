@@ -71,8 +71,9 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
         read[real] = _load(found, named[:-1], read, added)
         return read[real]
 
-    content, trained_by = with_trained_by(read_toml(path), where, load)
-    file = validated(RecipeFile, added.entered(content, where, all_given=not chain), where)
+    content = added.entered(read_toml(path), where, all_given=not chain)
+    content, trained_by = with_trained_by(content, where, load)
+    file = validated(RecipeFile, content, where)
     dataset = file.dataset
     recipe = Recipe(
         file.name,

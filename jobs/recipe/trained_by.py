@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from jobs.recipe.recipe import ModelRecipe, Recipe
+from pipeline.models.added.added_method import ADDED
 from pipeline.models.domain import PHYSICS, Domain
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
@@ -91,8 +92,9 @@ def _taken_over(
         allowed = f"must be a model of the recipe {trainer.name}; {nearest_name(str(name), list(known), 'model')}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
     model, options = known[name], known[name].options
-    if entry.get("model", options.model) != options.model:
-        allowed = f"{name} is {options.model} in the recipe {trainer.name}"
+    kind = options.name if options.model == ADDED else options.model
+    if entry.get("model", kind) != kind:
+        allowed = f"{name} is {kind} in the recipe {trainer.name}"
         raise BadInput(where, f"{key}.model", entry["model"], allowed)
     for more in entry.keys() - set(_KEYS):
         raise BadInput(where, f"{key}.{more}", entry[more], f"leave it out: the recipe {trainer.name} says it")

@@ -90,7 +90,10 @@ class Batch(NamedTuple):
 
 
 class Network(Protocol):
-    """A torch module that the training loop can train; the module's file describes what it learns."""
+    """A torch module that the training loop can train; the module's file describes what it learns.
+
+    A network from outside needs `loss` alone (`pipeline.models.added.network`).
+    """
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; `random` is a pure function of seed and step."""

@@ -1,6 +1,7 @@
 """Methods from outside in recipes; the tests of what their code may be are in tests/pipeline/models/added."""
 
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 
@@ -92,6 +93,25 @@ def test_a_network_is_trained_and_measured_of_each_seed(files, theirs, tmp_path,
     assert f"; {what}, 20 steps of 1,024 queries, 2 trainings with the seeds 4 to 5" in note.about
     changed = {title for title, one in ids(recipe).items() if before.get(title, one) != one}
     assert changed == {"bench timing of all methods", "report page of tiny"}
+
+
+@pytest.mark.parametrize("named", ['model = "theirs"', 'name = "theirs"'])
+def test_another_recipe_can_train_a_network(files, theirs, tmp_path, named):
+    (tmp_path / "theirs.py").write_text(NETWORK)
+    own = files.text
+    files.text = own.replace('"tiny"', '"trains"') + HERE + "rows = 9\nseeds = 2\n"
+    trainer = Path(files.write()).rename(tmp_path / "trains.toml")
+    files.text = own + f'\n[[models]]\n{named}\nrecipe = "trains.toml"\n'
+    recipe = load_recipe(files.write(), [theirs])
+    (model,) = [one for one in recipe.models if one.options.model == "added"]
+    assert (model.options.own, model.seeds, recipe.trained_by["theirs"].name) == ({"rows": 9}, 2, "trains")
+    trained = {title for title in ids(load_recipe(trainer, [theirs])) if title.startswith("train theirs")}
+    assert len(trained) == 2 and trained <= ids(recipe).keys()
+    with pytest.raises(BadInput, match=r"code of your own is given with --add FILE.py:CLASS"):
+        load_recipe(files.write())
+    files.text = own + f'\n[[models]]\nmodel = "added"\nsource = "{theirs}"\nrecipe = "trains.toml"\n'
+    with pytest.raises(BadInput, match=r"must be a model of the recipe trains"):
+        load_recipe(files.write(), [theirs])
 
 
 def test_a_changed_network_is_trained_again(files, theirs, tmp_path):
