@@ -175,6 +175,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
         "reference": percent(max((row.reference for row in measured["truth_accuracy"]), default=0.0), 2),
         "accuracy_count": max((row.count for row in measured["truth_accuracy"]), default=0),
         "calibrations": truth_rows.calibration_rows(measured["truth_calibration"]),
+        "calibration_rows": max((row.count for row in measured["truth_calibration"]), default=0),
         "calibration_count": sum(row.count for row in measured["truth_calibration"]),
         "exceeded": percent(calibration.EXCEEDED),
         "biases": truth_rows.bias_rows(measured["truth_bias"]),

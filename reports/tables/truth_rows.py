@@ -72,7 +72,7 @@ CALIBRATION: Final = ("cloth", "components", "transparency")
 
 
 def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
-    """Return the rows of the table of calibration: estimator, then `CALIBRATION`; ✗ if errors are not calibrated."""
+    """Return the rows of the table of calibration: estimator, then `CALIBRATION`."""
 
     def cell(ratio: float, exceeded: float) -> str:
         return f"{ratio:.2f} · {percent(exceeded, 2)}"
@@ -81,7 +81,7 @@ def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
         [
             plain(row.estimator),
             row.kind,
-            cell(row.ratio, row.exceeded) + ("" if row.holds else " ✗"),
+            cell(row.ratio, row.exceeded),
             cell(row.ratio_through, row.exceeded_through),
         ]
         for row in sorted(found, key=lambda row: row.estimator)
