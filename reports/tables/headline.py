@@ -45,8 +45,8 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
 def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
     """Return the setting of each method that the headline names.
 
-    It is the form under the energy bound where that was measured: its error on validation cloths is lower. Otherwise it is
-    the first. The truth, and methods that nothing is trained for, are left out.
+    It is the form under the energy bound where that was measured: its error on validation cloths is lower. Otherwise
+    it is the first. The truth, and methods that nothing is trained for, are left out.
     """
     settings: dict[str, list[str]] = {}
     for method, setting in zip(errors["method"], errors["setting"], strict=True):
