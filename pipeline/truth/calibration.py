@@ -3,7 +3,7 @@
 Estimators report errors in order to stop: they compare the norm of an answer's four errors with the requested one. The
 meaning of a reported error differs between the computations, the *stages*: sampled answers report the spread of
 randomisations, tables what they cannot resolve, quadrature the last change of its rules. Each stage has factors, fitted
-on random fabrics (tests/fits/fit_calibration.py), that give two numbers with one meaning:
+on random fabrics (grid: tests/fits/fit_calibration.py), that give two numbers with one meaning:
 
     standard error   s^2 = r^2 + (b m)^2, r = a e / (1 + a e / (c m)): the root mean square of the true errors over many
                      queries
@@ -58,11 +58,10 @@ COMPONENTS: Final = {
 }
 """Factors of the four components, light and viewer in front of the cloth."""
 
-BEHIND: Final = {
+BEHIND: Final = COMPONENTS | {
     COARSE_TABLE: Factors(0.8, 0.03, 0.002, 6.0),
     FINE_TABLE: Factors(0.8, 0.1, 0.0015, 10.0),
     REFINED: Factors(1.1, 0.1, 0.0005, 5.0),
-    SAMPLED: Factors(1.0, math.inf, 0.0, 4.7),
     QUADRATURE: Factors(1.0, 0.2, 0.004, 6.0),
     QUADRATURE_CURVED: Factors(1.0, 0.2, 0.004, 6.0),
 }

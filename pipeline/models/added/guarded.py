@@ -249,14 +249,10 @@ def load_function(options: AddedFunction) -> Callable[..., float]:
     MethodFailed
         If it cannot be imported.
     """
-    source = locate(options.source, options.folder)
-    source.verify(options.sha256)
-    with faults_of(options.name, "import", options.limit, source.root):
-        module = source.imported()
-    function = source.of(module)
+    function, root = _found(options)
 
     def measured(*arguments: Any) -> float:
-        with faults_of(options.name, "the metric", options.limit, source.root):
+        with faults_of(options.name, "the metric", options.limit, root):
             value = function(*arguments)
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise MethodFailed(options.name, f"it returned {value!r}; a finite number is needed")
@@ -296,15 +292,20 @@ def imported(options: AddedMethod) -> tuple[Callable[[], Method], Path]:
     MethodFailed
         If it cannot be imported.
     """
+    found, root = _found(options)
+
+    def make() -> Method:
+        with faults_of(options.name, "__init__", options.limit, root):
+            method: Method = found(**options.own)
+        return method
+
+    return make, root
+
+
+def _found(options: AddedMethod | AddedFunction) -> tuple[Any, Path]:
+    """Import code from outside; return the class or function, and its file or the folder of its package."""
     source = locate(options.source, options.folder)
     source.verify(options.sha256)
     with faults_of(options.name, "import", options.limit, source.root):
         module = source.imported()
-    found = source.of(module)
-
-    def make() -> Method:
-        with faults_of(options.name, "__init__", options.limit, source.root):
-            method: Method = found(**options.own)
-        return method
-
-    return make, source.root
+    return source.of(module), source.root
