@@ -156,7 +156,7 @@ class Draft:
 
     def canonical(self) -> tuple[tuple[int, int], bytes]:
         """Return a form that is equal for all shifts and mirror images of this cloth, and for no other cloth."""
-        matrix = _smallest_repeat(self.warp_over)
+        matrix = smallest_repeat(self.warp_over)
         picks, ends = matrix.shape
         images = (matrix, matrix[::-1], matrix[:, ::-1], matrix[::-1, ::-1])
         shifted = (np.lib.stride_tricks.sliding_window_view(np.tile(image, (2, 2)), (picks, ends)) for image in images)
@@ -214,13 +214,18 @@ def _runs(side: Bools) -> tuple[Floats, Floats]:
     return length, offset
 
 
-def _smallest_repeat(matrix: Bools) -> Bools:
+def smallest_repeat(matrix: Bools) -> Bools:
     """Cut a matrix to the smallest block that repeats in it."""
     for axis in (0, 1):
-        size = matrix.shape[axis]
-        period = next(p for p in range(1, size + 1) if size % p == 0 and (np.roll(matrix, p, axis) == matrix).all())
-        matrix = matrix.take(range(period), axis)
+        matrix = matrix.take(range(smallest_period(matrix, axis)), axis)
     return matrix
+
+
+def smallest_period(values: npt.NDArray[np.generic], axis: int = 0) -> int:
+    """Return the smallest divisor of an axis's length after which the values repeat; 0 if there are none."""
+    size = values.shape[axis]
+    periods = (p for p in range(1, size + 1) if size % p == 0 and bool((np.roll(values, p, axis) == values).all()))
+    return next(periods, 0)
 
 
 class Family(BaseModel):

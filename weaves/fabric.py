@@ -1,7 +1,7 @@
 """Fabrics: a draft, a warp yarn and a weft yarn, read from TOML.
 
-A fabric file has a name, the source of its numbers, and the tables `[draft]`, `[warp]` and `[weft]`; the presets beside
-this module are examples.
+A fabric file has a name, the source of its numbers, and the tables `[draft]`, `[warp]` and `[weft]`, and `[colours]` if
+its ends or picks differ in colour; the presets beside this module are examples.
 """
 
 from __future__ import annotations
@@ -12,8 +12,19 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tomli_w
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
+from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
 from weaves.plain import Basket, Plain, Rib
@@ -64,6 +75,31 @@ class Fabric(BaseModel):
     """The yarns along y."""
     weft: Yarn
     """The yarns along x."""
+    colours: ColourOrder | None = None
+    """Colours of single ends and picks, in place of the colours of the two yarns."""
+
+    @model_validator(mode="after")
+    def _keeps_energy(self) -> Fabric:
+        for axis, yarn in (("ends", self.warp), ("picks", self.weft)):
+            for name in sorted(set(self.colours.threads(axis))) if self.colours else ():
+                try:
+                    self.colours.palette[name].on(yarn)
+                except ValidationError as error:
+                    raise ValueError(
+                        f"colour {name!r} of the {axis}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
+                    ) from error
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_empty_colours(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out `colours` where there are none: such a fabric's file and hash know nothing of them."""
+        return {key: value for key, value in dump(self).items() if key != "colours" or value is not None}
+
+    def thread_colours(self) -> tuple[ThreadColours, ThreadColours]:
+        """Return the colours of the ends and of the picks, one row for each thread after which they repeat."""
+        if self.colours is None:
+            return colours_of_yarns([self.warp]), colours_of_yarns([self.weft])
+        return self.colours.thread_colours("ends", self.warp), self.colours.thread_colours("picks", self.weft)
 
     @property
     def weave(self) -> Draft:

@@ -159,7 +159,7 @@ def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: Serializati
     if info.context != IDENTITY:
         return dump(fabric)
     shown = {"specular", "diffuse", "diffuse_transmission"}
-    colours = fabric.model_dump(mode="json", include={"warp": shown, "weft": shown})
+    colours = fabric.model_dump(mode="json", include={"warp": shown, "weft": shown, "colours": True})
     return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
 
 

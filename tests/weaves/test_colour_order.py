@@ -1,0 +1,76 @@
+"""Colour orders: sequences, repeats, and what is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from weaves.colour_order import MOST_THREADS, ColourOrder
+from weaves.errors import BadInput
+from weaves.fabric import Fabric, load_fabric
+from weaves.validation import validated
+
+PALETTE = {"white": {"diffuse": [0.8, 0.7, 0.6]}, "navy": {"diffuse": "#001030", "specular": [0.1, 0.2, 0.3]}}
+denim = load_fabric("denim")
+
+
+def coloured(**colours):
+    return validated(Fabric, denim.model_dump() | {"colours": {"palette": PALETTE} | colours}, "cloth.toml")
+
+
+def test_threads_have_their_own_colours_and_keep_what_is_not_given():
+    ends, picks = coloured(ends=[["white", 2], ["navy", 1]]).thread_colours()
+    assert ends.diffuse[:2].tolist() == [[0.8, 0.7, 0.6]] * 2
+    assert ends.specular.tolist() == [list(denim.warp.specular_rgb)] * 2 + [[0.1, 0.2, 0.3]]
+    assert picks.diffuse.tolist() == [list(denim.weft.diffuse_rgb)]
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.sampled_from(["white", "navy"]), st.integers(1, 5)), min_size=1, max_size=6))
+def test_a_sequence_repeats_after_its_smallest_repeat(runs):
+    order = ColourOrder.model_validate({"palette": PALETTE, "ends": runs})
+    written = [name for name, count in runs for _ in range(count)]
+    threads = order.threads("ends")
+    assert list(threads) * (len(written) // len(threads)) == written
+    assert all(threads != threads[k:] + threads[:k] for k in range(1, len(threads)))
+
+
+def test_a_fabric_without_an_order_has_no_such_key():
+    assert "colours" not in denim.model_dump()
+    assert coloured(picks=[["navy", 1]]).optics() == denim.optics()
+
+
+def test_a_coloured_fabric_reads_back_from_its_own_file(tmp_path):
+    fabric = coloured(ends=[["white", 2], ["navy", 1]], picks=[["white", 5], ["navy", 3]])
+    (tmp_path / "cloth.toml").write_text(fabric.to_toml(), encoding="utf-8", newline="")
+    assert load_fabric(tmp_path / "cloth.toml") == fabric
+    assert all(
+        np.array_equal(a, b)
+        for ours, read in zip(
+            fabric.thread_colours(), load_fabric(tmp_path / "cloth.toml").thread_colours(), strict=True
+        )
+        for a, b in zip(ours, read, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("colours", "named"),
+    [
+        ({"ends": [["whit", 4]]}, "whit"),
+        ({"ends": [["white", 0]]}, "ends"),
+        ({"picks": [["white", MOST_THREADS], ["navy", 1]]}, str(MOST_THREADS)),
+        ({"palette": {}}, "palette"),
+        (
+            {
+                "palette": {"glow": {"diffuse": [1.0, 1.0, 1.0], "diffuse_transmission": [0.5, 0.5, 0.5]}},
+                "ends": [["glow", 1]],
+            },
+            "glow",
+        ),
+    ],
+)
+def test_bad_colours_are_one_sentence(colours, named):
+    with pytest.raises(BadInput) as refused:
+        coloured(**colours)
+    assert named in str(refused.value) and "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 300

@@ -1,0 +1,115 @@
+"""Colour orders: the colours of single ends and picks, for stripes, checks and colour-and-weave effects.
+
+A colour order is a palette and two sequences, that of the ends and that of the picks. Each sequence starts at the first
+end (pick) of the draft and repeats on its own: its length need not fit the repeat of the weave.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+
+from weaves.colour import Colour, linear_rgb
+from weaves.draft import smallest_period
+from weaves.errors import nearest
+from weaves.yarn import Yarn
+
+MOST_COLOURS: Final = 256
+"""Most colours of a palette."""
+
+MOST_THREADS: Final = 4096
+"""Most ends, and most picks, after which the colours must repeat."""
+
+Run = tuple[str, Annotated[StrictInt, Field(ge=1, le=MOST_THREADS)]]
+"""A name of the palette, and the number of neighbouring threads that have this colour."""
+
+
+class ThreadColours(NamedTuple):
+    """Colours of the n threads after which a sequence repeats, linear sRGB, float64 (n, 3).
+
+    Attributes
+    ----------
+    specular, diffuse, diffuse_transmission : float64 (n, 3)
+        k_s, k_d and k_dt of each thread.
+    """
+
+    specular: npt.NDArray[np.float64]
+    diffuse: npt.NDArray[np.float64]
+    diffuse_transmission: npt.NDArray[np.float64]
+
+
+class PaletteColour(BaseModel):
+    """A colour of threads; what is not given is that of the yarn."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    diffuse: Colour
+    """Colour k_d of the light scattered many times and sent back."""
+    specular: Colour | None = None
+    """Colour k_s of the light scattered once by the fibres."""
+    diffuse_transmission: Colour | None = None
+    """Colour k_dt of the light scattered many times that leaves on the other side."""
+
+    def on(self, yarn: Yarn) -> Yarn:
+        """Return a yarn in this colour; ValueError if it would make light."""
+        given = self.model_dump(exclude_none=True) | {"diffuse": self.diffuse}
+        return Yarn.model_validate(yarn.model_dump() | given)
+
+
+class ColourOrder(BaseModel):
+    """The colours of single ends and picks.
+
+    Examples
+    --------
+    >>> check = {"palette": {"white": {"diffuse": "#ffffff"}, "red": {"diffuse": "#aa1020"}}}
+    >>> order = ColourOrder.model_validate(check | {"ends": [["white", 4], ["red", 4]]})
+    >>> order.threads("ends")[3:5]
+    ('white', 'red')
+    >>> order.threads("picks")
+    ()
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    palette: dict[Annotated[str, Field(min_length=1, max_length=60)], PaletteColour] = Field(
+        min_length=1, max_length=MOST_COLOURS
+    )
+    """Colours by name."""
+    ends: tuple[Run, ...] = Field(default=(), max_length=MOST_THREADS)
+    """Runs of neighbouring ends, from the first end on; without any, all ends have the colours of the warp yarn."""
+    picks: tuple[Run, ...] = Field(default=(), max_length=MOST_THREADS)
+    """Runs of neighbouring picks, from the first pick on; without any, all picks have those of the weft yarn."""
+
+    @model_validator(mode="after")
+    def _names_its_colours(self) -> Self:
+        for key, runs in (("ends", self.ends), ("picks", self.picks)):
+            for name, _ in runs:
+                if name not in self.palette:
+                    raise ValueError(f"{key} name the colour {name!r}: {nearest(name, self.palette)}")
+            if (count := sum(number for _, number in runs)) > MOST_THREADS:
+                raise ValueError(f"{key} repeat after {count} threads: at most {MOST_THREADS} are allowed")
+        return self
+
+    def threads(self, axis: str) -> tuple[str, ...]:
+        """Return the colour of each thread of the smallest repeat of the ``"ends"`` or ``"picks"``."""
+        runs = self.ends if axis == "ends" else self.picks
+        names = np.array([name for name, number in runs for _ in range(number)], dtype=object)
+        return tuple(names[: smallest_period(names)])
+
+    def thread_colours(self, axis: str, yarn: Yarn) -> ThreadColours:
+        """Return the colours of the ``"ends"`` or ``"picks"``, which are of one yarn; a single row without an order."""
+        names = self.threads(axis)
+        dyed = {name: self.palette[name].on(yarn) for name in set(names)}
+        return colours_of_yarns([dyed[name] for name in names] or [yarn])
+
+
+def colours_of_yarns(yarns: list[Yarn]) -> ThreadColours:
+    """Return the colours of some yarns, one row each."""
+    return ThreadColours(
+        np.array([linear_rgb(yarn.specular) for yarn in yarns]),
+        np.array([linear_rgb(yarn.diffuse) for yarn in yarns]),
+        np.array([linear_rgb(yarn.diffuse_transmission) for yarn in yarns]),
+    )
