@@ -10,7 +10,7 @@ from typing import Annotated, Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationError, model_validator
 
 from weaves.colour import Colour, linear_rgb
 from weaves.draft import smallest_period
@@ -54,7 +54,7 @@ class PaletteColour(BaseModel):
     """Colour k_dt of the light scattered many times that leaves on the other side."""
 
     def on(self, yarn: Yarn) -> Yarn:
-        """Return a yarn in this colour; ValueError if it would make light."""
+        """Return a yarn in this colour; ValidationError if it would make light."""
         given = self.model_dump(exclude_none=True) | {"diffuse": self.diffuse}
         return Yarn.model_validate(yarn.model_dump() | given)
 
@@ -98,6 +98,15 @@ class ColourOrder(BaseModel):
         runs = self.ends if axis == "ends" else self.picks
         names = np.array([name for name, number in runs for _ in range(number)], dtype=object)
         return tuple(names[: smallest_period(names)])
+
+    def refuse_gain(self, axis: str, yarn: Yarn) -> None:
+        """Refuse colours in which the threads of a yarn would send back more light than they receive; ValueError."""
+        for name in sorted(set(self.threads(axis))):
+            try:
+                self.palette[name].on(yarn)
+            except ValidationError as error:
+                reason = error.errors()[0]["msg"].removeprefix("Value error, ")
+                raise ValueError(f"colour {name!r} of the {axis}: {reason}") from error
 
     def thread_colours(self, axis: str, yarn: Yarn) -> ThreadColours:
         """Return the colours of the ``"ends"`` or ``"picks"``, which are of one yarn; a single row without an order."""

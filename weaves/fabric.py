@@ -19,7 +19,6 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     Strict,
-    ValidationError,
     model_serializer,
     model_validator,
 )
@@ -80,14 +79,9 @@ class Fabric(BaseModel):
 
     @model_validator(mode="after")
     def _keeps_energy(self) -> Fabric:
-        for axis, yarn in (("ends", self.warp), ("picks", self.weft)):
-            for name in sorted(set(self.colours.threads(axis))) if self.colours else ():
-                try:
-                    self.colours.palette[name].on(yarn)
-                except ValidationError as error:
-                    raise ValueError(
-                        f"colour {name!r} of the {axis}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
-                    ) from error
+        if self.colours is not None:
+            self.colours.refuse_gain("ends", self.warp)
+            self.colours.refuse_gain("picks", self.weft)
         return self
 
     @model_serializer(mode="wrap")
