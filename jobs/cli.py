@@ -101,6 +101,20 @@ class TruthFlags:
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
 
 
+@dataclass(frozen=True)
+class YarnFlags:
+    """Numbers of a yarn on the command line; None: those of the draft file, or of the fabric named by --like."""
+
+    width: Annotated[float | None, Parameter(help="Width in yarn spacings, in place of the file's.")] = None
+    bend: Annotated[float | None, Parameter(help="Largest inclination along a float, degrees.")] = None
+    twist: Annotated[float | None, Parameter(help="Angle of the fibres to the yarn's axis, degrees.")] = None
+    roughness: Annotated[float | None, Parameter(help="Roughness of the fibres.")] = None
+
+    def given(self) -> dict[str, float]:
+        """Return the numbers that are given."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+
 On = Annotated[WorkerFlags, Parameter(name="*")]
 
 
@@ -110,6 +124,22 @@ def list_() -> None:
     from jobs.verbs.list import print_lists
 
     print_lists()
+
+
+@app.command(name="import", sort_key=0.5)
+def import_(
+    draft: Annotated[Local, Parameter(help="Draft file: .wif, .wifw, .dtx, .wpo or .twa.")],
+    *,
+    out: Annotated[Local, Parameter(help="Fabric file to write, ending in .toml.")],
+    like: Annotated[str, Parameter(help="Fabric whose yarns give what a draft does not state.")] = "cotton_twill",
+    name: Annotated[str | None, Parameter(help="Name of the fabric; default: that of the draft file.")] = None,
+    warp: Annotated[YarnFlags, Parameter(name="--warp")] = YarnFlags(),
+    weft: Annotated[YarnFlags, Parameter(name="--weft")] = YarnFlags(),
+) -> None:
+    """Make a fabric from the draft file of a weaving program."""
+    from jobs.verbs.exchange.import_draft import import_draft
+
+    import_draft(draft, out, like, name, {"warp": warp.given(), "weft": weft.given()})
 
 
 @app.command(sort_key=1)
@@ -128,17 +158,30 @@ def show(
 def export(
     fabric: FabricName,
     *,
-    mesh: Annotated[Local, Parameter(help="File to write, ending in .ply.")],
-    vertices: Annotated[int, Parameter(help="Steps across a yarn, and along it in every cell.")] = 64,
-    repeats: Annotated[int, Parameter(help="Copies of the repeat in each direction.")] = 1,
+    mesh: Annotated[Local | None, Parameter(help="Triangle mesh to write, ending in .ply.")] = None,
+    wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
+    vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
+    repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
 ) -> None:
-    """Write a fabric's surface as a coloured triangle mesh, for any 3D program."""
+    """Write a fabric for other programs: its surface as a mesh, or its draft."""
     from jobs.terminal import Terminal
-    from jobs.verbs.export import write_mesh
     from weaves.fabric import load_fabric
 
-    triangles = write_mesh(load_fabric(fabric), mesh, vertices, repeats)
-    Terminal().print(f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up", soft_wrap=True)
+    cloth = load_fabric(fabric)
+    if (mesh is None) == (wif is None):
+        raise BadInput("export", "", f"{'no' if mesh is None else 'more than one'} file", "--mesh or --wif is needed")
+    if mesh is not None:
+        from jobs.verbs.exchange.export_mesh import write_mesh
+
+        triangles = write_mesh(cloth, mesh, 64 if vertices is None else vertices, 1 if repeats is None else repeats)
+        said = f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up"
+    else:
+        from jobs.verbs.exchange.export_draft import write_draft
+
+        if vertices is not None or repeats is not None:
+            raise BadInput("export", "--wif", str(wif), "--vertices and --repeats are for --mesh alone")
+        said = write_draft(cloth, Path(str(wif)))
+    Terminal().print(said, soft_wrap=True)
 
 
 @app.command(sort_key=3)

@@ -49,6 +49,7 @@ HOMES = {
     "onnxruntime": ["pipeline.models"],
     "safetensors": ["pipeline.models", "pipeline.training"],
     "colour": ["weaves"],
+    "dtx_to_wif": ["weaves"],
     "pandas": ["reports"],
     "matplotlib": ["reports"],
     "jinja2": ["reports"],

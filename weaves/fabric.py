@@ -48,6 +48,10 @@ def _file_name(name: str) -> str:
     return name
 
 
+YarnCount = Annotated[float, Strict(), Field(ge=0.1, le=1000)]
+"""Yarns per centimetre."""
+
+
 class Fabric(BaseModel):
     """A woven fabric.
 
@@ -68,6 +72,8 @@ class Fabric(BaseModel):
     """Source of the numbers."""
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
     """Optical thickness T of the yarn layer."""
+    yarns_per_cm: tuple[YarnCount, YarnCount] | None = None
+    """Ends per centimetre and picks per centimetre: the physical size, where it is known."""
     draft: Weave
     """The weave family and its numbers."""
     warp: Yarn
@@ -85,9 +91,10 @@ class Fabric(BaseModel):
         return self
 
     @model_serializer(mode="wrap")
-    def _without_empty_colours(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `colours` where there are none: such a fabric's file and hash know nothing of them."""
-        return {key: value for key, value in dump(self).items() if key != "colours" or value is not None}
+    def _without_empty_fields(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out `colours` and `yarns_per_cm` where there are none: files and hashes do not contain them."""
+        optional = ("colours", "yarns_per_cm")
+        return {key: value for key, value in dump(self).items() if key not in optional or value is not None}
 
     def thread_colours(self) -> tuple[ThreadColours, ThreadColours]:
         """Return the colours of the ends and of the picks, one row for each thread after which they repeat."""
@@ -101,7 +108,7 @@ class Fabric(BaseModel):
         return _woven(self.draft)
 
     def optics(self) -> dict[str, Any]:
-        """Return the parameters that the four components depend on: no name, source or colour.
+        """Return the parameters that the four components depend on: no name, source, colour or physical size.
 
         Two fabrics with equal optics have the same ground truth, so fingerprints use it.
         """

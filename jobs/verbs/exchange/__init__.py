@@ -1,0 +1,1 @@
+"""Verbs that exchange fabrics with other programs: `import` and `export`."""

@@ -1,0 +1,1 @@
+"""Draft files of weaving programs: reading, fabrics from them, and writing."""

@@ -1,0 +1,223 @@
+"""Fabrics from draft files: structure, colours and size are the file's, the optics of the yarns another fabric's.
+
+A draft file says nothing of fibres, twist, bend or roughness. Everything that is assumed is a sentence.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from weaves.colour import linear_rgb
+from weaves.colour_order import MOST_COLOURS
+from weaves.draft import LARGEST_REPEAT, Bools, Draft, smallest_period
+from weaves.draft_files.read import DraftFile, Threads
+from weaves.errors import BadInput, one_line
+from weaves.fabric import Fabric
+from weaves.validation import validated
+from weaves.yarn import Yarn
+
+NARROWEST: Final = 0.05
+"""Least width of a yarn, in yarn spacings."""
+
+MOST_SOURCE: Final = 2000
+"""Most letters of a fabric's `source`."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A fabric from a draft file, with what was read and assumed."""
+
+    fabric: Fabric
+    """The fabric."""
+    read: tuple[str, ...]
+    """Sentences on what the file states."""
+    assumed: tuple[str, ...]
+    """Sentences on what it does not state, or what could not be used."""
+
+
+def fabric_of(
+    draft: DraftFile,
+    like: Fabric,
+    name: str,
+    where: str,
+    given: Mapping[str, Mapping[str, float]],
+) -> Imported:
+    """Return the fabric of a draft file.
+
+    Parameters
+    ----------
+    draft : DraftFile
+        The file, read.
+    like : Fabric
+        Fabric whose yarns give what the file does not state.
+    name : str
+        Name of the new fabric.
+    where : str
+        The file, for messages.
+    given : mapping of mappings
+        Numbers of the yarns ``"warp"`` and ``"weft"`` that replace those of `like` and of the file.
+
+    Raises
+    ------
+    BadInput
+        If the smallest repeat is larger than `LARGEST_REPEAT`, a yarn never changes side, more than `MOST_COLOURS`
+        colours are used, or a given number is not allowed.
+    """
+    read: list[str] = []
+    assumed = list(draft.remarks)
+    matrix = _repeat(draft.warp_over, where, read, assumed)
+    _refuse_loose(matrix, where)
+    woven = Draft(matrix)
+    if not woven.hangs_together():
+        assumed.append("Some yarns lie loose on others, as in a double cloth: all are treated as one layer.")
+    yarns = {}
+    for axis, threads, yarn in (("warp", draft.ends, like.warp), ("weft", draft.picks, like.weft)):
+        own = _width(axis, threads, yarn, like.name, given[axis], read, assumed)
+        yarns[axis] = yarn.model_dump(exclude={"width", "diffuse"}) | own | dict(given[axis])
+    colours = _colours(draft, like, yarns, where, read, assumed)
+    size = None
+    if draft.ends.per_cm and draft.picks.per_cm:
+        size = (_rounded(draft.ends.per_cm), _rounded(draft.picks.per_cm))
+        read.append(f"Size: {size[0]:g} ends and {size[1]:g} picks per cm.")
+    else:
+        assumed.append("The file does not state the size of the cloth: the fabric has no yarns_per_cm.")
+    assumed.append(_optics(like, given))
+    about = f"Draft {draft.title!r}" + (f", written by {draft.program}" if draft.program else "")
+    source = f"{about}, from {Path(where).name}. " + " ".join((*read, *assumed))
+    table: dict[str, Any] = {
+        "name": name,
+        "source": one_line(source, MOST_SOURCE),
+        "optical_thickness": like.optical_thickness,
+        "draft": {"family": "matrix", "rows": woven.rows()},
+    }
+    table |= {"yarns_per_cm": size} if size else {}
+    table |= yarns | ({"colours": colours} if colours else {})
+    return Imported(validated(Fabric, table, where), tuple(read), tuple(assumed))
+
+
+def numbered(rows: Sequence[Hashable]) -> tuple[list[int], list[Hashable]]:
+    """Return a number for each row, equal for equal ones, counted from 0 as they appear; and the different rows."""
+    different: dict[Hashable, int] = {}
+    return [different.setdefault(row, len(different)) for row in rows], list(different)
+
+
+def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Bools:
+    """Cut a draft to its smallest repeat."""
+    picks, ends = over.shape
+    periods = []
+    for axis, section, threads in ((0, "[TREADLING]", "picks"), (1, "[THREADING]", "ends")):
+        lines = np.ascontiguousarray(np.moveaxis(over, axis, 0))
+        numbers = np.array(numbered([line.tobytes() for line in lines])[0])
+        period = smallest_period(numbers)
+        if period > LARGEST_REPEAT:  # a last repeat that is not whole, as at a selvedge
+            shifts = range(1, min(LARGEST_REPEAT, len(numbers) // 2) + 1)
+            period = next((p for p in shifts if np.array_equal(numbers[p:], numbers[:-p])), period)
+            if period > LARGEST_REPEAT:
+                allowed = f"at most {LARGEST_REPEAT} are allowed"
+                raise BadInput(where, "", f"{section} repeats after {period} {threads}", allowed)
+            assumed.append(f"The last {len(numbers) % period} {threads} do not fill a repeat and are left out.")
+        periods.append(period)
+    read.append(f"Structure: {ends} ends and {picks} picks, which repeat after {periods[1]} and {periods[0]}.")
+    return over[: periods[0], : periods[1]]
+
+
+def _refuse_loose(matrix: Bools, where: str) -> None:
+    """Refuse a draft with a yarn that stays on one side: it is not woven in."""
+    for section, thread, lines in (("[THREADING]", "end", matrix.T), ("[TREADLING] or [LIFTPLAN]", "pick", matrix)):
+        for number, line in enumerate(lines, 1):
+            if line.all() or not line.any():
+                found = f"{thread} {number} of {section} never changes side"
+                raise BadInput(where, "", found, "it is not woven in, so this is not a cloth")
+
+
+def _width(
+    axis: str,
+    threads: Threads,
+    yarn: Yarn,
+    like: str,
+    given: Mapping[str, float],
+    read: list[str],
+    assumed: list[str],
+) -> dict[str, float]:
+    """Return the width of a yarn as the file states it, else that of `yarn`."""
+    title = axis.capitalize()
+    if "width" in given:
+        return {}
+    if threads.width is None:
+        assumed.append(f"{title}: the file states no thickness; width {yarn.width:g} is that of {like}.")
+        return {"width": yarn.width}
+    stated = round(threads.width, 4)
+    width = min(max(stated, NARROWEST), 1.0)
+    if width != stated:
+        ratio = f"the thickness is {stated:g} of the spacing, outside of {NARROWEST:g} to 1"
+        assumed.append(f"{title}: {ratio}; width {width:g} is taken.")
+    else:
+        read.append(f"{title}: width {width:g} of the spacing.")
+    return {"width": width}
+
+
+def _colours(
+    draft: DraftFile,
+    like: Fabric,
+    yarns: Mapping[str, dict[str, Any]],
+    where: str,
+    read: list[str],
+    assumed: list[str],
+) -> dict[str, Any]:
+    """Give each yarn its most frequent colour, and return the colour order; empty if each axis has one colour."""
+    axes = (("warp", "ends", draft.ends.colours, like.warp), ("weft", "picks", draft.picks.colours, like.weft))
+    used = numbered([colour for _, _, colours, _ in axes for colour in colours])[1]
+    if len(used) > MOST_COLOURS:
+        raise BadInput(where, "", f"the threads have {len(used)} colours of [COLOR TABLE]", f"at most {MOST_COLOURS}")
+    names = {colour: f"colour_{number}" for number, colour in enumerate(used, 1)}
+    palette: dict[str, dict[str, Any]] = {}
+    orders: dict[str, list[list[Any]]] = {}
+    dimmed = False
+    for axis, threads, colours, yarn in axes:
+        yarns[axis]["diffuse"] = Counter(colours).most_common(1)[0][0]
+        left = 1.0 - np.max([linear_rgb(colour) for colour in set(colours)], axis=0)
+        if (yarn.diffuse_transmission_rgb > left).any():
+            most = np.maximum(left - 1e-6, 0.0)
+            yarns[axis]["diffuse_transmission"] = np.minimum(yarn.diffuse_transmission_rgb, most).round(6).tolist()
+            dimmed = True
+        if len(set(colours)) == 1:
+            read.append(f"Colours: all {threads} are {colours[0]}.")
+            continue
+        order = colours[: smallest_period(np.array(colours))]
+        runs: list[list[Any]] = []
+        for colour in order:
+            palette[names[colour]] = {"diffuse": colour}
+            if runs and runs[-1][0] == names[colour]:
+                runs[-1][1] += 1
+            else:
+                runs.append([names[colour], 1])
+        orders[threads] = runs
+        read.append(f"Colours: {len(set(order))} of the {threads}, which repeat after {len(order)}.")
+    if dimmed:
+        assumed.append("Light through the yarns is reduced, because bright colours send back nearly all light.")
+    return {"palette": palette} | orders if orders else {}
+
+
+def _optics(like: Fabric, given: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the sentence on what no draft file states."""
+    parts = []
+    for key, unit in (("bend", "°"), ("twist", "°"), ("roughness", "")):
+        values = [given[axis].get(key, getattr(yarn, key)) for axis, yarn in (("warp", like.warp), ("weft", like.weft))]
+        parts.append(f"{key} {values[0]:g}{unit} and {values[1]:g}{unit}")
+    options = [f"{axis}.{key}" for axis, numbers in given.items() for key in numbers]
+    but = f", except {' and '.join(options)}, which you gave" if options else ""
+    return (
+        f"No draft states the optics of yarns: those of warp and weft are from {like.name}{but}: {', '.join(parts)}; "
+        "also relief, blend, highlights, light through the yarns and optical thickness. Colours are taken as sRGB."
+    )
+
+
+def _rounded(value: float) -> float:
+    """Round to four digits: files have three decimals."""
+    return float(f"{value:.4g}")

@@ -1,0 +1,260 @@
+"""The sections of a WIF text, checked one by one, so that each error names its section.
+
+WIF (Weaving Information File, version 1.1) is a text of sections and keys. The reader of dtx-to-wif never returns on
+some texts and raises bare errors on others; it gets the text that `checked_wif` returns, which has none of these.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Mapping
+from configparser import ConfigParser, ParsingError
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from weaves.colour_order import MOST_THREADS
+from weaves.errors import BadInput, brief
+from weaves.reading import MIB
+
+MOST_BYTES: Final = 4 * MIB
+"""Most bytes of a draft file."""
+
+MOST_USED: Final = MIB
+"""Most letters of the sections that are read; others, such as pictures of single programs, are left out before."""
+
+MOST_LETTERS: Final = 8192
+"""Most letters of a line."""
+
+MOST_ENTRIES: Final = 16 * MOST_THREADS
+"""Most lines of the sections that are read."""
+
+Thread = Annotated[int, Field(ge=1, le=MOST_THREADS)]
+Count = Annotated[int, Field(ge=0, le=MOST_THREADS)]
+Length = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+Level = Annotated[int, Field(ge=0, le=65535)]
+
+
+def _filled(section: Any) -> Any:
+    """Leave out keys without a value, which have the default."""
+    return {key: text for key, text in section.items() if text and text.strip()}
+
+
+def _parts(text: Any) -> Any:
+    """Split at commas; pydantic reports what is no text."""
+    return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
+
+
+Sets = Annotated[dict[Thread, Annotated[tuple[Count, ...], BeforeValidator(_parts)]], BeforeValidator(_filled)]
+Colours = Annotated[dict[Thread, Thread], BeforeValidator(_filled)]
+Lengths = Annotated[dict[Thread, Length], BeforeValidator(_filled)]
+Table = Annotated[
+    dict[Annotated[int, Field(ge=1, le=65536)], Annotated[tuple[Level, Level, Level], BeforeValidator(_parts)]],
+    BeforeValidator(_filled),
+]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="ignore", hide_input_in_errors=True)
+
+
+class _Text(_Section):
+    title: str | None = None
+
+
+class _Program(_Section):
+    source_program: Annotated[str | None, Field(alias="source program")] = None
+    source_version: Annotated[str | None, Field(alias="source version")] = None
+
+
+class _Weaving(_Section):
+    shafts: Annotated[int | None, Field(ge=1, le=MOST_THREADS)] = None
+    treadles: Count | None = None
+    rising_shed: Annotated[bool | None, Field(alias="rising shed")] = None
+
+
+class _Yarns(_Section):
+    threads: Annotated[int | None, Field(ge=1, le=MOST_THREADS)] = None
+    color: Annotated[tuple[Annotated[int, Field(ge=0, le=65536)], ...] | None, BeforeValidator(_parts)] = None
+    spacing: Length | None = None
+    thickness: Length | None = None
+    units: str | None = None
+
+
+class _Palette(_Section):
+    range: Annotated[tuple[Level, Level] | None, BeforeValidator(_parts)] = None
+
+
+Filled = BeforeValidator(_filled)
+
+
+class _Wif(_Section):
+    """The sections that are read; their names in lower case with _."""
+
+    wif: Annotated[_Program, Filled] = _Program()
+    text: Annotated[_Text, Filled] = _Text()
+    weaving: Annotated[_Weaving, Filled] = _Weaving()
+    warp: Annotated[_Yarns, Filled] = _Yarns()
+    weft: Annotated[_Yarns, Filled] = _Yarns()
+    color_palette: Annotated[_Palette, Filled] = _Palette()
+    color_table: Table = {}
+    threading: Sets = {}
+    tieup: Sets = {}
+    treadling: Sets = {}
+    liftplan: Sets = {}
+    warp_colors: Colours = {}
+    weft_colors: Colours = {}
+    warp_spacing: Lengths = {}
+    weft_spacing: Lengths = {}
+    warp_thickness: Lengths = {}
+    weft_thickness: Lengths = {}
+
+
+def section_name(field: str) -> str:
+    """Return the name of a section as a WIF text has it."""
+    return f"[{field.upper().replace('_', ' ')}]"
+
+
+def checked_wif(text: str, where: str) -> str:
+    """Return a WIF text with the sections that matter, which dtx-to-wif reads without errors of its own.
+
+    Parameters
+    ----------
+    text : str
+        The file, decoded.
+    where : str
+        The file, for messages.
+
+    Raises
+    ------
+    BadInput
+        If there is no section [WIF], a section is missing, damaged or contradicts another, or a limit is exceeded.
+
+    Warns
+    -----
+    UserWarning
+        If something cannot be used.
+    """
+    try:
+        wif = _Wif.model_validate(_sections(text, where))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        section, *keys = first["loc"]
+        key = " ".join([section_name(str(section)), *(str(key) for key in keys[:1])])
+        raise BadInput(where, key, first["input"], first["msg"]) from error
+    _refuse_missing(wif, where)
+    for axis in ("warp", "weft"):
+        _complete(wif, axis, where)
+    # The reader takes the number of tied treadles for the last of them.
+    wif.weaving.treadles = max([wif.weaving.treadles or 0, *wif.tieup])
+    if not wif.liftplan and (most := max(max(used) for used in wif.treadling.values())) > wif.weaving.treadles:
+        raise BadInput(where, "", f"[TREADLING] uses treadle {most}", f"[TIEUP] ends at {wif.weaving.treadles}")
+    return _written(wif)
+
+
+def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
+    """Parse the sections that are read: those of others may have anything in them."""
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    kept: list[str] = []
+    known = {name.replace("_", " ") for name in _Wif.model_fields} | set(_Wif.model_fields)
+    inside, begun = False, False
+    for line in map(str.strip, lines):  # an indented line would continue the one before
+        if line.startswith("["):
+            name = line[1:].partition("]")[0].strip().lower()
+            begun = begun or name == "wif"
+            inside = begun and name in known
+            kept += [f"[{name.replace(' ', '_')}]"] * inside
+        elif inside and line:
+            if len(line) > MOST_LETTERS:
+                raise BadInput(
+                    where, "", f"{kept[-1]} has a line of {len(line):,} letters", f"at most {MOST_LETTERS:,}"
+                )
+            kept.append(line)
+    if not begun:
+        raise BadInput(where, "", "has no section [WIF]", "a draft in the Weaving Information File format is needed")
+    if len(kept) > MOST_ENTRIES or sum(map(len, kept)) > MOST_USED:
+        raise BadInput(where, "", f"has {len(kept):,} lines", f"at most {MOST_ENTRIES:,} with {MOST_USED:,} letters")
+    parser = ConfigParser(interpolation=None, allow_no_value=True, strict=False)
+    try:
+        parser.read_string("\n".join(kept))
+    except ParsingError as error:
+        number, line = error.errors[0]
+        section = next(line for line in reversed(kept[:number]) if line.startswith("["))
+        raise BadInput(where, "", f"{section_name(section[1:-1])} has the line {brief(line)}", "KEY=VALUE") from error
+    return {name: dict(parser[name]) for name in parser.sections()}
+
+
+def _refuse_missing(wif: _Wif, where: str) -> None:
+    """Refuse a draft without a threading, colours, or what lifts the shafts."""
+    if not any(any(shafts) for shafts in wif.threading.values()):
+        raise BadInput(where, "", "[THREADING] is missing or empty", "the shaft of each end is needed")
+    if not (any(any(shafts) for shafts in wif.liftplan.values())):
+        for name, sets in (("[TREADLING]", wif.treadling), ("[TIEUP]", wif.tieup)):
+            if not any(any(numbers) for numbers in sets.values()):
+                needed = "[TIEUP] and [TREADLING], or [LIFTPLAN], are needed"
+                raise BadInput(where, "", f"{name} is missing or empty, and so is [LIFTPLAN]", needed)
+    if not wif.color_table:
+        raise BadInput(where, "", "[COLOR TABLE] is missing or empty", "the colours of the yarns are needed")
+    if wif.color_palette.range is None:
+        raise BadInput(where, "", "[COLOR PALETTE] Range is missing", "the range of the colours is needed")
+    least, most = wif.color_palette.range
+    if least >= most:
+        raise BadInput(where, "[COLOR PALETTE] Range", (least, most), "the first number must be less than the second")
+    if list(wif.color_table) != sorted(wif.color_table) or max(wif.color_table) > len(wif.color_table):
+        wif.color_table = dict(sorted(wif.color_table.items()))
+        if missing := set(range(1, max(wif.color_table))) - set(wif.color_table):
+            raise BadInput(where, "", f"[COLOR TABLE] has no colour {min(missing)}", "colours 1, 2, 3, … are needed")
+    for index, levels in wif.color_table.items():
+        if not all(least <= level <= most for level in levels):
+            allowed = f"numbers from {least} to {most}, the range of [COLOR PALETTE], are needed"
+            raise BadInput(where, f"[COLOR TABLE] {index}", levels, allowed)
+
+
+def _complete(wif: _Wif, axis: str, where: str) -> None:
+    """Check the colours of the threads of an axis, and give it the defaults without which the reader drops lengths."""
+    yarns: _Yarns = getattr(wif, axis)
+    colours: dict[int, int] = getattr(wif, f"{axis}_colors")
+    known = f"[COLOR TABLE] has the colours 1 to {len(wif.color_table)}"
+    for thread, colour in colours.items():
+        if colour > len(wif.color_table):
+            raise BadInput(where, f"{section_name(f'{axis}_colors')} {thread}", colour, known)
+    sets = wif.threading if axis == "warp" else wif.liftplan or wif.treadling
+    yarns.threads = max([yarns.threads or 0, *sets])
+    section, default = section_name(axis), yarns.color[0] if yarns.color else 0
+    if not 1 <= default <= len(wif.color_table):
+        # Most programs state no default where each thread has a colour of its own.
+        if not colours or set(colours) != set(range(1, len(colours) + 1)):
+            stated = f"Color = {default}" if yarns.color else "no Color"
+            without = min(set(range(1, yarns.threads + 1)) - set(colours))
+            raise BadInput(where, "", f"{section} has {stated}", f"{known}; thread {without} has no colour of its own")
+        default = colours[1]
+        if len(colours) < yarns.threads:
+            threads = f"threads from {len(colours) + 1} on"
+            warnings.warn(f"{section} states no Color: {threads} have that of thread 1.", stacklevel=1)
+    yarns.color = (default,)
+    for key in ("spacing", "thickness"):
+        lengths: dict[int, float] = getattr(wif, f"{axis}_{key}")
+        if lengths and getattr(yarns, key) is None:
+            if len(lengths) >= yarns.threads:
+                setattr(yarns, key, next(iter(lengths.values())))
+            else:
+                single = section_name(f"{axis}_{key}")
+                warnings.warn(f"{section} states no {key.title()}: {single} is not used.", stacklevel=1)
+                lengths.clear()
+
+
+def _written(wif: _Wif) -> str:
+    """Return the sections as text."""
+    parser = ConfigParser(interpolation=None)
+    for field, content in wif.model_dump(by_alias=True, exclude_none=True).items():
+        if field == "wif" or content:
+            parser[field.replace("_", " ")] = {str(key): _value(value) for key, value in content.items()}
+    file = io.StringIO()
+    parser.write(file, space_around_delimiters=False)
+    return file.getvalue()
+
+
+def _value(value: object) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    return " ".join(text.replace("%", "%%").split())  # the reader interpolates
