@@ -23,7 +23,9 @@ from jobs.cli import main
 from jobs.recipe.load import load_recipe
 from pipeline.scenes.catalogue import load_scene
 from reports.record import Record, this_machine, write_records
+from weaves.draft_files.write import wif_text
 from weaves.errors import MOST_LETTERS, BadInput
+from weaves.fabric import load_fabric
 
 SECONDS = 60  # a pipe that is opened would wait for ever
 MEMORY = 1 << 30
@@ -41,8 +43,16 @@ FILES = {
     "records": ["compare {}.json good.json", "compare good.json {}.json"],
     "markdown": ["results smoke --readme {}.md"],
     "scheduler": ["generate smoke --scheduler {}.json"],
+    "draft": ["import {}.wif --out a.toml"],
 }
-SUFFIX = {"scene": ".xml", "queries": ".parquet", "records": ".json", "markdown": ".md", "scheduler": ".json"}
+SUFFIX = {
+    "scene": ".xml",
+    "queries": ".parquet",
+    "records": ".json",
+    "markdown": ".md",
+    "scheduler": ".json",
+    "draft": ".wif",
+}
 
 
 def _link(target):
@@ -246,6 +256,20 @@ export denim --mesh a.ply --repeats {10**30}
 export denim --mesh {"m" * 300}.ply --vertices 2
 export denim --mesh good.json/a.ply --vertices 2
 export denim --mesh folder.ply --vertices 2
+export denim --wif a.txt
+export denim --wif a.wif --mesh a.ply
+export denim --wif a.wif --repeats 2
+export denim --wif good.json/a.wif
+import nothing.wif --out a.toml
+import good.json --out a.toml
+import good.wif --out a.txt
+import good.wif --out good.json/a.toml
+import good.wif --out a.toml --like nothing
+import good.wif --out a.toml --name {"n" * 61}
+import good.wif --out a.toml --name a/b
+import good.wif --out a.toml --warp.bend 95
+import good.wif --out a.toml --weft.roughness nan
+import good.wif --out a.toml --warp.colour red
 evaluate denim
 evaluate denim nothing.parquet --out a.parquet
 evaluate denim good.parquet --out a.parquet --estimator nothing
@@ -351,6 +375,7 @@ def surroundings():
     """Write the good files that commands name."""
     Path("good.json").write_text('[{"method": "a"}]')
     Path("good.xml").write_text("<scene/>")
+    Path("good.wif").write_text(wif_text(load_fabric("denim")))
     Path("folder.ply").mkdir()
     os.mkfifo("pipe.xml")
     for suffix in (".xml", ".toml"):

@@ -42,7 +42,20 @@ def complaint(answer, code=2):
 def test_help_lists_the_verbs_in_the_order_of_work(twillight):
     code, text, _ = twillight("--help")
     verbs = [line.split()[1] for line in text.splitlines() if line.startswith("│") and line.split()[1].isalpha()]
-    order = ["list", "show", "export", "plan", "generate", "evaluate", "check", "train", "bench", "report", "run"]
+    order = [
+        "list",
+        "import",
+        "show",
+        "export",
+        "plan",
+        "generate",
+        "evaluate",
+        "check",
+        "train",
+        "bench",
+        "report",
+        "run",
+    ]
     order += ["status", "compare"]
     assert code == 0 and [verb for verb in verbs if verb in order] == order
 

@@ -246,6 +246,8 @@ def test_a_ledger_sees_what_it_has_written(switch, tmp_path):
         ["compare", "s3://products/a", "b"],
         ["show", "denim", "--out", "s3://products/a"],
         ["export", "denim", "--mesh", "s3://products/a.ply"],
+        ["export", "denim", "--wif", "s3://products/a.wif"],
+        ["import", "s3://products/a.wif", "--out", "a.toml"],
         ["results", "quick", "--file", "s3://products/a.md"],
     ],
 )

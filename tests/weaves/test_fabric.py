@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weaves.draft import cells
+from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.yarn import Yarn
 
@@ -96,6 +97,23 @@ def test_published_bend_and_twist_of_the_presets():
     for name, (warp, weft, twist) in published.items():
         fabric = load_fabric(name)
         assert (fabric.warp.bend, fabric.weft.bend, fabric.warp.twist, fabric.weft.twist) == (warp, weft, twist, twist)
+
+
+def test_the_physical_size_is_left_out_where_it_is_unknown(tmp_path):
+    denim = load_fabric("denim")
+    assert "yarns_per_cm" not in denim.model_dump() and "yarns_per_cm" not in denim.to_toml()
+    sized = Fabric.model_validate(denim.model_dump() | {"yarns_per_cm": [24, 19.5]})
+    (tmp_path / "denim.toml").write_text(sized.to_toml(), encoding="utf-8", newline="")
+    assert load_fabric(tmp_path / "denim.toml").yarns_per_cm == (24.0, 19.5)
+    assert sized.optics() == denim.optics()
+
+
+@pytest.mark.parametrize("size", ["[24.0]", "[0.0, 20.0]", "[24.0, 1e9]", "24.0", "[nan, 20.0]"])
+def test_sizes_that_no_cloth_has_are_refused(tmp_path, size):
+    path = tmp_path / "denim.toml"
+    path.write_text(f"yarns_per_cm = {size}\n{load_fabric('denim').to_toml()}", encoding="utf-8", newline="")
+    with pytest.raises(BadInput, match="yarns_per_cm"):
+        load_fabric(path)
 
 
 def test_optics_see_shape_but_not_colour_name_or_source():

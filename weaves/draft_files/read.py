@@ -123,9 +123,6 @@ def _read_dtx(content: bytes, where: str) -> PatternData:
         if not (name in sections and sections[name].data):
             raise BadInput(where, "", f"section @@{name} is missing or empty", "it is needed")
     pattern = _called(lambda: read_dtx(io.StringIO(text), where), where, "a FiberWorks draft")
-    # Version 4.7.1 of the reader looks for this word with the %% that it has removed.
-    lifts = sections.get("tieup") or sections.get("liftplan")
-    pattern.is_rising_shed = lifts is None or "sinking" not in lifts.metadata
     for axis, threads in (("warp", "ends"), ("weft", "picks")):
         if f"{axis}_spacing" not in sections:
             size = f"{dtx_reader.DefaultFiberSpacing:g} cm"
@@ -176,7 +173,8 @@ def _called(call: Callable[[], Result], where: str, kind: str) -> Result:
     try:
         return call()
     except Exception as error:
-        reason = one_line(error, 120) or type(error).__name__
+        missing = f"the entry {one_line(error, 60)} is missing" if isinstance(error, LookupError) else ""
+        reason = missing or one_line(error, 120) or type(error).__name__
         raise BadInput(where, "", f"cannot be read as {kind}", reason) from error
 
 

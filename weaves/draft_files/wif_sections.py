@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from weaves.colour_order import MOST_THREADS
-from weaves.errors import BadInput, brief
+from weaves.errors import BadInput
 from weaves.reading import MIB
 
 MOST_BYTES: Final = 4 * MIB
@@ -159,7 +159,9 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
     kept: list[str] = []
     known = {name.replace("_", " ") for name in _Wif.model_fields} | set(_Wif.model_fields)
     inside, begun = False, False
-    for line in map(str.strip, lines):  # an indented line would continue the one before
+    for raw in lines:
+        # An indented line would continue the one before, and the parser's time is cubic in the length of a gap.
+        line = " ".join(raw.split())
         if line.startswith("["):
             name = line[1:].partition("]")[0].strip().lower()
             begun = begun or name == "wif"
@@ -168,7 +170,7 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
         elif inside and line:
             if len(line) > MOST_LETTERS:
                 raise BadInput(
-                    where, "", f"{kept[-1]} has a line of {len(line):,} letters", f"at most {MOST_LETTERS:,}"
+                    where, "", f"{section_name(name)} has a line of {len(line):,} letters", f"at most {MOST_LETTERS:,}"
                 )
             kept.append(line)
     if not begun:
@@ -179,9 +181,11 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
     try:
         parser.read_string("\n".join(kept))
     except ParsingError as error:
-        number, line = error.errors[0]
-        section = next(line for line in reversed(kept[:number]) if line.startswith("["))
-        raise BadInput(where, "", f"{section_name(section[1:-1])} has the line {brief(line)}", "KEY=VALUE") from error
+        number, line = error.errors[0][0], kept[error.errors[0][0] - 1]
+        section = next(one for one in reversed(kept[:number]) if one.startswith("["))
+        raise BadInput(
+            where, "", f"{section_name(section[1:-1])} has the line {line}", "a line is KEY=VALUE"
+        ) from error
     return {name: dict(parser[name]) for name in parser.sections()}
 
 

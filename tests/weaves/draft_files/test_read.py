@@ -1,0 +1,308 @@
+"""Reading of draft files: what each section means, real files, and what is refused."""
+
+import io
+import signal
+import zipfile
+from importlib.metadata import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
+from weaves.draft import Draft, smallest_repeat
+from weaves.draft_files.read import read_draft
+from weaves.draft_files.wif_sections import MOST_BYTES
+from weaves.errors import MOST_LETTERS, BadInput
+
+SAMPLES = {str(path): Path(path.locate()) for path in files("dtx-to-wif") if "test_data" in path.parts}
+"""Files that come with the library; its own tests say which are bad."""
+VALID = sorted(name for name in SAMPLES if "bad_" not in name)
+BAD = sorted(name for name in SAMPLES if "bad_" in name)
+
+SECONDS = 30  # far above the two seconds that are stated: it ends a reader that hangs, whatever else the machine does
+
+
+@pytest.fixture(autouse=True)
+def _ends():
+    """Fail, rather than wait, where a reader does not return."""
+
+    def late(number, frame):
+        raise AssertionError(f"it takes more than {SECONDS} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(SECONDS)
+    yield
+    signal.alarm(0)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def call(content, suffix=".wif"):
+        path = tmp_path / f"draft{suffix}"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return read_draft(path)
+
+    return call
+
+
+def rows(draft):
+    return Draft(smallest_repeat(draft.warp_over)).rows()
+
+
+def refusal(read, content, suffix=".wif"):
+    with pytest.raises(BadInput) as refused:
+        read(content, suffix)
+    sentence = str(refused.value)
+    assert len(sentence) <= MOST_LETTERS and sentence.isprintable()
+    return sentence
+
+
+def test_the_sections_of_a_twill(read):
+    draft = read(wif())
+    assert rows(draft) == BALANCED_ROWS and draft.warp_over.shape == (8, 8)
+    assert (draft.title, draft.program, draft.remarks) == ("Small cloth", "Loom 2", ())
+    assert draft.ends.colours == ("#ffffff",) * 8 and draft.picks.colours == ("#aa1020",) * 8
+    assert (draft.ends.width, draft.picks.width) == pytest.approx((0.75, 0.5))
+    assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54)
+    assert draft.picks.per_cm == pytest.approx(1 / 0.254)
+
+
+def test_a_liftplan_and_several_treadles_weave_the_same(read):
+    lifted = numbered(["1,2", "2,3", "3,4", "4,1"] * 2)
+    assert rows(read(wif(TIEUP=None, TREADLING=None, LIFTPLAN=lifted))) == BALANCED_ROWS
+    pressed = numbered(["1,2", "2,3", "3,4", "4,1"] * 2)
+    assert rows(read(wif(TIEUP="1=1\n2=2\n3=3\n4=4", TREADLING=pressed))) == BALANCED_ROWS
+
+
+def test_a_falling_shed_lowers_the_shafts(read):
+    text = wif(WEAVING="Rising Shed=false\nShafts=4\nTreadles=4")
+    assert np.array_equal(read(text).warp_over, ~read(wif()).warp_over)
+
+
+@pytest.mark.parametrize(
+    ("levels", "white", "red"),
+    [
+        ("0,255", "255,255,255", "170,16,32"),
+        ("0,999", "999,999,999", "666,63,125"),
+        ("0,65535", "65535,65535,65535", "43690,4112,8224"),
+    ],
+)
+def test_palettes_of_any_range(read, levels, white, red):
+    draft = read(wif(COLOR_PALETTE=f"Range={levels}", COLOR_TABLE=f"1={white}\n2={red}"))
+    assert (draft.ends.colours[0], draft.picks.colours[0]) == ("#ffffff", "#aa1020")
+
+
+def test_single_colours_and_lengths_of_threads(read):
+    draft = read(
+        wif(WARP_COLORS="2=2\n5=\n8=2", WEFT_COLORS="1=1", WARP_SPACING="1=20\n2=4", WARP_THICKNESS="1=5\n2=3\n3=")
+    )
+    white, red = "#ffffff", "#aa1020"
+    assert draft.ends.colours == (white, red, *[white] * 5, red)
+    assert draft.picks.colours == (white, *[red] * 7)
+    assert draft.ends.width == pytest.approx((5 + 3 + 6 * 9) / (20 + 4 + 6 * 12))
+
+
+def test_a_real_draft_without_default_colours(read):
+    """Nine colours, no key Color, palette from 0 to 999, thickness above spacing, Windows-1252, a title with %."""
+    colours = [thread * 7 % 9 + 1 for thread in range(216)]
+    table = numbered([f"{100 * k},0,{999 - 100 * k}" for k in range(9)])
+    text = wif(
+        TEXT="Title=Café 50% laine",
+        COLOR_PALETTE="Range=0,999\nEntries=9",
+        COLOR_TABLE=table,
+        WARP="Threads=216\nSpacing=.212\nThickness=.2438\nUnits=centimeters",
+        WEFT="Threads=216\nSpacing=.212\nThickness=.2438\nUnits=Centimeters",
+        WARP_COLORS=numbered(colours),
+        WEFT_COLORS=numbered(colours[::-1]),
+        THREADING=numbered([end % 4 + 1 for end in range(216)]),
+        TREADLING=numbered([pick % 4 + 1 for pick in range(216)]),
+    )
+    draft = read(text.replace("\n", "\r\n").encode("cp1252"))
+    assert draft.title == "Café 50% laine" and draft.remarks == ()
+    assert len(set(draft.ends.colours)) == 9 and draft.picks.colours == draft.ends.colours[::-1]
+    assert draft.ends.width == pytest.approx(1.15) and draft.ends.per_cm == pytest.approx(4.717, abs=1e-3)
+    assert rows(draft) == BALANCED_ROWS
+
+
+def test_text_before_the_first_section_and_others_sections_are_skipped(read):
+    private = "[PRIVATE PICTURE]\n" + "x" * 100_000 + "\n=\n[NOTES]\n1=100 %\nno number\n"
+    text = "\ufeffsaved by a mail program\r\n" + wif() + private + "   [text]\n   title = 20 % wool\n"
+    draft = read(text)
+    assert rows(draft) == BALANCED_ROWS and draft.title == "20 % wool"
+
+
+def test_what_cannot_be_used_is_a_remark(read):
+    draft = read(
+        wif(WARP="Threads=8\nColor=1\nUnits=Decipoints", WARP_SPACING="1=20", WEFT="Color=2\nSpacing=3\nUnits=ells")
+    )
+    assert any("[WARP SPACING] is not used" in remark for remark in draft.remarks)
+    assert any("'ells'" in remark for remark in draft.remarks)
+    assert draft.ends.per_cm is draft.picks.per_cm is draft.ends.width is None
+    assert read(wif(WARP="Threads=8\nColor=1\nSpacing=0\nUnits=Inches")).ends.per_cm is None
+
+
+@pytest.mark.parametrize("name", VALID)
+def test_the_sample_files_of_the_library_are_read(name):
+    draft = read_draft(SAMPLES[name])
+    assert draft.warp_over.shape == (len(draft.picks.colours), len(draft.ends.colours))
+
+
+def test_there_are_sample_files_of_all_formats():
+    assert {Path(name).suffix for name in VALID} == {".wif", ".dtx", ".wpo", ".twa"}
+    assert len(VALID) > 40 and len(BAD) > 20
+
+
+@pytest.mark.parametrize("form", ["liftplan", "multiple treadles", "single treadles"])
+def test_all_formats_of_one_draft_agree(form):
+    same = [read_draft(SAMPLES[name]) for name in VALID if Path(name).stem == f"two color {form}"]
+    assert len(same) == 5  # two of .wif
+    assert all(np.array_equal(draft.warp_over, same[0].warp_over) for draft in same)
+    assert all(draft.ends.colours == same[0].ends.colours for draft in same)
+    assert all(draft.picks.colours == same[0].picks.colours for draft in same)
+
+
+def test_a_sinking_shed_of_fiberworks_is_that_of_its_wif():
+    stems = {Path(name).stem for name in VALID if "sinking" in name}
+    assert len(stems) == 2
+    for stem in stems:
+        first, second = (read_draft(SAMPLES[name]).warp_over for name in VALID if Path(name).stem == stem)
+        rising = next(read_draft(SAMPLES[n]) for n in VALID if Path(n).stem == stem.removesuffix(" sinking shed"))
+        assert np.array_equal(first, second) and np.array_equal(first, ~rising.warp_over)
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_the_bad_files_of_the_library_are_refused(name, read):
+    path = SAMPLES[name]
+    refusal(read, path.read_bytes(), path.suffix)
+
+
+MALFORMED = {
+    "empty": ("", "[WIF]"),
+    "binary": (bytes(range(256)) * 20, "[WIF]"),
+    "no WIF": (wif(WIF=None), "[WIF]"),
+    "bare WIF": ("[WIF]", "[THREADING]"),
+    "no palette": (wif(COLOR_PALETTE=None), "[COLOR PALETTE]"),
+    "palette of one": (wif(COLOR_PALETTE="Range=255"), "[COLOR PALETTE] range"),
+    "falling palette": (wif(COLOR_PALETTE="Range=255,0"), "[COLOR PALETTE] Range"),
+    "no colour table": (wif(COLOR_TABLE=None), "[COLOR TABLE]"),
+    "colour out of range": (wif(COLOR_TABLE="1=256,0,0\n2=0,0,0"), "[COLOR TABLE] 1"),
+    "two levels": (wif(COLOR_TABLE="1=25,0\n2=0,0,0"), "[COLOR TABLE] 1"),
+    "gap in table": (wif(COLOR_TABLE="1=2,5,0\n3=0,0,0"), "[COLOR TABLE] has no colour 2"),
+    "no threading": (wif(THREADING=None), "[THREADING]"),
+    "empty threading": (wif(THREADING="1=0\n2="), "[THREADING]"),
+    "shaft by name": (wif(THREADING="1=one"), "[THREADING] 1"),
+    "end 0": (wif(THREADING="0=1"), "[THREADING] 0"),
+    "end by name": (wif(THREADING="first=1"), "[THREADING] first"),
+    "line without key": (wif(THREADING="1=1\n=2\n2=1"), "[THREADING] has the line =2"),
+    "no tie-up": (wif(TIEUP=None), "[TIEUP]"),
+    "no treadling": (wif(TREADLING=None), "[TREADLING]"),
+    "treadle without tie-up": (wif(TREADLING=numbered([1, 2, 3, 9])), "[TREADLING] uses treadle 9"),
+    "comment": (wif(WEAVING="Shafts=2 ; two"), "[WEAVING] shafts"),
+    "negative shafts": (wif(WEAVING="Shafts=-2"), "[WEAVING] shafts"),
+    "shed": (wif(WEAVING="Rising Shed=perhaps"), "[WEAVING] rising shed"),
+    "spacing nan": (wif(WARP="Threads=8\nColor=1\nSpacing=nan"), "[WARP] spacing"),
+    "spacing infinite": (wif(WEFT="Threads=8\nColor=1\nSpacing=1e999"), "[WEFT] spacing"),
+    "negative spacing": (wif(WARP_SPACING="1=-1"), "[WARP SPACING] 1"),
+    "many threads": (wif(WARP="Threads=2000000000\nColor=1"), "[WARP] threads"),
+    "no threads": (wif(WARP="Threads=0\nColor=1"), "[WARP] threads"),
+    "many ends": (wif(THREADING="2000000000=1"), "[THREADING] 2000000000"),
+    "colour that is not there": (wif(WARP="Threads=8\nColor=7"), "[WARP] has Color = 7"),
+    "no colour": (wif(WEFT="Threads=8"), "[WEFT] has no Color"),
+    "colour of an end": (wif(WARP_COLORS="3=7"), "[WARP COLORS] 3"),
+    "long line": (wif(TIEUP="1=" + "1," * 9000), "[TIEUP] has a line"),
+    "long gap": (wif(TEXT=("a" + " " * 8000 + "b\n") * 100, THREADING=None), "[THREADING]"),
+    "long number": (wif(THREADING="1=" + "9" * 5000), "[THREADING] 1"),
+    "many lines": (wif(THREADING="1=1\n" * 70_000), "lines"),
+    "large": ("[WIF]\n" + "x" * MOST_BYTES, f"{MOST_BYTES:,}"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_a_malformed_wif_is_one_sentence_that_names_its_section(read, case):
+    content, named = MALFORMED[case]
+    assert named in refusal(read, content)
+
+
+def archive(**members):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, content in members.items():
+            packed.writestr(name.replace("_", "."), content)
+    return file.getvalue()
+
+
+DTX = "@@StartDTX\n@@Imprint\nPCW 4.2.0\n@@Info\n%%ends 2\n"
+DTX += "@@Threading\n1 2\n@@Color Palet\n1,2,3\n4,5,6\n@@Tieup\n01\n10\n"
+
+OTHERS = {
+    "no archive": (b"[WIF]", ".twa", "TempoWeave"),
+    "no draft inside": (archive(readme_txt="hello"), ".twa", "twamain.waf"),
+    "bomb": (archive(twamain_waf=b"\0" * 50_000_000), ".twa", "4,194,304"),
+    "bad draft inside": (archive(twamain_waf=wif(THREADING=None)), ".twa", "[THREADING]"),
+    "empty WeavePoint": (b"", ".wpo", "WeavePoint"),
+    "other WeavePoint": (b"\0" * 300, ".wpo", "WeavePoint"),
+    "short WeavePoint": (b"\x7b\x05\x65" + b"\1" * 60, ".wpo", "WeavePoint"),
+    "empty FiberWorks": (b"", ".dtx", "@@StartDTX"),
+    "text": (b"hello", ".dtx", "@@StartDTX"),
+    "threading": (DTX.replace("1 2\n", "1 two\n"), ".dtx", "@@threading"),
+    "no threading": (DTX.replace("@@Threading\n1 2\n", ""), ".dtx", "@@threading"),
+    "no colours": (DTX.replace("@@Color Palet\n1,2,3\n4,5,6\n", ""), ".dtx", "@@color_table"),
+    "tie-up": (DTX.replace("01\n10", "01\n1"), ".dtx", "@@tieup"),
+    "no treadling": (DTX, ".dtx", "treadling"),
+    "many ends": (DTX.replace("ends 2", "ends 2000000000") + "@@Treadling\n1 2\n", ".dtx", "Threads"),
+    "many numbers": ("@@StartDTX\n@@Threading\n" + "1 " * 700_000, ".dtx", "letters"),
+    "other suffix": (b"", ".jpg", ".wif, .wifw, .dtx, .wpo, .twa"),
+}
+
+
+@pytest.mark.parametrize("case", OTHERS)
+def test_other_malformed_files_are_one_sentence(read, case):
+    content, suffix, named = OTHERS[case]
+    assert named in refusal(read, content, suffix)
+
+
+def test_a_fiberworks_file_by_hand(read):
+    draft = read(DTX + "@@Treadling\n1 2\n", ".dtx")
+    assert draft.warp_over.tolist() == [[True, False], [False, True]]
+    assert draft.ends.colours == ("#010203",) * 2 and draft.picks.colours == ("#040506",) * 2
+    assert [("default" in remark) for remark in draft.remarks] == [True, True]
+
+
+def test_a_weavepoint_file_without_yarns_per_inch(read):
+    content = bytearray(SAMPLES[next(name for name in VALID if name.endswith("two color liftplan.wpo"))].read_bytes())
+    content[9] = content[10] = 0
+    assert read(bytes(content), ".wpo").ends.per_cm is None
+
+
+damaged = st.sampled_from([name for name in VALID if SAMPLES[name].stat().st_size < 20_000])
+
+
+@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(damaged, st.data())
+def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
+    content = bytearray(SAMPLES[name].read_bytes())
+    for place in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=6)):
+        content[place] ^= 1 << data.draw(st.integers(0, 7))
+    left = data.draw(st.integers(0, len(content)))
+    try:
+        read(bytes(content[:left] if data.draw(st.booleans()) else content), SAMPLES[name].suffix)
+    except BadInput as refused:
+        assert len(str(refused)) <= MOST_LETTERS and str(refused).isprintable()
+
+
+words = st.sampled_from(
+    ["[WIF]", "[WARP]", "[TIEUP]", "=", "1", ",", "%", ";", "\n", "[", "]", " ", "\0", "color", "nan"]
+)
+
+
+@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(words, max_size=60), st.sampled_from([".wif", ".dtx"]))
+@example(["[WIF]", "\n", "[WARP]", "\n", "color", "=", ","], ".wif")
+def test_any_words_are_a_draft_or_one_sentence(read, pieces, suffix):
+    try:
+        read("".join(pieces), suffix)
+    except BadInput as refused:
+        assert len(str(refused)) <= MOST_LETTERS and str(refused).isprintable()

@@ -1,0 +1,142 @@
+"""Fabrics from drafts: repeats, colours, sizes, assumptions, and what is no cloth."""
+
+import pytest
+
+from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
+from weaves.draft_files.read import read_draft
+from weaves.draft_files.to_fabric import fabric_of
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+denim, voile = load_fabric("denim"), load_fabric("voile")
+NOTHING = {"warp": {}, "weft": {}}
+
+
+@pytest.fixture
+def imported(tmp_path):
+    def call(text, like=denim, given=NOTHING):
+        path = tmp_path / "small.wif"
+        path.write_text(text, encoding="utf-8", newline="")
+        return fabric_of(read_draft(path), like, "cloth", "small.wif", given)
+
+    return call
+
+
+def test_a_twill_with_its_size_and_the_yarns_of_denim(imported, tmp_path):
+    found = imported(wif())
+    fabric = found.fabric
+    assert fabric.weave.rows() == BALANCED_ROWS
+    assert fabric.yarns_per_cm == (23.62, 3.937)
+    assert fabric.colours is None and (fabric.warp.diffuse, fabric.weft.diffuse) == ("#ffffff", "#aa1020")
+    assert (fabric.warp.width, fabric.weft.width) == (0.75, 0.5)
+    assert fabric.warp.optics() | {"width": 1.0} == denim.warp.optics()
+    assert fabric.weft.optics() | {"width": 1.0} == denim.weft.optics()
+    assert fabric.warp.specular_rgb == denim.warp.specular_rgb
+    (tmp_path / "cloth.toml").write_text(fabric.to_toml(), encoding="utf-8", newline="")
+    assert load_fabric(tmp_path / "cloth.toml") == fabric
+
+
+def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
+    """One of a public archive: the structure is a plain weave, the colours repeat after all 214 threads."""
+    colours = [1 + (thread * thread // 7) % 9 for thread in range(214)]
+    found = imported(
+        wif(
+            COLOR_TABLE=numbered([f"{25 * k},{255 - 20 * k},80" for k in range(10)]),
+            WARP="Threads=214\nSpacing=.2\nThickness=.23\nUnits=centimeters",
+            WEFT="Threads=214\nSpacing=.2\nThickness=.23\nUnits=centimeters",
+            WARP_COLORS=numbered(colours),
+            WEFT_COLORS=numbered(colours[::-1]),
+            THREADING=numbered([1, 2] * 107),
+            TIEUP="1=1\n2=2",
+            TREADLING=numbered([1, 2] * 107),
+        )
+    )
+    fabric = found.fabric
+    assert fabric.weave.rows() == [".#", "#."]
+    assert fabric.colours is not None and len(fabric.colours.palette) == 9
+    ends, picks = fabric.colours.threads("ends"), fabric.colours.threads("picks")
+    assert len(ends) == len(picks) == 214 and ends == picks[::-1]
+    hexes = [fabric.colours.palette[name].diffuse for name in ends]
+    assert hexes == [f"#{25 * (k - 1):02x}{255 - 20 * (k - 1):02x}50" for k in colours]
+    assert (fabric.warp.width, fabric.weft.width) == (1.0, 1.0)
+    assert sum("1.15 of the spacing" in sentence for sentence in found.assumed) == 2
+
+
+def test_stripes_in_the_ends_alone(imported):
+    fabric = imported(wif(WARP_COLORS=numbered([1, 1, 1, 2] * 2))).fabric
+    assert fabric.colours.ends == (("colour_1", 3), ("colour_2", 1)) and fabric.colours.picks == ()
+    assert fabric.warp.diffuse == "#ffffff" and fabric.weft.diffuse == "#aa1020"
+
+
+def test_everything_assumed_is_said_and_kept(imported):
+    found = imported(
+        wif(WARP="Threads=8\nColor=1", WEFT="Threads=8\nColor=2"), given={"warp": {"bend": 20.5}, "weft": {}}
+    )
+    text = " ".join(found.assumed)
+    for said in ("width 1 is that of denim", "size", "bend 20.5° and 38°", "warp.bend", "twist -30° and -30°", "sRGB"):
+        assert said in text
+    assert found.fabric.yarns_per_cm is None and found.fabric.warp.bend == 20.5
+    assert all(sentence in found.fabric.source for sentence in (*found.read, *found.assumed))
+    assert "'Small cloth', written by Loom 2, from small.wif" in found.fabric.source
+
+
+def test_a_bright_colour_leaves_no_light_to_go_through(imported):
+    found = imported(wif(), like=voile)
+    assert found.fabric.warp.diffuse_transmission_rgb == (0.0, 0.0, 0.0)
+    assert found.fabric.weft.diffuse_transmission_rgb[1] == pytest.approx(voile.weft.diffuse_transmission_rgb[1])
+    assert any("Light through" in sentence for sentence in found.assumed)
+
+
+def test_a_last_repeat_that_is_not_whole_is_left_out(imported):
+    text = wif(
+        WARP="Threads=131\nColor=1", THREADING=numbered([end % 4 + 1 for end in range(131)]), WEFT="Threads=8\nColor=2"
+    )
+    found = imported(text)
+    assert found.fabric.weave.rows() == BALANCED_ROWS
+    assert "The last 3 ends do not fill a repeat and are left out." in found.assumed
+
+
+def test_layers_that_lie_loose_are_said(imported):
+    # Ends 1 and 3 weave with picks 1 and 3, ends 2 and 4 with picks 2 and 4, the first layer on top.
+    text = wif(
+        THREADING=numbered([1, 2, 3, 4]), TIEUP="1=1\n2=1,3,2\n3=3\n4=1,3,4", TREADLING=numbered([1, 2, 3, 4]),
+        WARP="Threads=4\nColor=1", WEFT="Threads=4\nColor=2",
+    )  # fmt: skip
+    found = imported(text)
+    assert not found.fabric.weave.hangs_together()
+    assert any("loose" in sentence for sentence in found.assumed)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"THREADING": "1=1\n2=2\n3=3"}, "end 4 of [THREADING]"),
+        ({"TREADLING": numbered([1, 2, 3, 4, 1, 2, 3])}, "pick 8 of [TREADLING]"),
+        ({"TIEUP": "1=1,2\n2=2,3\n3=3,4\n4=0"}, "pick 4 of [TREADLING]"),
+        ({"TIEUP": "1=1,2,3,4\n2=2,3\n3=3,4"}, "pick 1 of [TREADLING]"),
+        (
+            {
+                "THREADING": numbered([end * end * end % 4 + 1 for end in range(200)] + [1, 2, 3, 4]),
+                "WARP": "Threads=211\nColor=1",
+            },
+            "[THREADING] repeats after 211 ends",
+        ),
+        (
+            {
+                "COLOR_TABLE": numbered([f"{k % 256},{k // 256},0" for k in range(300)]),
+                "WARP_COLORS": numbered(range(1, 301)),
+                "THREADING": numbered([1, 2, 3, 4] * 75),
+            },
+            "[COLOR TABLE]",
+        ),
+    ],
+)
+def test_what_is_no_cloth_is_refused(imported, change, named):
+    with pytest.raises(BadInput) as refused:
+        imported(wif(**change))
+    assert named in str(refused.value)
+
+
+def test_a_number_of_a_yarn_that_is_not_allowed_is_refused(imported):
+    with pytest.raises(BadInput, match=r"warp\.bend = 95"):
+        imported(wif(), given={"warp": {"bend": 95.0}, "weft": {}})
