@@ -184,6 +184,27 @@ def export(
     Terminal().print(said, soft_wrap=True)
 
 
+@app.command(sort_key=2)
+def render(
+    scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
+    *,
+    out: Annotated[Local, Parameter(help="File ending in .png, .exr or .mp4, or a folder for numbered pictures.")],
+    fabric: Annotated[list[str], Parameter(help="Fabric in place of the next cloth's own; several.")] = [],  # noqa: B006
+    method: Annotated[str, Parameter(help="truth, selvage, soft_nodes, point_sampled:16, … or a folder.")] = "selvage",
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT in pixels; default: the film of the scene.")] = "",
+    frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
+    samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
+    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 16,
+    tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
+    exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,
+) -> None:
+    """Render a scene with any fabrics by any method."""
+    from jobs.verbs.render.look import look
+    from jobs.verbs.render.render import render as rendered
+
+    rendered(scene, fabric, method, frames, look(size, samples, directions, tone, exposure), out)
+
+
 @app.command(sort_key=3)
 def plan(
     recipe: RecipeName,

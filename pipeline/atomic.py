@@ -56,8 +56,7 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
             _sync_folder(path.parent)
     except OSError as error:
         if error.errno in _UNWRITABLE:
-            reason = error.strerror or "not writable"
-            raise BadInput(str(path.parent), "", reason, "a folder that can be written is needed") from error
+            raise _unwritable(path, error) from error
         raise WorkFailed(f"{path}: {error.strerror or error}; what was written before is kept") from error
     finally:
         with suppress(OSError):
@@ -68,6 +67,23 @@ def atomic_write(path: Path, content: bytes, *, durable: bool = True) -> None:
     """Write `content` to `path` whole or not at all; `durable` as for `atomic_path`."""
     with atomic_path(path, durable=durable) as temporary:
         temporary.write_bytes(content)
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Create the folder of a file that long work is to write; BadInput if it cannot be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    if path.is_dir():
+        raise BadInput(str(path), "", "is a folder", "the path of a file is needed")
+
+
+def _unwritable(path: Path, error: OSError) -> BadInput:
+    reason = error.strerror or "not writable"
+    return BadInput(str(path.parent), "", reason, "a folder that can be written is needed")
 
 
 def _sync_folder(folder: Path) -> None:

@@ -54,6 +54,7 @@ HOMES = {
     "matplotlib": ["reports"],
     "jinja2": ["reports"],
     "OpenEXR": ["reports"],
+    "av": ["reports.images"],
     "skimage": ["reports"],
     "flip_evaluator": ["reports"],
     "pyfvvdp": ["reports"],

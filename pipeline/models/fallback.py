@@ -50,9 +50,14 @@ answers by .1 to .3 % with the light behind and by 1 % with it in front; at graz
 
 def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     """Answer N queries of any kind, float32 (N, 4); `seed` fixes the random points."""
+    return fallback_rows(fabric, queries, seed)[:, :4]
+
+
+def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
+    """Return the components and the transparency of N queries of any kind, float32 (N, 5)."""
     turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
     flat = queries._replace(curvature=np.where(turned <= FLAT, np.float32(0.0), queries.curvature))
-    result, left = np.empty((len(queries.u), 4), np.float32), np.ones(len(queries.u), np.bool_)
+    result, left = np.empty((len(queries.u), 5), np.float32), np.ones(len(queries.u), np.bool_)
     for behind in (False, True):
         rows = np.flatnonzero((queries.wo[:, 2] < 0.0) == behind)
         if not rows.size:
@@ -62,9 +67,10 @@ def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
         if known.any():
             rows = rows[known]
             answers = TABLE.answer(cloth, columns.take(known), rows, *UNBOUNDED, seed)
-            result[rows], left[rows] = np.maximum(answers.mean[:, :4], 0.0), False
+            result[rows], left[rows] = np.maximum(answers.mean, 0.0), False
     if left.any():
-        result[left] = estimate(fabric, flat.take(left), QUADRATURE, seed).mean
+        estimated = estimate(fabric, flat.take(left), QUADRATURE, seed)
+        result[left] = np.concatenate([estimated.mean, estimated.transparency[:, None]], axis=1)
     return result
 
 
@@ -104,11 +110,15 @@ class Fallback:
         outside = self.out_of_domain(fabric, queries)
         if not outside.any():
             return self._method.predict(fabric, self._known(fabric, queries), seed)
-        result = np.empty((len(outside), 4), np.float32)
-        result[outside] = fallback_answers(fabric, queries.take(outside), seed)
-        if not outside.all():
-            result[~outside] = self._method.predict(fabric, self._known(fabric, queries.take(~outside)), seed)
-        return result
+        return self._rows(fabric, queries, outside, seed)[:, :4]
+
+    def rows(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Return components and transparency, (N, 5); the transparency is NaN where the method answers itself."""
+        return self._rows(fabric, queries, self.out_of_domain(fabric, queries), seed)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the transparency of N footprints, (N,), by the fallback; no light changes it."""
+        return fallback_rows(fabric, looks, seed)[:, 4]
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes; all methods share the tables of the fallback."""
@@ -119,6 +129,15 @@ class Fallback:
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
         behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
         return behind if self._domain is None else behind | self._domain.out_of_domain(fabric, self._nearest(queries))
+
+    def _rows(self, fabric: Fabric, queries: Queries, outside: Mask, seed: int) -> Float32:
+        result = np.full((len(outside), 5), np.nan, np.float32)
+        if outside.any():
+            result[outside] = fallback_rows(fabric, queries.take(outside), seed)
+        if not outside.all():
+            inside = self._known(fabric, queries.take(~outside))
+            result[~outside, :4] = self._method.predict(fabric, inside, seed)
+        return result
 
     def _known(self, fabric: Fabric, queries: Queries) -> Queries:
         """Return queries in the nearest form; footprints that see the average are no larger than trained on."""

@@ -6,7 +6,8 @@ torch tensors.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -109,6 +110,17 @@ class Network(Protocol):
 
     def architecture(self) -> dict[str, Any]:
         """Describe layers and parameter counts for the model card."""
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch compute on the thread that calls it, for callers that have one thread a core themselves."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def loaded(network: Net, weights: dict[str, Tensor]) -> Net:

@@ -22,23 +22,26 @@ Floats = npt.NDArray[np.float64]
 _AOVS = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
 
 
-def backdrop(loaded: Loaded, camera: Camera, size: tuple[int, int], cloth: npt.NDArray[np.bool_]) -> Floats:
+def backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: npt.NDArray[np.bool_]) -> Floats:
     """Return the linear RGB of a frame without its cloth, (H, W, 3).
 
     Parameters
     ----------
+    loaded, camera : Loaded, Camera
+        The scene, and its camera in this frame.
+    sensor : Any
+        The camera's sensor, of H by W pixels.
     cloth : bool (H, W)
         Pixels that show cloth: there the scene behind it is seen, without its shadows.
     """
-    picture = _seen(loaded, loaded.world, camera, size, ~cloth)
-    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, size, cloth), picture)
+    picture = _seen(loaded, loaded.world, camera, sensor, ~cloth)
+    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, sensor, cloth), picture)
 
 
-def _seen(loaded: Loaded, world: Any, camera: Camera, size: tuple[int, int], wanted: npt.NDArray[np.bool_]) -> Floats:
-    """Return the radiance of the wanted pixels; what else there is, is the environment."""
+def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.NDArray[np.bool_]) -> Floats:
+    """Return the radiance of the wanted pixels, and that of the environment where a ray leaves the scene."""
     mi = loaded.mi
     integrator = mi.load_dict({"type": "direct"})
-    sensor = camera.sensor(mi, size)
     # Where a ray leaves the scene, Mitsuba returns the environment as it is.
     picture = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3].copy()
     aovs = aovs_of(mi, world, sensor, _AOVS)

@@ -22,7 +22,7 @@ from pipeline.scenes.aovs import aovs_of
 from pipeline.scenes.backdrop import backdrop
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
-from pipeline.scenes.loading import Camera, Loaded
+from pipeline.scenes.loading import Camera, Loaded, Window
 from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted
 from pipeline.scenes.rays import blocked, first_hits, off
 from pipeline.scenes.scene import Cloth
@@ -53,9 +53,15 @@ class Frame(NamedTuple):
     """By the cloth's key; a cloth out of sight has no places."""
     backdrop: Floats
     """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
+    depth: Floats
+    """Distance of what is seen along the camera's axis, in the world's lengths, (H, W); 0 where nothing is."""
+    normal: Floats
+    """Shading normal of what is seen, in the world, (H, W, 3); 0 where nothing is."""
 
 
-def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None) -> Frame:
+def render(
+    loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None, window: Window | None = None
+) -> Frame:
     """Return what every pixel of a frame shows.
 
     Parameters
@@ -66,6 +72,8 @@ def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = No
         Which one; 0 is the first.
     size : (int, int), optional
         Width and height in pixels; the film's unless given.
+    window : Window, optional
+        The part of it that is rendered, H by W pixels; all unless given.
 
     Raises
     ------
@@ -75,14 +83,18 @@ def render(loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = No
     camera = loaded.camera.at(loaded.scene, frame)
     size = size or camera.size
     _refuse_inside(loaded, camera)
-    aovs = aovs_of(loaded.mi, loaded.world, camera.sensor(loaded.mi, size), _AOVS)
+    sensor = camera.sensor(loaded.mi, size, window)
+    aovs = aovs_of(loaded.mi, loaded.world, sensor, _AOVS)
     gbuffers = {}
-    shown = np.zeros((size[1], size[0]), np.bool_)
+    shown = np.zeros(aovs["uv"].shape[:2], np.bool_)
     for key, (cloth, _) in loaded.cloths.items():
         mask = np.isin(aovs["shape_index"][..., 0], np.array(loaded.worn[key]) + 1)
         gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
         shown |= mask
-    return Frame(gbuffers, backdrop(loaded, camera, size, shown))
+    something = aovs["shape_index"][..., 0] > 0
+    forward = camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
+    depth = np.where(something, (aovs["position"] - camera.to_world[:3, 3]) @ forward, 0.0)
+    return Frame(gbuffers, backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
 
 
 def _gbuffer(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,15 @@ from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 
 Floats = npt.NDArray[np.float64]
+
+
+class Window(NamedTuple):
+    """A rectangle of a film, in pixels."""
+
+    left: int
+    top: int
+    width: int
+    height: int
 
 
 @dataclass(frozen=True)
@@ -65,9 +74,12 @@ class Camera:
         depth = (position - self.to_world[:3, 3]) @ self.to_world[:3, 2]
         return np.asarray(depth / (depth - self.settings["near_clip"]))
 
-    def sensor(self, mi: Any, size: tuple[int, int]) -> Any:
-        """Return Mitsuba's sensor, with one ray through the centre of every pixel."""
+    def sensor(self, mi: Any, size: tuple[int, int], window: Window | None = None) -> Any:
+        """Return Mitsuba's sensor, with one ray through the centre of every pixel of a window, or of the whole film."""
         film = {"type": "hdrfilm", "width": size[0], "height": size[1], "component_format": "float32"}
+        if window is not None:
+            film |= {"crop_offset_x": window.left, "crop_offset_y": window.top}
+            film |= {"crop_width": window.width, "crop_height": window.height}
         return mi.load_dict(
             {
                 "type": "orthographic" if self.parallel else "perspective",

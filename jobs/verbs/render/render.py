@@ -1,0 +1,110 @@
+"""`twillight render`: a scene as a picture, a film, or a folder of pictures, by any method."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from jobs.console import duration
+from jobs.terminal import Terminal
+from jobs.verbs.render.film_maker import FilmMaker
+from jobs.verbs.render.look import WHERE, Look
+from pipeline.atomic import refuse_unwritable
+from pipeline.models.fallback import Fallback
+from pipeline.models.named import TRUTH, named_method
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.loading import load
+from pipeline.scenes.picture import TruthAnswers
+from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.sources import worn
+from reports.images.video import refuse_missing
+from reports.options import ShotOptions
+from weaves.errors import BadInput, WorkFailed
+from weaves.fabric import load_fabric
+
+MOST_FRAMES: Final = 100_000
+"""Most frames of a film."""
+
+_SUFFIXES: Final = (".png", ".exr", ".mp4", "")
+
+
+def render(scene: str, fabrics: Sequence[str], method: str, frames: int | None, how: Look, out: Path) -> None:
+    """Render a scene and print where the picture is.
+
+    Parameters
+    ----------
+    scene : str
+        Name of a scene of the package, or path of an .xml or .toml file.
+    fabrics : sequence of str
+        Fabrics that replace those of the scene's cloths, in their order.
+    method : str
+        Name or folder of a method, or ``truth``.
+    frames : int, optional
+        Frames of a film or folder; those of the scene if left out.
+    how : Look
+        How it is made and shown.
+    out : Path
+        A file ending in .png, .exr or .mp4, or a folder for numbered PNG files.
+
+    Raises
+    ------
+    BadInput
+        If a value, the scene, a fabric, the method or the path cannot be used.
+    WorkFailed
+        If the memory does not suffice.
+    """
+    found = dressed(load_scene(scene), fabrics)
+    count = _frames(frames, found, out)
+    answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, WHERE, "--method")
+    loaded = load(found, how.options)
+    if isinstance(answerer, Fallback):
+        for _, fabric in loaded.cloths.values():
+            if not answerer.covers(fabric):
+                raise BadInput(WHERE, "--method", method, f"this model was not trained on {fabric.name}")
+            answerer.prepare(fabric)
+    size = how.size or loaded.camera.size
+    if out.suffix == ".mp4" and (size[0] % 2 or size[1] % 2):
+        raise BadInput(WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
+    refuse_unwritable(out if out.suffix else out / "frame")
+    start = time.monotonic()
+    try:
+        with FilmMaker(loaded, answerer, size, how, count) as maker:
+            maker.write(out, method)
+    except KeyboardInterrupt as stop:
+        stop.args = (f"stopped; {out} is as it was before",) if out.suffix else stop.args
+        raise
+    except MemoryError as error:
+        raise WorkFailed(f"{out}: the memory does not suffice for {size[0]} x {size[1]} pixels") from error
+    share = "" if method == TRUTH else f"; {maker.share:.0%} of the queries by the fallback"
+    terminal = Terminal()
+    terminal.print(f"{out}: {size[0]} x {size[1]}, {duration(time.monotonic() - start)}{share}", soft_wrap=True)
+
+
+def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
+    """Return a scene whose cloths are made of other fabrics, in their order; the rest keeps its own."""
+    keys = list(worn(scene))
+    if len(fabrics) > len(keys):
+        allowed = f"the scene {scene.name} has {len(keys)}: {', '.join(keys) or 'none'}"
+        raise BadInput(WHERE, "--fabric", fabrics[len(keys)], f"is one fabric more than cloths; {allowed}")
+    cloths = dict(scene.cloths)
+    for key, name in zip(keys, fabrics, strict=False):
+        load_fabric(name)
+        cloths[key] = cloths.get(key, Cloth()).model_copy(update={"fabric": name})
+    return scene.model_copy(update={"cloths": cloths})
+
+
+def _frames(frames: int | None, scene: Scene, out: Path) -> int:
+    """Return the number of frames; BadInput if it does not go with the file."""
+    if out.suffix not in _SUFFIXES:
+        raise BadInput(WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
+    if frames is not None and not 1 <= frames <= MOST_FRAMES:
+        raise BadInput(WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
+    if out.suffix == ".mp4":
+        refuse_missing(WHERE, "--out", out)
+    if out.suffix in (".png", ".exr"):
+        if frames is not None and frames > 1:
+            raise BadInput(WHERE, "--frames", frames, f"{out.suffix} holds one frame; name an .mp4 file or a folder")
+        return 1
+    return scene.frames if frames is None else frames

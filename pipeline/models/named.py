@@ -1,0 +1,72 @@
+"""Methods by the names that people give on a command line.
+
+`selvage` is a model that comes with the package, `out/models/NAME` the folder of a trained one, `soft_nodes` a model
+that learns nothing, and `point_sampled:16` one of its settings. Without a setting the last one is taken, which is the
+most accurate.
+"""
+
+from __future__ import annotations
+
+from pipeline.models.catalogue import CLASSES
+from pipeline.models.fallback import Fallback
+from pipeline.models.options import Options
+from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
+from pipeline.storage import place
+from weaves.errors import BadInput, nearest
+from weaves.validation import validated
+
+TRUTH = "truth"
+"""Name of the ground truth among methods."""
+
+
+def untrained_names() -> list[str]:
+    """Return the names of the models that learn nothing."""
+    return sorted(name for name, options in CLASSES.items() if not options.learns)
+
+
+def named_method(name: str, where: str, key: str) -> Fallback:
+    """Return a method that answers any query; others than its own go to the fallback.
+
+    Parameters
+    ----------
+    name : str
+        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting, or a folder.
+    where, key : str
+        The verb and its option that name the method, for messages.
+
+    Raises
+    ------
+    BadInput
+        If there is no such method, it must be trained first, it has no such setting, or its files are damaged.
+    """
+    model, _, setting = name.partition(":")
+    if model in untrained_names():
+        options = _with_setting(CLASSES[model](), setting, where, key, name)
+        return Fallback(load_methods(options)[-1], options.kinds)
+    if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():
+        if name in CLASSES:
+            raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
+        known = [TRUTH, *pretrained_names(), *untrained_names()]
+        raise BadInput(where, key, name, f"the folder of a trained model or a name is needed; {nearest(name, known)}")
+    (method,) = load_model(model_folder(name, where, key))
+    return Fallback(method, _kinds(method))
+
+
+def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:
+    """Return options with one setting k, if one is named."""
+    if not setting:
+        return options
+    if not options.parameter or not setting.isdecimal() or len(setting) > 6:
+        allowed = f"a number k after the colon is needed, such as {options.model}:4"
+        raise BadInput(where, key, name, allowed if options.parameter else f"{options.model} has no settings")
+    try:
+        return validated(type(options), {options.parameter: [int(setting)]}, where)
+    except BadInput as error:
+        raise BadInput(where, key, name, error.allowed) from error
+
+
+def _kinds(method: object) -> frozenset[str]:
+    """Return the kinds of queries that a trained method knows."""
+    domain = getattr(method, "domain", None)
+    trained: frozenset[str] = frozenset() if domain is None else domain.kinds
+    return trained | frozenset(getattr(method, "without_training", ()))

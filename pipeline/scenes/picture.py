@@ -1,0 +1,259 @@
+"""Pictures of a scene by any method: windows of a frame, answered on several threads, with components as layers.
+
+A pixel is one ray and one footprint, or k stratified rays, k = s^2, whose mean is taken. One ray is enough inside the
+cloth, because the footprint is the pixel. It is not enough at silhouettes and at the borders of shadows. The footprints
+of k rays are smaller, so that all together have the variance of one pixel's Gaussian, and the cloth is as sharp as with
+one ray:
+
+    sigma_k^2 = sigma^2 - (1 - 1/k) / 12     in pixels; the rays' own places have the variance (1 - 1/k) / 12
+
+The frame is cut into windows of at most `QUERIES` queries, so that memory does not grow with its size. Neither the
+windows nor the chunks of queries depend on the number of threads, so the bytes do not either.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.arrays import Float32
+from pipeline.fingerprint import fingerprint
+from pipeline.scenes.frame import Frame, render
+from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.loading import Loaded, Window
+from pipeline.scenes.shade import compose, shade
+from pipeline.truth.conventions import COMPONENTS
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+QUERIES: Final = 2**20
+"""Queries of a window, at most; a single pixel may have more."""
+
+CHUNK: Final = 2**14
+"""Queries that a thread answers at a time."""
+
+MOST_SAMPLES: Final = 8
+"""Most rays along each side of a pixel."""
+
+_AHEAD = 3  # windows under way: threads have work while a frame is traced
+
+Plane = npt.NDArray[np.float32]
+
+
+class Answerer(Protocol):
+    """A method that answers any query."""
+
+    def rows(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Return components and transparency of N queries, (N, 5); a transparency may be NaN: it is asked for then."""
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
+        """Return the transparency of N footprints, (N,)."""
+
+
+class TruthAnswers:
+    """The ground truth."""
+
+    def __init__(self, options: TruthOptions) -> None:
+        self._options = options
+
+    def rows(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Return components and transparency of N queries, (N, 5)."""
+        answers = estimate(fabric, queries, self._options, seed)
+        return np.concatenate([answers.mean, answers.transparency[:, None]], axis=1)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
+        """Return the transparency of N footprints, (N,)."""
+        return estimate(fabric, looks, self._options, seed).transparency
+
+
+class Part(NamedTuple):
+    """A window of a picture, finished.
+
+    Attributes
+    ----------
+    window : Window
+        Which pixels.
+    planes : dict of float32 (H, W, C)
+        ``rgb``; with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share of a
+        pixel's rays that meet cloth, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
+        ``fabric``, the number of the cloth in the scene from 1 on.
+    queries, fallback : int
+        Queries, and those that the fallback answered.
+    """
+
+    window: Window
+    planes: dict[str, Plane]
+    queries: int
+    fallback: int
+
+
+def sharpened(loaded: Loaded, side: int) -> Loaded:
+    """Return a scene whose footprints are those of `side` by `side` rays a pixel, in its smaller pixels."""
+    sigma = loaded.options.pixel_sigma
+    variance = max(sigma**2 - (1.0 - 1.0 / side**2) / 12.0, (sigma / side) ** 2)
+    return replace(loaded, options=loaded.options.model_copy(update={"pixel_sigma": side * variance**0.5}))
+
+
+def windows(size: tuple[int, int], queries_a_pixel: int) -> list[Window]:
+    """Return windows that cover a picture, from its top left, of at most `QUERIES` queries each."""
+    pixels = max(1, QUERIES // queries_a_pixel)
+    width = min(size[0], pixels)
+    height = min(size[1], max(1, pixels // width))
+    return [
+        Window(left, top, min(width, size[0] - left), min(height, size[1] - top))
+        for top in range(0, size[1], height)
+        for left in range(0, size[0], width)
+    ]
+
+
+def picture(
+    loaded: Loaded,
+    answerer: Answerer,
+    pool: Executor,
+    size: tuple[int, int],
+    frame: float = 0.0,
+    side: int = 1,
+    layers: bool = False,
+    seed: int = 0,
+) -> Iterator[Part]:
+    """Yield the windows of a frame.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scene.
+    answerer : Answerer
+        The method.
+    pool : Executor
+        Threads that answer queries.
+    size : (int, int)
+        Width and height in pixels.
+    frame : float
+        Which frame; 0 is the first.
+    side : int
+        Rays along each side of a pixel.
+    layers : bool
+        Whether components and what is seen are kept apart.
+    seed : int
+        Seed of methods that draw random numbers.
+
+    Raises
+    ------
+    BadInput
+        As `pipeline.scenes.frame.render`.
+    """
+    fine, names = sharpened(loaded, side), (loaded.scene.name, frame, seed)
+    under_way: deque[_UnderWay] = deque()
+    for window in windows(size, side**2 * (len(loaded.lights) + 1)):
+        traced = render(fine, frame, (side * size[0], side * size[1]), Window(*(side * edge for edge in window)))
+        under_way.append(_UnderWay(fine, answerer, pool, window, traced, (*names, *window)))
+        if len(under_way) == _AHEAD:
+            yield under_way.popleft().part(side, layers)
+    while under_way:
+        yield under_way.popleft().part(side, layers)
+
+
+class _UnderWay:
+    """A window that has been traced and whose queries are being answered."""
+
+    def __init__(
+        self, loaded: Loaded, answerer: Answerer, pool: Executor, window: Window, frame: Frame, names: Sequence[object]
+    ) -> None:
+        self._loaded, self._answerer, self._pool, self._names = loaded, answerer, pool, names
+        self._window, self._frame = window, frame
+        self._asked = {
+            key: self._ask(answerer.rows, key, gbuffer.queries(self._fabric(key).weave.repeat), "query")
+            for key, gbuffer in frame.gbuffers.items()
+        }
+
+    def part(self, side: int, layers: bool) -> Part:
+        """Return the finished window, when its queries are answered."""
+        frame = self._frame
+        answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
+        through = {key: self._transparency(key, answers[key][:, 4]) for key in answers}
+        planes = {"backdrop": frame.backdrop.astype(np.float32)}
+        for key, gbuffer in frame.gbuffers.items():
+            dark = np.zeros((len(gbuffer.place), 3))
+            planes["backdrop"] = compose(gbuffer, dark, planes["backdrop"], transparency=through[key])
+        kept = {name: np.arange(4) == index for index, name in enumerate(COMPONENTS)} if layers else {"light": True}
+        for name, chosen in kept.items():
+            planes[name] = np.zeros(frame.backdrop.shape, np.float32)
+            for key, gbuffer in frame.gbuffers.items():
+                own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
+                planes[name] = compose(gbuffer, self._light(key, gbuffer, own), planes[name])
+        if layers:
+            planes["cloth"] = np.any([gbuffer.mask for gbuffer in frame.gbuffers.values()], axis=0)[..., None]
+        planes = {name: _mean(plane, side) for name, plane in planes.items()}
+        planes["rgb"] = np.sum([planes["backdrop"], *(planes[name] for name in kept)], axis=0)
+        if layers:
+            planes |= {name: _middle(plane, side) for name, plane in _seen(frame).items()}
+        found = [int(np.isfinite(values[:, 4]).sum()) for values in answers.values()]
+        return Part(self._window, planes, sum(map(len, answers.values())), sum(found))
+
+    def _fabric(self, key: str) -> Fabric:
+        return self._loaded.cloths[key][1]
+
+    def _light(self, key: str, gbuffer: GBuffer, components: Float32) -> npt.NDArray[np.float64]:
+        return shade(self._fabric(key), components, gbuffer.transmitted)
+
+    def _transparency(self, key: str, known: Float32) -> Float32:
+        """Return the transparency of each place, from any of its queries or else asked for; 0 if all behind is dark."""
+        gbuffer = self._frame.gbuffers[key]
+        result = np.full(len(gbuffer.pixel), np.nan, np.float32)
+        answered = np.isfinite(known)
+        result[gbuffer.place[answered]] = known[answered]
+        behind = self._frame.backdrop.reshape(-1, 3)[gbuffer.pixel].any(axis=1)
+        rest = np.flatnonzero(np.isnan(result) & behind)
+        looks = gbuffer.looks(self._fabric(key).weave.repeat).take(rest)
+        result[rest] = _gathered(self._ask(self._answerer.transparency, key, looks, "look"), (0,))
+        return np.nan_to_num(result, nan=0.0)
+
+    def _ask(
+        self, ask: Callable[[Fabric, Queries, int], Float32], key: str, queries: Queries, kind: str
+    ) -> list[Future[Float32]]:
+        """Send queries to the threads in chunks."""
+        asked = []
+        for start in range(0, len(queries.u), CHUNK):
+            seed = int(fingerprint([*self._names, key, kind, start]), 16)
+            asked.append(self._pool.submit(ask, self._fabric(key), queries.take(slice(start, start + CHUNK)), seed))
+        return asked
+
+
+def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float32:
+    """Return the answers of all chunks; an empty array of this shape if there are none."""
+    return np.concatenate([np.empty(shape, np.float32), *(future.result() for future in asked)])
+
+
+def _seen(frame: Frame) -> dict[str, Plane]:
+    """Return what each ray meets: depth, normal, and of cloth the place, the footprint and its number."""
+    height, width = frame.backdrop.shape[:2]
+    planes = {name: np.zeros((height * width, channels), np.float32) for name, channels in _OF_CLOTH.items()}
+    for number, gbuffer in enumerate(frame.gbuffers.values(), start=1):
+        planes["fabric"][gbuffer.mask.ravel()] = number
+        planes["uv"][gbuffer.pixel] = np.stack([gbuffer.u, gbuffer.v], axis=-1)
+        planes["sigma"][gbuffer.pixel] = np.stack([gbuffer.sigma, gbuffer.sigma_minor], axis=-1)
+    shaped = {name: plane.reshape(height, width, -1) for name, plane in planes.items()}
+    return shaped | {"depth": frame.depth[..., None].astype(np.float32), "normal": frame.normal.astype(np.float32)}
+
+
+_OF_CLOTH: Final = {"fabric": 1, "uv": 2, "sigma": 2}
+
+
+def _mean(plane: npt.NDArray[np.generic], side: int) -> Plane:
+    """Return the mean over the rays of each pixel."""
+    height, width, channels = plane.shape
+    rays = plane.reshape(height // side, side, width // side, side, channels)
+    return np.asarray(rays.mean(axis=(1, 3), dtype=np.float64).astype(np.float32))
+
+
+def _middle(plane: Plane, side: int) -> Plane:
+    """Return one of the middle rays of each pixel."""
+    return plane[side // 2 :: side, side // 2 :: side]

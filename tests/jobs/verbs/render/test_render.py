@@ -1,0 +1,174 @@
+"""Pictures from the command line: those of the benchmark, their layers, sizes, frames and fabrics, and bad input."""
+
+import re
+import sys
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import jobs.verbs.render.film_maker
+from jobs.cli import main
+from pipeline.models.named import named_method
+from pipeline.scenes.options import SceneOptions
+from pipeline.truth.conventions import COMPONENTS
+from pipeline.truth.options import TruthOptions
+from reports.images.exr import read_exr
+from reports.images.tone import displayed
+from reports.measure.scene.shot import read_shot, shoot
+from reports.options import ShotOptions
+
+SMALL = ("--size", "32x24", "--directions", "4")
+COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+
+
+@pytest.fixture
+def render(capsys, monkeypatch, tmp_path):
+    """Run the verb in a folder of its own; return exit code, output and complaint."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*tokens):
+        code = main(["render", *tokens])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def codes_of(path):
+    """Return the 8-bit values of a PNG, (H, W, 3); it must be opaque."""
+    rgba = np.rint(255 * matplotlib.image.imread(path)).astype(int)
+    assert (rgba[..., 3] == 255).all()
+    return rgba[..., :3]
+
+
+def test_a_picture_is_the_frame_of_the_benchmark(render, tmp_path):
+    """The light of the cloth is the same; the light through it is the fallback's, 1 to 3 % from the truth's: a code.
+
+    Where no light reaches the cloth, the benchmark asks for nothing and shows nothing through it.
+    """
+    options = ShotOptions(size=(32, 24), frames=3, options=SceneOptions(environment_directions=4), frame_truth=COARSE)
+    shoot("dinner_table", options, tmp_path / "shot.npz")
+    shot = read_shot(tmp_path / "shot.npz").first()
+    pictures = shot.pictures(shot.answers(named_method("soft_nodes", "render", "--method"), 0))
+    code, text, _ = render("dinner_table", "--method", "soft_nodes", "--out", "a.exr", *SMALL)
+    assert code == 0 and re.fullmatch(r"a\.exr: 32 x 24, \d+ s; \d+% of the queries by the fallback\n", text)
+    layers = read_exr(tmp_path / "a.exr")
+    light = sum(layers.stack(*(f"{name}.{channel}" for channel in "RGB")) for name in COMPONENTS)
+    np.testing.assert_allclose(light, pictures[0] - shot.base[0], atol=1e-5)
+    assert render("dinner_table", "--method", "soft_nodes", "--out", "a.png", *SMALL)[0] == 0
+    same = shot.lit[0] | (layers.channels["A"] == 0)
+    assert same.mean() > 0.95
+    np.testing.assert_allclose(codes_of(tmp_path / "a.png")[same], displayed(pictures[0])[same].astype(int), atol=1)
+
+
+def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tmp_path):
+    assert render("dinner_table", "--out", "a.exr", *SMALL)[0] == 0
+    exr = read_exr(tmp_path / "a.exr")
+    parts = [exr.stack(*(f"{name}.{channel}" for channel in "RGB")) for name in ("backdrop", *COMPONENTS)]
+    np.testing.assert_allclose(sum(parts), exr.stack(*"RGB"), atol=1e-6)
+    assert all(part.max() > 0 for part in parts)
+    assert set(np.unique(exr.channels["fabric.id"])) == {0.0, 1.0, 2.0, 3.0, 4.0}
+    np.testing.assert_array_equal(exr.channels["A"] > 0, exr.channels["fabric.id"] > 0)
+    assert {"depth.Z", "normal.X", "uv.U", "sigma.major", "sigma.minor"} <= set(exr.channels)
+    about = exr.attributes
+    assert about["fabrics"] == "1 polyester_lining, 2 basket, 3 silk_charmeuse, 4 denim"
+    assert (about["scene"], about["method"], about["samples"]) == ("dinner_table", "selvage", 1)
+    assert 0 < about["fallback_share"] < 1 and about["versions"].startswith("truth ")
+
+
+@pytest.mark.parametrize("method", ["truth", "point_sampled:2", "prefiltered"])
+def test_two_runs_give_the_same_bytes(render, tmp_path, method):
+    for name in ("a.exr", "b.exr"):
+        assert render("sphere", "--method", method, "--out", name, "--size", "16x12", "--directions", "4")[0] == 0
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
+    own, denim = "own.exr", "denim.exr"
+    assert render("dinner_table", "--out", own, *SMALL)[0] == 0
+    assert render("dinner_table", "--fabric", "denim", "--fabric", "voile", "--out", denim, *SMALL)[0] == 0
+    before, after = (read_exr(tmp_path / name) for name in (own, denim))
+    assert after.attributes["fabrics"] == "1 denim, 2 voile, 3 silk_charmeuse, 4 denim"
+    changed = np.abs(after.stack(*"RGB") - before.stack(*"RGB")).max(axis=-1) > 0
+    number = before.channels["fabric.id"]
+    assert changed[(number == 1) | (number == 2)].mean() > 0.9
+    assert not changed[(number == 0) | (number > 2)].any()
+
+
+def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):
+    fast = "--size", "16x12", "--directions", "4", "--method", "soft_nodes"
+    assert render("plane", "--out", "film", "--frames", "2", *fast)[0] == 0
+    assert render("plane", "--out", "one.png", *fast)[0] == 0
+    assert render("plane", "--out", "dark.png", "--exposure", "-1", "--tone", "reinhard", *fast)[0] == 0
+    assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["frame-0001.png", "frame-0002.png"]
+    first, second = ((tmp_path / "film" / f"frame-000{index}.png").read_bytes() for index in (1, 2))
+    assert first == (tmp_path / "one.png").read_bytes() != second
+    assert codes_of(tmp_path / "dark.png").mean() < codes_of(tmp_path / "one.png").mean()
+
+
+def test_a_film_has_the_frames_that_are_asked_for(render, tmp_path):
+    av = pytest.importorskip("av")
+    fast = "--size", "16x12", "--directions", "4", "--method", "soft_nodes"
+    assert render("plane", "--out", "a.mp4", "--frames", "3", *fast)[0] == 0
+    with av.open(str(tmp_path / "a.mp4")) as film:
+        assert len(list(film.decode(video=0))) == 3
+    code, _, complaint = render("plane", "--out", "a.mp4", "--size", "15x12")
+    assert code == 2 and "even" in complaint
+
+
+def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
+    (tmp_path / "a.png").write_bytes(b"before")
+
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(jobs.verbs.render.film_maker, "displayed", stopped)
+    code, _, complaint = render("plane", "--out", "a.png", "--method", "soft_nodes", *SMALL)
+    assert code == 130 and complaint == "stopped; a.png is as it was before\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert (tmp_path / "a.png").read_bytes() == b"before"
+
+
+BARE = '<scene version="3.0.0"><shape type="sphere"/></scene>'
+
+
+@pytest.mark.parametrize(
+    ("tokens", "says"),
+    [
+        (("nix", "--out", "a.png"), "or a scene that comes with the package"),
+        (("bare.xml", "--out", "a.png"), "a shape must wear a fabric"),
+        (("drape", "--out", "a.gif"), "must end in .png, .exr or .mp4"),
+        (("drape", "--out", "there"), "File exists"),
+        (("drape", "--out", "bare.xml/a.png"), "a folder that can be written"),
+        (("drape", "--out", "folder.png"), "is a folder"),
+        (("drape", "--out", "a.png", "--size", "0x3"), "each from 1 to 16384"),
+        (("drape", "--out", "a.png", "--size", "1000000x1000000"), "each from 1 to 16384"),
+        (("drape", "--out", "a.png", "--size", "big"), "WIDTHxHEIGHT"),
+        (("drape", "--out", "a.png", "--samples", "5"), "must be one of 1, 4, 9"),
+        (("drape", "--out", "a.png", "--samples", "1000000"), "must be one of 1, 4, 9"),
+        (("drape", "--out", "a.png", "--directions", "0"), "greater than or equal to 4"),
+        (("drape", "--out", "a.png", "--exposure", "nan"), "from -20 to 20 stops"),
+        (("drape", "--out", "a.png", "--frames", "2"), "holds one frame"),
+        (("drape", "--out", "film", "--frames", "0"), "from 1 to 100000"),
+        (("drape", "--out", "a.png", "--method", "selvege"), "did you mean"),
+        (("drape", "--out", "a.png", "--method", "woven"), "must be trained first"),
+        (("drape", "--out", "a.png", "--fabric", "nix"), "a preset is needed"),
+        (("drape", "--out", "a.png", "--fabric", "denim", "--fabric", "voile"), "one fabric more than cloths"),
+        (("drape", "--out", "a.png", "--tone", "film"), "srgb"),
+    ],
+)
+def test_bad_input_is_one_sentence(render, tmp_path, tokens, says):
+    (tmp_path / "bare.xml").write_text(BARE)
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "there").write_text("a file where the folder should be")
+    code, _, complaint = render(*tokens)
+    assert code == 2 and complaint.count("\n") == 1 and says in complaint
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.xml", "folder.png", "there"]
+
+
+def test_without_the_library_for_films_a_sentence_names_it(render, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, _, complaint = render("drape", "--out", "a.mp4")
+    assert code == 2 and "pip install 'twillight[video]'" in complaint

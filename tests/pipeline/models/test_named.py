@@ -1,0 +1,64 @@
+"""Names of methods on a command line: what they load, and the sentences for those that load nothing."""
+
+import numpy as np
+import pytest
+
+from pipeline.models.fallback import fallback_rows
+from pipeline.models.named import named_method, untrained_names
+from pipeline.truth.query import Queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("selvage", ("selvage", "")),
+        ("soft_nodes", ("soft_nodes", "")),
+        ("prefiltered", ("prefiltered", "")),
+        ("point_sampled", ("point_sampled", "k = 64")),
+        ("point_sampled:3", ("point_sampled", "k = 3")),
+        ("gauss_nodes:4", ("gauss_nodes", "k = 4")),
+    ],
+)
+def test_a_name_and_a_setting_load_a_method(name, found):
+    method = named_method(name, "render", "--method")
+    assert (method.name, method.setting) == found
+
+
+def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through():
+    """Light from behind goes to the fallback, unless the method knows it: point sampling does."""
+    denim = load_fabric("denim")
+    queries = Queries.round([0.5, 0.5], [0.5, 0.5], [0.5, 0.5], LIGHTS, [[0, 0, 1]] * 2)
+    expected = fallback_rows(denim, queries, 0)
+    assert 0 < expected[1, 4] < 1
+    for name in ("selvage", *untrained_names()):
+        method = named_method(name, "render", "--method")
+        method.prepare(denim)
+        rows = method.rows(denim, queries, 0)
+        assert np.isfinite(rows[:, :4]).all() and np.isnan(rows[0, 4])
+        if name == "point_sampled":
+            assert np.isnan(rows[1, 4])
+        else:
+            np.testing.assert_array_equal(rows[1], expected[1])
+        np.testing.assert_array_equal(rows[:, :4], method.predict(denim, queries, 0))
+        np.testing.assert_array_equal(method.transparency(denim, queries, 0), expected[:, 4])
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("selvege", "did you mean 'selvage'"),
+        ("woven", "must be trained first"),
+        ("soft_nodes:4", "soft_nodes has no settings"),
+        ("gauss_nodes:99", "less than or equal to 16"),
+        ("gauss_nodes:x", "a number k after the colon"),
+        ("", "the folder of a trained model or a name"),
+    ],
+)
+def test_other_names_get_a_sentence(name, says):
+    with pytest.raises(BadInput, match="--method") as refused:
+        named_method(name, "render", "--method")
+    assert says in str(refused.value)
