@@ -22,6 +22,7 @@ from weaves.fabric import PRESETS, load_fabric
 ROOT = Path(__file__).parents[1]
 ROOMS = ("weaves", "pipeline", "reports", "jobs")
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+DOCUMENTS += sorted((ROOT / "docs").glob("*.md"))
 DOCUMENTS += [path for room in ROOMS for path in sorted((ROOT / room).rglob("README.md"))]
 
 LONGEST_README = 7500

@@ -87,6 +87,7 @@ def fabric_of(
         read.append(f"Size: {size[0]:g} ends and {size[1]:g} picks per cm.")
     else:
         assumed.append("The file does not state the size of the cloth: the fabric has no yarns_per_cm.")
+    assumed.append("The colours are read as sRGB and taken for the diffuse colours of the yarns.")
     assumed.append(_optics(like, given))
     about = f"Draft {draft.title!r}" + (f", written by {draft.program}" if draft.program else "")
     source = f"{about}, from {Path(where).name}. " + " ".join((*read, *assumed))
@@ -123,7 +124,7 @@ def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Boo
                 raise BadInput(where, "", f"{section} repeats after {period} {threads}", allowed)
             assumed.append(f"The last {len(numbers) % period} {threads} do not fill a repeat and are left out.")
         periods.append(period)
-    read.append(f"Structure: {ends} ends and {picks} picks, which repeat after {periods[1]} and {periods[0]}.")
+    read.append(f"Structure: {ends} ends and {picks} picks; it repeats after {periods[1]} ends and {periods[0]} picks.")
     return over[: periods[0], : periods[1]]
 
 
@@ -198,9 +199,9 @@ def _colours(
             else:
                 runs.append([names[colour], 1])
         orders[threads] = runs
-        read.append(f"Colours: {len(set(order))} of the {threads}, which repeat after {len(order)}.")
+        read.append(f"Colours: the {threads} have {len(set(order))}, whose order repeats after {len(order)} {threads}.")
     if dimmed:
-        assumed.append("Light through the yarns is reduced, because bright colours send back nearly all light.")
+        assumed.append("Bright colours send back nearly all light: the light through the yarns is reduced.")
     return {"palette": palette} | orders if orders else {}
 
 
@@ -211,10 +212,11 @@ def _optics(like: Fabric, given: Mapping[str, Mapping[str, float]]) -> str:
         values = [given[axis].get(key, getattr(yarn, key)) for axis, yarn in (("warp", like.warp), ("weft", like.weft))]
         parts.append(f"{key} {values[0]:g}{unit} and {values[1]:g}{unit}")
     options = [f"{axis}.{key}" for axis, numbers in given.items() for key in numbers]
-    but = f", except {' and '.join(options)}, which you gave" if options else ""
+    own = f" Your own: {', '.join(options)}." if options else ""
+    others = "its relief, blend, specular colour, light through the yarns and optical thickness"
     return (
-        f"No draft states the optics of yarns: those of warp and weft are from {like.name}{but}: {', '.join(parts)}; "
-        "also relief, blend, highlights, light through the yarns and optical thickness. Colours are taken as sRGB."
+        f"A draft does not state the optics of yarns. Those of {like.name} are taken, for warp and weft: "
+        f"{', '.join(parts)}; also {others}.{own}"
     )
 
 

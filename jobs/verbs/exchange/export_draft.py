@@ -22,9 +22,6 @@ def write_draft(fabric: Fabric, path: Path) -> str:
         raise BadInput("export", "--wif", str(path), "a path that ends in .wif is needed")
     text = wif_text(fabric)
     atomic_write(path, text.encode())
-    size = (
-        "spacing and thickness"
-        if fabric.yarns_per_cm
-        else "no spacing or thickness, because the fabric has no yarns_per_cm"
-    )
-    return f"{path}: structure and colours; {size}; the optics of the yarns have no place in a draft file"
+    content = "structure and colours" if fabric.yarns_per_cm is None else "structure, colours, spacing and thickness"
+    left = "" if fabric.yarns_per_cm else "; no spacing and thickness, because the fabric has no yarns_per_cm"
+    return f"{path}: {content}{left}; a draft file has no place for the optics of yarns"

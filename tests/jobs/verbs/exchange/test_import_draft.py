@@ -24,9 +24,7 @@ def test_a_draft_becomes_a_fabric_that_other_verbs_load(twillight, tmp_path):
     (tmp_path / "Scarf #2.wif").write_text(wif(WARP_COLORS=numbered([1, 2] * 4)), encoding="utf-8")
     code, text, complaint = twillight("import", "Scarf #2.wif", "--out", "deep/scarf.toml", "--like", "denim")
     assert (code, complaint) == (0, "")
-    assert (
-        "8 ends and 8 picks, which repeat after 4 and 4" in text and "Assumed:" in text and "bend 12° and 38°" in text
-    )
+    assert "it repeats after 4 ends and 4 picks" in text and "Assumed:" in text and "bend 12° and 38°" in text
     fabric = load_fabric(tmp_path / "deep" / "scarf.toml")
     assert fabric.name == "Scarf_2" and fabric.warp.bend == load_fabric("denim").warp.bend
     code, text, _ = twillight("show", "deep/scarf.toml")
