@@ -73,16 +73,12 @@ CALIBRATION: Final = ("cloth", "components", "transparency")
 
 def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
     """Return the rows of the table of calibration: estimator, then `CALIBRATION`."""
-
-    def cell(ratio: float, exceeded: float) -> str:
-        return f"{ratio:.2f} · {percent(exceeded, 2)}"
-
     return [
         [
             plain(row.estimator),
             row.kind,
-            cell(row.ratio, row.exceeded),
-            cell(row.ratio_through, row.exceeded_through),
+            f"{row.ratio:.2f} ({row.low:.2f} to {row.high:.2f}) · {percent(row.exceeded, 2)}",
+            f"{row.ratio_through:.2f} · {percent(row.exceeded_through, 2)}",
         ]
         for row in sorted(found, key=lambda row: row.estimator)
     ]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from reports.truth.calibration import CLASSES, RECORDS, Calibration, compared, measure
+from reports.truth.calibration import CLASSES, RECORDS, Calibration, compared, interval, measure
 
 
 def test_the_comparison_of_normal_errors():
@@ -30,10 +30,28 @@ def test_records_bring_calibrations_back():
 
 
 def test_a_row_holds_within_its_limits():
-    good = Calibration("auto", "solid", 0.9, 0.002, 1.0, 0.0, 100)
-    assert good.holds
-    assert not Calibration("auto", "solid", 0.7, 0.002, 1.0, 0.0, 100).holds
-    assert not Calibration("auto", "solid", 1.0, 0.004, 1.0, 0.0, 100).holds
+    def row(ratio, exceeded, low, high):
+        return Calibration("auto", "solid", ratio, exceeded, low, high, 1.0, 0.0, 100)
+
+    assert row(0.9, 0.002, 0.85, 0.95).holds
+    assert row(0.7, 0.002, 0.5, 0.85).holds
+    assert not row(0.7, 0.002, 0.65, 0.75).holds
+    assert not row(1.4, 0.002, 1.3, 1.5).holds
+    assert not row(1.0, 0.004, 0.9, 1.1).holds
+
+
+def test_the_interval_covers_the_ratio_of_normal_errors_and_refuses_another():
+    rng = np.random.default_rng(2)
+    error = rng.lognormal(0.0, 1.0, (400, 1)) * np.ones((1, 5))
+    nothing, covered = np.zeros_like(error), []
+    for _ in range(100):
+        wrong = error * rng.standard_normal(error.shape)
+        low, high = interval(wrong, error, nothing)
+        covered.append(low <= 1.0 <= high)
+    # The level is 99 %; heavy tails cost some of it.
+    assert sum(covered) >= 93
+    low, high = interval(2.0 * wrong, error, nothing)
+    assert low > 1.25
 
 
 @pytest.mark.slow
