@@ -435,12 +435,13 @@ def require(
     method: Annotated[str, Parameter(help="Method of the general recipe; default: the cheapest.")] = "",
     effort: Annotated[float, Parameter(help="Share of its rows per fabric and of its training steps.")] = 0.25,
     set_: Annotated[list[str], Parameter(name="--set", help="Changed option of the method, such as hidden=64.")] = [],  # noqa: B006
+    add: Add = NOTHING,
     out: Out = OUT,
 ) -> None:
     """Analyse the queries of a scene and write the cheapest recipe that meets an error or a time."""
     from jobs.verbs.require import require as required
 
-    required(scene, out, recipe, error, time, frames, margin, method, effort, set_)
+    required(scene, out, recipe, error, time, frames, margin, method, effort, set_, add)
 
 
 @app.command(sort_key=17)
@@ -448,12 +449,13 @@ def savings(
     recipe: RecipeName,
     scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, are finished.")],
     *,
+    add: Add = NOTHING,
     out: Out = OUT,
 ) -> None:
     """Compare scenes' own recipes with the general one: time and rows saved, and errors."""
     from jobs.verbs.savings import savings as saved
 
-    saved(scenes, out, recipe)
+    saved(scenes, out, recipe, add)
 
 
 @app.command(sort_key=18)

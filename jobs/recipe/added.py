@@ -87,6 +87,11 @@ class Added:
             models += [method.model_dump() for name, method in self._given.items() if name not in named]
         return {**content, "models": models} if models else dict(content)
 
+    def model_of(self, method: AddedMethod) -> str:
+        """Return the value of `model` by which a recipe names a method: the name that its code states."""
+        stated = {given.source: name for name, given in self._given.items()}
+        return stated.get(method.source) or {source: name for name, source in _installed().items()}[method.source]
+
     def _entry(self, entry: Any, key: str, where: str) -> Any:
         """Return an entry of a recipe's models, written out if the method is from outside."""
         if not isinstance(entry, Mapping) or not isinstance(model := entry.get("model"), str) or model in CLASSES:

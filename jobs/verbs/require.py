@@ -45,6 +45,7 @@ def require(
     method: str = "",
     effort: float = EFFORT,
     changes: Sequence[str] = (),
+    add: Sequence[str] = (),
 ) -> None:
     """Print the requirements of a scene and the methods that meet a limit, and write the recipe of the chosen one.
 
@@ -68,6 +69,8 @@ def require(
         Share of the general recipe's rows per fabric and of its training steps.
     changes : sequence of str
         Changed options of the model, each as ``key = value`` in TOML.
+    add : sequence of str
+        Methods from outside the package, with which the general recipe was run.
 
     Raises
     ------
@@ -90,7 +93,7 @@ def require(
     ):
         if not (value > 0 if allowed == "> 0" else value >= 1):
             raise BadInput("require", f"--{key}", value, f"must be {allowed}")
-    general = load_recipe(recipe)
+    general = load_recipe(recipe, add)
     options = _options(changes)
     names = [model.options.name for model in general.models]
     if method and method not in names:
@@ -128,10 +131,10 @@ def require(
         told = nearest_name(chosen.method, names, "model")
         raise BadInput(f"the page of {general.name}", "method", chosen.method, f"{allowed}; {told}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
-    write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options)
+    write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options, add)
     name = f"{chosen.method} {chosen.setting}".strip()
     cost = f"{100 * chosen.error:.2g} % in {chosen.ms:.3g} ms per frame ({chosen.known})"
-    summary = f"{name}: {cost}. {savings(path, general)}"
+    summary = f"{name}: {cost}. {savings(path, general, add)}"
     console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True)
 
 

@@ -9,7 +9,7 @@ replaced by one that samples, at the error of `SAMPLED`.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -17,10 +17,12 @@ from typing import Any, Final
 import tomli_w
 
 from jobs.plan.plan import plan
+from jobs.recipe.added import Added
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.recipe.validation import table_refusal
 from pipeline.atomic import atomic_write
+from pipeline.models.added.added_method import AddedMethod
 from pipeline.models.domain import PHYSICS
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions
@@ -49,6 +51,7 @@ def write_recipe(
     fabrics: Mapping[str, tuple[str, Fabric]],
     effort: float = EFFORT,
     options: Mapping[str, Any] = MappingProxyType({}),
+    add: Sequence[str] = (),
 ) -> None:
     """Write the recipe of one method in the scene's domain, and load it to check it.
 
@@ -70,6 +73,8 @@ def write_recipe(
         Share of the training rows a fabric and of the steps, > 0; 1: all of them.
     options : mapping
         Options of the model that are other than in the general recipe, such as a smaller width.
+    add : sequence of str
+        Methods from outside the package that the general recipe was loaded with.
 
     Raises
     ------
@@ -77,6 +82,7 @@ def write_recipe(
         If the model has no such options, or the recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
+    named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model
     general = general.trainer_of(model)
     queries = requirement.queries(model.options.kinds)
     worn = {name: fabrics[name] for name in requirement.fabrics}
@@ -91,12 +97,15 @@ def write_recipe(
             "queries": queries.model_dump(mode="json", exclude_defaults=True, exclude_none=True),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
-        "models": [_model(model, setting, effort, _bent(model, queries) | dict(options)), *_baseline(general, method)],
+        "models": [
+            {"model": named} | _model(model, setting, effort, _bent(model, queries) | dict(options)),
+            *_baseline(general, method),
+        ],
         "bench": _bench(general, _beside(path, scene)),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic_write(path, tomli_w.dumps(table).encode())
-    load_recipe(path)
+    load_recipe(path, add)
 
 
 def alone(general: Recipe, names: set[str]) -> Recipe:
@@ -115,9 +124,9 @@ def effort_of(recipe: Recipe) -> tuple[int, int]:
     return rows, learnt
 
 
-def savings(path: Path, general: Recipe) -> str:
+def savings(path: Path, general: Recipe, add: Sequence[str] = ()) -> str:
     """Return a sentence: rows to generate and queries to train on, compared with the general recipe."""
-    own = load_recipe(path)
+    own = load_recipe(path, add)
     same = alone(general, {model.options.name for model in own.models})
     (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
     said = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
@@ -168,17 +177,21 @@ def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
     """Return point sampling with 2 points, the baseline, if the general recipe has it."""
     found = [model for model in general.models if model.options.name == _BASELINE != method]
-    return [_model(model, "k = 2", 1.0) for model in found]
+    return [{"model": _BASELINE} | _model(model, "k = 2", 1.0) for model in found]
 
 
 def _model(
     model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
-    """Return a model's table with one setting, if given, and a shortened training."""
-    options = model.options.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | dict(other)
-    options = {"model": model.options.model, "name": model.options.name} | options
-    validated(type(model.options), options, "--set")
-    if setting.startswith("k = "):
+    """Return a model's table without `model`, with one setting, if given, and a shortened training."""
+    if isinstance(model.options, AddedMethod):
+        options = {"name": model.options.name, "limit": model.options.limit} | model.options.own | dict(other)
+    else:
+        options = model.options.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | dict(other)
+        options["name"] = model.options.name
+        validated(type(model.options), options, "--set")
+        options.pop("model", None)
+    if setting.startswith("k = ") and model.options.parameter:
         options[model.options.parameter] = [int(setting.removeprefix("k = "))]
     if model.learns:
         training = model.training

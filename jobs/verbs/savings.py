@@ -76,7 +76,7 @@ class Saving(NamedTuple):
         return math.nan if not a else a / b if b else math.inf
 
 
-def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
+def savings(scenes: Sequence[str], out: Path, recipe: str, add: Sequence[str] = ()) -> None:
     """Print the savings of scenes' own recipes, and write them to ``report/savings.csv``.
 
     Parameters
@@ -87,6 +87,8 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
         Folder of products of both recipes.
     recipe : str
         The general recipe.
+    add : sequence of str
+        Methods from outside the package, with which both recipes were run.
 
     Raises
     ------
@@ -97,9 +99,10 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     from pipeline.atomic import atomic_write
     from pipeline.scenes.catalogue import load_scene
 
-    general = load_recipe(recipe)
+    general = load_recipe(recipe, add)
     found = {
-        name: saved(name, out, general, recipe) for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
+        name: saved(name, out, general, recipe, add)
+        for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
     }
     console = Terminal()
     console.width = max(console.width, _WIDTH)
@@ -112,12 +115,12 @@ def savings(scenes: Sequence[str], out: Path, recipe: str) -> None:
     console.print(f"the numbers: {path}", soft_wrap=True)
 
 
-def saved(scene: str, out: Path, general: Recipe, run: str = "") -> list[Saving]:
+def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[str] = ()) -> list[Saving]:
     """Return the costs of a scene by the general recipe, which is run by the name `run`, and by its own recipe."""
     path = out / "recipes" / f"require-{scene}.toml"
     if not path.is_file():
         raise BadInput("savings", "scene", scene, f"there is no {path}; write it with `twillight require {scene}`")
-    own = load_recipe(path)
+    own = load_recipe(path, add)
     model = own.models[0]
     name, worn = model.options.name, {fabric.name for fabric in own.seen}
     if name not in {one.options.name for one in general.models}:

@@ -142,3 +142,29 @@ def test_scenes_and_fabrics_by_path_are_found_from_anywhere(tmp_path, monkeypatc
         assert [fabric.name for fabric in own.seen] == ["own", "denim"]
         assert own.bench.scenes.names == (str(tmp_path / "attic.toml"),)
     assert str(tmp_path) not in (tmp_path / "out" / "recipes" / "r.toml").read_text()
+
+
+def test_a_method_from_outside_keeps_its_name_and_its_options(tmp_path):
+    code = tmp_path / "theirs.py"
+    code.write_text(
+        "import numpy as np\n"
+        "class Theirs:\n"
+        "    name, setting, version = 'theirs', '', 3\n"
+        "    def __init__(self, rows=8): self.rows = rows\n"
+        "    def covers(self, fabric): return True\n"
+        "    def prepare(self, fabric): pass\n"
+        "    def predict(self, fabric, queries, seed=0): return np.zeros((len(queries.u), 4), np.float32)\n"
+        "    def bytes_stored(self, fabric): return 0\n",
+        encoding="utf-8",
+    )
+    add = [f"{code}:Theirs"]
+    general = load_recipe("quick", add)
+    write_recipe(
+        tmp_path / "r.toml", require(), general, "theirs", "", "sphere", {"denim": ("denim", load_fabric("denim"))},
+        options={"rows": 5}, add=add,
+    )  # fmt: skip
+    first = load_recipe(tmp_path / "r.toml", add).models[0].options
+    assert (first.model, first.name, first.own, first.source) == ("added", "theirs", {"rows": 5}, f"{code}:Theirs")
+    with pytest.raises(BadInput, match="code of your own is given with --add"):
+        load_recipe(tmp_path / "r.toml")
+    assert code.name not in (tmp_path / "r.toml").read_text(encoding="utf-8")
