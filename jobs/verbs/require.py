@@ -84,15 +84,7 @@ def require(
     from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
     from reports.tables.summary import rows, scene_table
 
-    for key, value, allowed in (
-        ("error", error, "> 0"),
-        ("time", ms, "> 0"),
-        ("frames", frames, ">= 1"),
-        ("margin", margin, ">= 1"),
-        ("effort", effort, "> 0"),
-    ):
-        if not (value > 0 if allowed == "> 0" else value >= 1):
-            raise BadInput("require", f"--{key}", value, f"must be {allowed}")
+    _refuse_limits(error=error, time=ms, frames=frames, margin=margin, effort=effort)
     general = load_recipe(recipe, add)
     options = _options(changes)
     names = [model.options.name for model in general.models]
@@ -136,6 +128,14 @@ def require(
     cost = f"{100 * chosen.error:.2g} % in {chosen.ms:.3g} ms per frame ({chosen.known})"
     summary = f"{name}: {cost}. {savings(path, general, add)}"
     console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True)
+
+
+def _refuse_limits(**limits: float) -> None:
+    """Refuse a number that is too small: frames and margin from 1 on, others above 0."""
+    for key, value in limits.items():
+        least = 1 if key in ("frames", "margin") else 0
+        if not (value >= least and value > 0):
+            raise BadInput("require", f"--{key}", value, f"must be {'>= 1' if least else '> 0'}")
 
 
 def _queries_of(
