@@ -19,8 +19,8 @@ from weaves.errors import BadInput, brief, one_line
 MIB: Final = 1 << 20
 """Bytes."""
 
-MOST_TEXT: Final = MIB // 4
-"""Most bytes of a TOML file. The largest fabric, a repeat of 128 x 128 as a loom plan, has some 100 KB."""
+MOST_TEXT: Final = MIB // 2
+"""Most bytes of a TOML file. The largest fabric has 4,096 ends and picks in colours of their own: some 400 KB."""
 
 MOST_VALUES: Final = 2_000_000
 """Most values of a JSON file: each takes up to 250 bytes in memory, even one of two letters."""

@@ -56,7 +56,7 @@ Table = Annotated[
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="ignore", hide_input_in_errors=True)
+    model_config = ConfigDict(extra="ignore")
 
 
 class _Text(_Section):
@@ -193,7 +193,7 @@ def _refuse_missing(wif: _Wif, where: str) -> None:
     """Refuse a draft without a threading, colours, or what lifts the shafts."""
     if not any(any(shafts) for shafts in wif.threading.values()):
         raise BadInput(where, "", "[THREADING] is missing or empty", "the shaft of each end is needed")
-    if not (any(any(shafts) for shafts in wif.liftplan.values())):
+    if not any(any(shafts) for shafts in wif.liftplan.values()):
         for name, sets in (("[TREADLING]", wif.treadling), ("[TIEUP]", wif.tieup)):
             if not any(any(numbers) for numbers in sets.values()):
                 needed = "[TIEUP] and [TREADLING], or [LIFTPLAN], are needed"

@@ -62,6 +62,25 @@ def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
     assert sum("1.15 of the spacing" in sentence for sentence in found.assumed) == 2
 
 
+def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
+    """4,096 ends and picks in 256 colours without a run of two."""
+    threads = range(4096)
+    found = imported(
+        wif(
+            COLOR_TABLE=numbered([f"{k},{255 - k},{k * 7 % 256}" for k in range(256)]),
+            WARP="Threads=4096\nColor=1",
+            WEFT="Threads=4096\nColor=2",
+            WARP_COLORS=numbered([1 + (t * (t // 2 + 1)) % 255 + t % 2 for t in threads]),
+            WEFT_COLORS=numbered([1 + t * t // 3 * 2 % 254 + t % 2 for t in threads]),
+            THREADING=numbered([t % 4 + 1 for t in threads]),
+            TREADLING=numbered([t % 4 + 1 for t in threads]),
+        )
+    )
+    assert len(found.fabric.colours.threads("ends")) == len(found.fabric.colours.threads("picks")) == 4096
+    (tmp_path / "large.toml").write_text(found.fabric.to_toml(), encoding="utf-8", newline="")
+    assert load_fabric(tmp_path / "large.toml") == found.fabric
+
+
 def test_stripes_in_the_ends_alone(imported):
     fabric = imported(wif(WARP_COLORS=numbered([1, 1, 1, 2] * 2))).fabric
     assert fabric.colours.ends == (("colour_1", 3), ("colour_2", 1)) and fabric.colours.picks == ()
