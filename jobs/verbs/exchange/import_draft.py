@@ -37,7 +37,10 @@ def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Map
     """
     if out.suffix != ".toml":
         raise BadInput("import", "--out", str(out), "a path that ends in .toml is needed")
-    yarns, file = load_fabric(like), read_draft(draft)
+    file = read_draft(
+        draft
+    )  # first: reading the colours of a fabric loads much, which a damaged draft need not wait for
+    yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
     found = fabric_of(file, yarns, own, str(draft), given)
     atomic_write(out, found.fabric.to_toml().encode())
