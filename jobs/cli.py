@@ -146,7 +146,9 @@ def import_(
 def show(
     fabric: FabricName,
     *,
-    out: Annotated[Local | None, Parameter(help="Folder for pictures of the fabric as PNG and EXR.")] = None,
+    out: Annotated[
+        Local | None, Parameter(help="Folder for pictures, a lit swatch among them, as PNG and EXR.")
+    ] = None,
 ) -> None:
     """Show a fabric: its drawdown and its yarns."""
     from jobs.verbs.show import show as print_fabric
@@ -194,7 +196,7 @@ def render(
     size: Annotated[str, Parameter(help="WIDTHxHEIGHT in pixels; default: the film of the scene.")] = "",
     frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
     samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
-    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 16,
+    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 8,
     tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
     exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,
 ) -> None:

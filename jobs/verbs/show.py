@@ -1,6 +1,6 @@
 """`twillight show`: a fabric's drawdown and yarns on the terminal, and its pictures.
 
-Pictures are drawdown, height and normals as PNG, and the maps of the geometry as EXR.
+Pictures are a lit swatch, drawdown, height and normals as PNG, and the maps of the geometry as EXR.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from rich.text import Text
 from jobs.console import table_of
 from jobs.terminal import Terminal
 from pipeline.atomic import atomic_write
+from pipeline.scenes.catalogue import load_scene
 from reports.images import tiles
 from reports.images.exr import write_exr
 from weaves.fabric import Fabric, load_fabric
@@ -22,6 +23,15 @@ from weaves.surface import GAP, surface_maps
 from weaves.yarn import Yarn
 
 TEXELS_PER_YARN: Final = 64
+
+SWATCH_SIZE: Final = "384x288"
+"""Width and height of the picture of a swatch."""
+
+LEAST_YARNS: Final = 48
+"""Yarns across a swatch, at least."""
+
+MOST_YARNS: Final = 400
+"""Yarns across a swatch, at most: they are a pixel wide."""
 
 _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"}
 
@@ -32,6 +42,7 @@ def show(name: str, out: Path | None) -> None:
     console.print(fabric_page(fabric))
     if out is not None:
         console.print(*write_pictures(fabric, out), sep="\n", soft_wrap=True)
+        console.print(write_swatch(name, fabric, out), soft_wrap=True)
 
 
 def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
@@ -54,6 +65,21 @@ def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
     about: dict[str, str | int | float] = {"fabric": fabric.name, "texels_per_yarn": TEXELS_PER_YARN}
     write_exr(paths[-1], {name: plane[::-1] for name, plane in channels.items()}, about)
     return paths
+
+
+def write_swatch(name: str, fabric: Fabric, folder: Path) -> Path:
+    """Write a picture of a lit swatch, the scene ``swatch`` with at least one and a half repeats; return its path."""
+    from jobs.verbs.render.look import look
+    from jobs.verbs.render.render import dressed, make
+
+    period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
+    yarns = min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS)
+    scene = dressed(load_scene("swatch"), [name])
+    cloths = {key: cloth.model_copy(update={"yarns": (yarns, yarns)}) for key, cloth in scene.cloths.items()}
+    path = folder / f"{fabric.name}-swatch.png"
+    how = look(size=SWATCH_SIZE, samples=1, directions=8, tone="srgb", exposure=0.0)
+    make(scene.model_copy(update={"cloths": cloths}), "selvage", 1, how, path)
+    return path
 
 
 def fabric_page(fabric: Fabric) -> RenderableType:

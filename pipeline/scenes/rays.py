@@ -27,9 +27,10 @@ class Hits(NamedTuple):
 def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
     """Return which of N rays hit anything nearer than `distance` (inf: anything)."""
     if mi.variant().startswith("scalar") or not len(origin):
+        # Points and vectors made here: Mitsuba takes longer to convert lists than to trace the ray.
         rays = zip(origin.tolist(), direction.tolist(), distance.tolist(), strict=True)
-        hits = (world.ray_test(mi.Ray3f(o, d, t, 0.0, [])) for o, d, t in rays)
-        return np.fromiter(hits, np.bool_, len(origin))
+        made = (mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), t, 0.0, []) for o, d, t in rays)
+        return np.fromiter(map(world.ray_test, made), np.bool_, len(origin))
     return np.asarray(world.ray_test(_rays(mi, origin, direction, distance)))
 
 
@@ -38,7 +39,7 @@ def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> Hits:
     if mi.variant().startswith("scalar") or not len(origin):
         found = np.full((len(origin), 7), np.nan)
         for row, (o, d) in enumerate(zip(origin.tolist(), direction.tolist(), strict=True)):
-            hit = world.ray_intersect(mi.Ray3f(o, d))
+            hit = world.ray_intersect(mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d)))
             if hit.is_valid():
                 found[row] = [hit.t, *hit.sh_frame.n, *hit.dp_du]
     else:

@@ -36,7 +36,8 @@ class FilmMaker:
     """A scene, a method and threads that make frames, with a progress bar while they do."""
 
     def __init__(self, loaded: Loaded, answerer: Answerer, size: tuple[int, int], how: Look, count: int) -> None:
-        self._loaded, self._answerer, self._size, self._how, self._count = loaded, answerer, size, how, count
+        self.size = size
+        self._loaded, self._answerer, self._how, self._count = loaded, answerer, how, count
         self._queries = self._fallback = 0
         console = Terminal(stderr=True)
         columns = TextColumn("rendering"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
@@ -62,7 +63,7 @@ class FilmMaker:
         if out.suffix == ".exr":
             self._write_exr(out, method)
         elif out.suffix == ".mp4":
-            write_film(out, map(self._shown, range(self._count)), self._size, RATE)
+            write_film(out, map(self._shown, range(self._count)), self.size, RATE)
         elif out.suffix == ".png":
             atomic_write(out, _png(self._shown(0)))
         else:
@@ -71,7 +72,7 @@ class FilmMaker:
 
     def _shown(self, frame: int) -> Bytes8:
         """Return a frame as it is shown."""
-        codes = np.zeros((self._size[1], self._size[0], 3), np.uint8)
+        codes = np.zeros((self.size[1], self.size[0], 3), np.uint8)
         for part in self._parts(frame, layers=False):
             codes[_place(part)] = displayed(part.planes["rgb"], self._how.tone, self._how.exposure)
         return codes
@@ -82,7 +83,7 @@ class FilmMaker:
         for part in self._parts(0, layers=True):
             for name, plane in part.planes.items():
                 if name not in planes:
-                    planes[name] = np.zeros((self._size[1], self._size[0], plane.shape[-1]), np.float32)
+                    planes[name] = np.zeros((self.size[1], self.size[0], plane.shape[-1]), np.float32)
                 planes[name][_place(part)] = plane
         channels = {channel: planes["rgb"][..., index] for index, channel in enumerate(RGB)}
         channels |= {"A": planes["cloth"][..., 0], "depth.Z": planes["depth"][..., 0]}
@@ -94,6 +95,8 @@ class FilmMaker:
 
     def _about(self, method: str) -> dict[str, str | int | float]:
         """Return what the file says of itself."""
+        model = method.partition(":")[0]
+        own = f", {model} {versions.MODELS[model]}" if model in versions.MODELS else ""
         fabrics = (f"{number} {fabric.name}" for number, (_, fabric) in enumerate(self._loaded.cloths.values(), 1))
         return {
             "scene": self._loaded.scene.name,
@@ -102,13 +105,13 @@ class FilmMaker:
             "samples": self._how.side**2,
             "directions": self._how.options.environment_directions,
             "fallback_share": 0.0 if method == TRUTH else self.share,
-            "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}",
+            "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}{own}",
         }
 
     def _parts(self, frame: int, layers: bool) -> Iterator[Part]:
         with one_thread():
             for part in picture(
-                self._loaded, self._answerer, self._pool, self._size, float(frame), self._how.side, layers
+                self._loaded, self._answerer, self._pool, self.size, float(frame), self._how.side, layers
             ):
                 self._queries += part.queries
                 self._fallback += part.fallback

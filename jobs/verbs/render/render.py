@@ -56,9 +56,17 @@ def render(scene: str, fabrics: Sequence[str], method: str, frames: int | None, 
         If the memory does not suffice.
     """
     found = dressed(load_scene(scene), fabrics)
-    count = _frames(frames, found, out)
+    start = time.monotonic()
+    maker = make(found, method, _frames(frames, found, out), how, out)
+    width, height = maker.size
+    share = "" if method == TRUTH else f"; {maker.share:.0%} of the queries by the fallback"
+    Terminal().print(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}", soft_wrap=True)
+
+
+def make(scene: Scene, method: str, frames: int, how: Look, out: Path) -> FilmMaker:
+    """Make a picture, a film or a folder, and return what made it; arguments and errors as for `render`."""
     answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, WHERE, "--method")
-    loaded = load(found, how.options)
+    loaded = load(scene, how.options)
     if isinstance(answerer, Fallback):
         for _, fabric in loaded.cloths.values():
             if not answerer.covers(fabric):
@@ -68,18 +76,16 @@ def render(scene: str, fabrics: Sequence[str], method: str, frames: int | None, 
     if out.suffix == ".mp4" and (size[0] % 2 or size[1] % 2):
         raise BadInput(WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
     refuse_unwritable(out if out.suffix else out / "frame")
-    start = time.monotonic()
     try:
-        with FilmMaker(loaded, answerer, size, how, count) as maker:
+        with FilmMaker(loaded, answerer, size, how, frames) as maker:
             maker.write(out, method)
     except KeyboardInterrupt as stop:
-        stop.args = (f"stopped; {out} is as it was before",) if out.suffix else stop.args
+        kept = f"{out} is as it was before" if out.suffix else f"finished frames are in {out}"
+        stop.args = (f"stopped; {kept}",)
         raise
     except MemoryError as error:
         raise WorkFailed(f"{out}: the memory does not suffice for {size[0]} x {size[1]} pixels") from error
-    share = "" if method == TRUTH else f"; {maker.share:.0%} of the queries by the fallback"
-    terminal = Terminal()
-    terminal.print(f"{out}: {size[0]} x {size[1]}, {duration(time.monotonic() - start)}{share}", soft_wrap=True)
+    return maker
 
 
 def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:

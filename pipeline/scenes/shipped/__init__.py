@@ -11,6 +11,7 @@ from pipeline.scenes.shipped.drape import DRAPE
 from pipeline.scenes.shipped.plane import PLANE
 from pipeline.scenes.shipped.roll import ROLL
 from pipeline.scenes.shipped.sphere import SPHERE
+from pipeline.scenes.shipped.swatch import SWATCH
 
-SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in (PLANE, SPHERE, DRAPE, ROLL, CURTAIN, TABLE)}
+SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in (PLANE, SPHERE, DRAPE, ROLL, CURTAIN, TABLE, SWATCH)}
 """Every shipped scene by its name."""

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import jobs.verbs.render.film_maker
+import jobs.verbs.render.render
+import jobs.verbs.show
 from jobs.cli import main
 from pipeline.models.named import named_method
 from pipeline.scenes.options import SceneOptions
@@ -17,6 +19,8 @@ from reports.images.exr import read_exr
 from reports.images.tone import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
+from weaves.fabric import load_fabric
+from weaves.satin import Satin
 
 SMALL = ("--size", "32x24", "--directions", "4")
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
@@ -76,6 +80,23 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
     assert about["fabrics"] == "1 polyester_lining, 2 basket, 3 silk_charmeuse, 4 denim"
     assert (about["scene"], about["method"], about["samples"]) == ("dinner_table", "selvage", 1)
     assert 0 < about["fallback_share"] < 1 and about["versions"].startswith("truth ")
+
+
+def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_path):
+    """Denim's swatch is the scene `swatch` with denim; a satin of more threads than a swatch has gets more yarns."""
+    monkeypatch.setattr(jobs.verbs.show, "SWATCH_SIZE", "32x24")
+    path = jobs.verbs.show.write_swatch("denim", load_fabric("denim"), tmp_path)
+    assert path == tmp_path / "denim-swatch.png"
+    assert main(["render", "swatch", "--fabric", "denim", "--size", "32x24", "--out", str(tmp_path / "a.png")]) == 0
+    assert path.read_bytes() == (tmp_path / "a.png").read_bytes()
+    cloth = codes_of(path)[8:16, 12:20].reshape(-1, 3).mean(axis=0)
+    assert cloth[2] > 1.2 * cloth[0]  # denim is blue
+    wide = load_fabric("denim").model_copy(update={"name": "wide", "draft": Satin(ends=100, move=3)})
+    (tmp_path / "wide.toml").write_text(wide.to_toml())
+    made = []
+    monkeypatch.setattr(jobs.verbs.render.render, "make", lambda scene, *_: made.append(scene))
+    jobs.verbs.show.write_swatch(str(tmp_path / "wide.toml"), wide, tmp_path)
+    assert made[0].cloths["swatch"].yarns == (150.0, 150.0)
 
 
 @pytest.mark.parametrize("method", ["truth", "point_sampled:2", "prefiltered"])
