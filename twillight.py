@@ -183,7 +183,7 @@ def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.N
     """
     from pipeline.scenes.shade import shade
 
-    return shade(fabric, components, queries.wi[:, 2] * queries.wo[:, 2] < 0)
+    return shade(fabric, components, queries)
 
 
 def open_dataset(folder: str | Path) -> Dataset:

@@ -51,11 +51,16 @@ class PaletteColour(BaseModel):
     specular: Colour | None = None
     """Colour k_s of the light scattered once by the fibres."""
     diffuse_transmission: Colour | None = None
-    """Colour k_dt of the light scattered many times that leaves on the other side."""
+    """Colour k_dt of the light scattered many times that leaves on the other side; if not given, at most 1 - k_d."""
 
     def on(self, yarn: Yarn) -> Yarn:
         """Return a yarn in this colour; ValidationError if it would make light."""
-        given = self.model_dump(exclude_none=True) | {"diffuse": self.diffuse}
+        through = self.diffuse_transmission
+        if through is None:
+            back = linear_rgb(self.diffuse)
+            through = tuple(min(k, 1.0 - b) for k, b in zip(yarn.diffuse_transmission_rgb, back, strict=True))
+        specular = yarn.specular if self.specular is None else self.specular
+        given = {"specular": specular, "diffuse": self.diffuse, "diffuse_transmission": through}
         return Yarn.model_validate(yarn.model_dump() | given)
 
 
@@ -82,6 +87,9 @@ class ColourOrder(BaseModel):
     """Runs of neighbouring ends, from the first end on; without any, all ends have the colours of the warp yarn."""
     picks: tuple[Run, ...] = Field(default=(), max_length=MOST_THREADS)
     """Runs of neighbouring picks, from the first pick on; without any, all picks have those of the weft yarn."""
+
+    def __hash__(self) -> int:
+        return hash((tuple(sorted(self.palette.items(), key=lambda item: item[0])), self.ends, self.picks))
 
     @model_validator(mode="after")
     def _names_its_colours(self) -> Self:

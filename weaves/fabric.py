@@ -6,6 +6,7 @@ its ends or picks differ in colour; the presets beside this module are examples.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -106,6 +107,22 @@ class Fabric(BaseModel):
     def weave(self) -> Draft:
         """The draft, woven."""
         return _woven(self.draft)
+
+    @property
+    def repeat(self) -> tuple[int, int]:
+        """Ends and picks after which weave and colours repeat: the extent of the cloth's own repeat in x and in y."""
+        (ends, picks), (warp, weft) = self.weave.repeat, self.thread_colours()
+        return math.lcm(ends, len(warp.diffuse)), math.lcm(picks, len(weft.diffuse))
+
+    def average(self) -> Fabric:
+        """Return the same cloth with the mean colours of its ends and picks on all of them."""
+        if self.colours is None:
+            return self
+        warp, weft = (
+            yarn.model_copy(update={name: tuple(values.mean(axis=0).tolist()) for name, values in found.items()})
+            for yarn, found in zip((self.warp, self.weft), (c._asdict() for c in self.thread_colours()), strict=True)
+        )
+        return self.model_copy(update={"warp": warp, "weft": weft, "colours": None})
 
     def optics(self) -> dict[str, Any]:
         """Return the parameters that the four components depend on: no name, source, colour or physical size.

@@ -71,7 +71,8 @@ class Sampler:
         return method.predict(fabric, queries, seed), self.pdf(fabric, queries)
 
     def _lobes(self, fabric: Fabric, queries: Queries) -> Lobes:
-        yarns = (fabric.warp, fabric.weft)
+        average = fabric.average()
+        yarns = (average.warp, average.weft)
         specular, diffuse, through = (
             np.array([luminance(getattr(yarn, name)) for yarn in yarns])
             for name in ("specular_rgb", "diffuse_rgb", "diffuse_transmission_rgb")

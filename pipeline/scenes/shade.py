@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.footprint_colours import footprint_colours
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -17,20 +18,27 @@ from weaves.fabric import Fabric
 def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64]:
     """Return the linear RGB colours of the components in the order of `pipeline.truth.conventions.COMPONENTS`, (4, 3).
 
-    Light that is `transmitted`, from the other side of the cloth, takes the diffuse colours k_dt.
+    Where ends or picks differ in colour, these are the means of their repeats. Light that is `transmitted`, from the
+    other side of the cloth, takes the diffuse colours k_dt.
     """
-    yarns = (fabric.warp, fabric.weft)
+    yarns = (fabric.average().warp, fabric.average().weft)
     diffuse = [yarn.diffuse_transmission_rgb if transmitted else yarn.diffuse_rgb for yarn in yarns]
     return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
 
 
 def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
-    """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own."""
+    """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own.
+
+    Where ends or picks differ in colour, these are the mean colours of the footprint's threads
+    (`pipeline.analytic.footprint_colours`).
+    """
+    if fabric.colours is not None:
+        return footprint_colours(fabric, queries)
     through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
     return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
-def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: npt.ArrayLike = False) -> npt.NDArray[np.float64]:
+def shade(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3).
 
     Parameters
@@ -39,12 +47,15 @@ def shade(fabric: Fabric, components: npt.ArrayLike, transmitted: npt.ArrayLike 
         Whose colours are applied.
     components : array_like (N, 4)
         S_warp, S_weft, C_warp, C_weft with unit colour.
-    transmitted : bool or bool (N,)
-        Whether light and viewer are on different sides of the cloth.
+    queries : Queries
+        Their N queries: footprints, and the sides of light and viewer.
     """
-    unit = np.asarray(components, dtype=np.float64)
-    reflected, through = unit @ colours(fabric), unit @ colours(fabric, transmitted=True)
-    return np.where(np.asarray(transmitted)[..., None], through, reflected)
+    return coloured(components, colours_of(fabric, queries))
+
+
+def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the patch BSDF in linear RGB, (N, 3), from components (N, 4) and the colours of each, (N, 4, 3)."""
+    return np.asarray(np.einsum("nc,ncx->nx", np.asarray(components, np.float64), colours))
 
 
 def compose(

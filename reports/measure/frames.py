@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.gbuffer import GBuffer
-from pipeline.scenes.shade import colours
+from pipeline.scenes.shade import coloured, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
+from pipeline.truth.thread_colours import component_colours
 from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from pipeline.models.method import Method
 
 Floats = npt.NDArray[np.float64]
+
+_LUMINANCE = np.array(LUMINANCE)[:, None]
 
 
 class _Frames(NamedTuple):
@@ -48,15 +51,15 @@ class _Frames(NamedTuple):
 
 def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
     """Write the truth's frames of the moving plane to `path`."""
-    weights = _luminance(fabric)
     values, errors = [], []
     for index in range(options.frames):
         gbuffer = _view(options, index)
         seed = int(fingerprint(["frame", fabric.name, index, options.seed]), 16)
-        queries = gbuffer.queries(fabric.weave.repeat)
+        queries = gbuffer.queries(fabric.repeat)
         answers = estimate(fabric, queries, options.frame_truth, seed)
-        values.append(_spread(gbuffer, answers.mean @ weights))
-        errors.append(_spread(gbuffer, colour_noise(answers, weights)))
+        luminances = component_colours(fabric, queries, options.frame_truth, seed).mean @ _LUMINANCE
+        values.append(_spread(gbuffer, coloured(answers.mean, luminances)))
+        errors.append(_spread(gbuffer, colour_noise(answers, luminances)))
     channels = {"Y": np.concatenate(values), "error.Y": np.concatenate(errors)}
     write_exr(path, channels, {"fabric": fabric.name, "scene": "plane", "method": TRUTH, "frames": options.frames})
 
@@ -80,13 +83,13 @@ def measure_aliasing(
     """
     reference = _read(frames, options)
     method.prepare(fabric)
-    weights = _luminance(fabric)
     planes = []
     for index in range(options.frames):
         gbuffer = _view(options, index)
         seed = int(fingerprint(["aliasing", fabric.name, index, options.seed]), 16)
-        values = method.predict(fabric, gbuffer.queries(fabric.weave.repeat), seed)
-        planes.append(_spread(gbuffer, values.astype(np.float64) @ weights))
+        queries = gbuffer.queries(fabric.repeat)
+        values = method.predict(fabric, queries, seed)
+        planes.append(_spread(gbuffer, shade(fabric, values, queries) @ _LUMINANCE))
     shown = np.array(planes)
     lit, rows = reference.lit, reference.rows
     subject = _subject(method.name, method.setting, fabric, role, provenance)
@@ -130,11 +133,6 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Floats:
     plane = np.zeros(gbuffer.lit.shape)
     plane[gbuffer.lit] = values[:, 0]
     return plane
-
-
-def _luminance(fabric: Fabric) -> Floats:
-    """Return the luminance of each component's colour, (4, 1)."""
-    return np.asarray(colours(fabric) @ np.array(LUMINANCE)[:, None])
 
 
 def _subject(method: str, setting: str, fabric: Fabric, role: Role, provenance: Provenance | None) -> Record:

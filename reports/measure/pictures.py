@@ -17,9 +17,10 @@ import numpy.typing as npt
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View
-from pipeline.scenes.shade import colours, compose, shade
+from pipeline.scenes.shade import coloured, compose, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
+from pipeline.truth.thread_colours import component_colours
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
 from reports.options import PictureOptions, Role
@@ -37,10 +38,11 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
     """Write the truth's picture of a scene to `path`."""
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["truth", fabric.name, scene, options.seed]), 16)
-    queries = gbuffer.queries(fabric.weave.repeat)
+    queries = gbuffer.queries(fabric.repeat)
     answers = estimate(fabric, queries, options.truth, seed)
-    noise = compose(gbuffer, colour_noise(answers, colours(fabric)))
-    picture = compose(gbuffer, shade(fabric, answers.mean))
+    colours = component_colours(fabric, queries, options.truth, seed).mean
+    noise = compose(gbuffer, colour_noise(answers, colours))
+    picture = compose(gbuffer, coloured(answers.mean, colours))
     write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)
 
 
@@ -68,7 +70,8 @@ def render_method(
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)
     method.prepare(fabric)
-    picture = compose(gbuffer, shade(fabric, method.predict(fabric, gbuffer.queries(fabric.weave.repeat), seed)))
+    queries = gbuffer.queries(fabric.repeat)
+    picture = compose(gbuffer, shade(fabric, method.predict(fabric, queries, seed), queries))
     about = {**_about(fabric, scene, gbuffer), "method": method.name, "setting": method.setting}
     write_picture(path, picture, gbuffer.mask, about)
     reference = read_exr(truth)

@@ -206,7 +206,6 @@ def _edge(
     components: npt.NDArray[np.float32],
     options: EdgeOptions,
 ) -> Edge:
-    behind = queries.wi[:, 2:] < 0
-    colour = np.where(behind, shade(fabric, components, transmitted=True), shade(fabric, components))
+    colour = shade(fabric, components, queries)
     cover = coverage.astype(np.float64).reshape(options.rows, -1)
     return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))

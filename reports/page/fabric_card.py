@@ -13,7 +13,8 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     """Return the title, weave, source and yarns of a fabric as text, and the colours of the yarns."""
     ends, picks = fabric.weave.repeat
     yarns = []
-    for family, yarn in (("warp", fabric.warp), ("weft", fabric.weft)):
+    average = fabric.average()
+    for family, yarn in (("warp", average.warp), ("weft", average.weft)):
         numbers = [
             f"{yarn.bend:.3g}°",
             f"{yarn.twist:.3g}°".replace("-", "−"),

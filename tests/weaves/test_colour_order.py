@@ -38,6 +38,7 @@ def test_a_sequence_repeats_after_its_smallest_repeat(runs):
 def test_a_fabric_without_an_order_has_no_such_key():
     assert "colours" not in denim.model_dump()
     assert coloured(picks=[["navy", 1]]).optics() == denim.optics()
+    assert hash(coloured(picks=[["navy", 1]])) == hash(coloured(picks=[["navy", 1]])) != hash(denim)
 
 
 def test_a_coloured_fabric_reads_back_from_its_own_file(tmp_path):

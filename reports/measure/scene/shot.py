@@ -24,9 +24,10 @@ from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import load
-from pipeline.scenes.shade import colours_of, compose
+from pipeline.scenes.shade import coloured, colours_of, compose, shade
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
+from pipeline.truth.thread_colours import component_colours
 from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -58,6 +59,8 @@ class ClothQueries:
     fallback_values : float32 (M, 4)
         Answers of the fallback where light or viewer is behind the cloth, for methods that do not know such queries; 0
         elsewhere.
+    colours : float32 (M, 4, 3)
+        The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
     """
 
     fabric: Fabric
@@ -68,25 +71,23 @@ class ClothQueries:
     mean: npt.NDArray[np.float32]
     standard_error: npt.NDArray[np.float32]
     fallback_values: npt.NDArray[np.float32]
+    colours: npt.NDArray[np.floating]
 
-    def light(self, components: npt.ArrayLike) -> Floats:
-        """Return the light of each query, (M, 3), from components (M, 4)."""
-        return np.asarray(
-            self.weight
-            * np.einsum("mc,mcx->mx", np.asarray(components, np.float64), colours_of(self.fabric, self.queries))
-        )
+    def light(self, components: npt.ArrayLike | None = None) -> Floats:
+        """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
+        if components is None:
+            return np.asarray(self.weight * coloured(self.mean, self.colours))
+        return np.asarray(self.weight * shade(self.fabric, components, self.queries))
 
     def noise(self) -> Floats:
         """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
         squared = np.square(self.standard_error.astype(np.float64))
-        return np.asarray(
-            self.weight * np.sqrt(np.einsum("mc,mcx->mx", squared, np.square(colours_of(self.fabric, self.queries))))
-        )
+        return np.asarray(self.weight * np.sqrt(coloured(squared, np.square(self.colours))))
 
     def of_frame(self, frame: int) -> ClothQueries:
         """Return the queries of one frame."""
         rows = np.flatnonzero(self.frame == frame)
-        parts = (getattr(self, name)[rows] for name in _COLUMNS)
+        parts = (getattr(self, name)[rows] for name in (*_COLUMNS, "colours"))
         return ClothQueries(self.fabric, self.queries.take(rows), *parts)
 
 
@@ -121,7 +122,7 @@ class Shot:
         result = self.base.astype(np.float64)
         flat = result.reshape(len(result), -1, 3)
         for index, cloth in enumerate(self.cloths):
-            light = cloth.light(cloth.mean if answers is None else answers[index])
+            light = cloth.light(None if answers is None else answers[index])
             np.add.at(flat, (cloth.frame, cloth.pixel), light)
         return result
 
@@ -178,7 +179,7 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             fabric = loaded.cloths[key][1]
             truth = options.frame_truth if frame else options.truth
             seed = int(fingerprint(["scene", loaded.scene.name, key, frame, options.seed]), 16)
-            queries = gbuffer.queries(fabric.weave.repeat)
+            queries = gbuffer.queries(fabric.repeat)
             answers = estimate(fabric, queries, truth, seed)
             dark = np.zeros((len(gbuffer.place), 3))
             base = compose(gbuffer, dark, base, transparency=_transparency(gbuffer, answers.transparency))
@@ -187,6 +188,8 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
             columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
+            if fabric.colours is not None:
+                columns |= {"colours": component_colours(fabric, queries, truth, seed).mean.astype(np.float32)}
             parts[key].append(columns)
         bases.append(base)
     arrays = {"base": np.array(bases, np.float32)}
@@ -210,7 +213,10 @@ def read_shot(path: Path) -> Shot:
         for key, fabric in about["cloths"].items():
             queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
             rest = (file[f"{key}.{column}"] for column in _COLUMNS)
-            cloths.append(ClothQueries(Fabric.model_validate(fabric), queries, *rest))
+            cloth = Fabric.model_validate(fabric)
+            plain = cloth.colours is None
+            colours = colours_of(cloth, queries) if plain else file[f"{key}.colours"]
+            cloths.append(ClothQueries(cloth, queries, *rest, colours))
         return Shot(about["name"], file["base"], cloths)
 
 

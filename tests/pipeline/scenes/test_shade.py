@@ -4,13 +4,20 @@ import pytest
 from pipeline.scenes.options import ViewOptions
 from pipeline.scenes.shade import colours, compose, shade
 from pipeline.scenes.views import view
-from weaves.fabric import load_fabric
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric, load_fabric
+
+
+def lit(side):
+    """Return four queries that are lit from one side."""
+    ones = np.ones(4)
+    return Queries.round(ones, ones, ones, np.tile([0.6, 0, 0.8 * side], (4, 1)), np.tile([0, 0, 1.0], (4, 1)))
 
 
 def test_shade_applies_each_colour_to_its_component():
     """One component at a time gives back its own colour; an asymmetric fabric sees warp and weft swapped."""
     fabric = load_fabric("denim")
-    rgb = shade(fabric, np.eye(4, dtype=np.float32))
+    rgb = shade(fabric, np.eye(4), lit(1.0))
     expected = [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb]
     assert rgb == pytest.approx(np.array(expected))
     assert colours(fabric) == pytest.approx(np.array(expected))
@@ -31,6 +38,18 @@ def test_compose_scales_by_the_irradiance_and_leaves_the_rest():
 def test_transmitted_light_takes_the_transmission_colours():
     denim = load_fabric("denim")
     curtain = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
-    rgb = shade(curtain, np.eye(4, dtype=np.float32), transmitted=True)
+    rgb = shade(curtain, np.eye(4), lit(-1.0))
     assert rgb[3] == pytest.approx([0.1, 0.2, 0.3]) and (rgb[2] == 0).all()
-    assert rgb[:2] == pytest.approx(shade(denim, np.eye(4, dtype=np.float32))[:2])
+    assert rgb[:2] == pytest.approx(shade(denim, np.eye(4), lit(1.0))[:2])
+
+
+def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
+    """A white end beside a black one: each footprint on one end has its colour, a wide one the mean of both."""
+    palette = {"white": {"diffuse": [1.0, 1.0, 1.0]}, "black": {"diffuse": [0.0, 0.0, 0.0]}}
+    order = {"palette": palette, "ends": [["white", 2], ["black", 2]]}
+    fabric = Fabric.model_validate(load_fabric("denim").model_dump() | {"colours": order})
+    places = np.array([1.0, 3.0, 5.0, 2.0])
+    queries = lit(1.0)._replace(u=places, sigma=np.array([0.1, 0.1, 0.1, 50.0]), sigma_minor=np.full(4, 0.1))
+    rgb = shade(fabric, np.tile([0.0, 0.0, 1.0, 0.0], (4, 1)), queries)
+    assert rgb[:, 0] == pytest.approx([1.0, 0.0, 1.0, 0.5], abs=1e-5)
+    assert colours(fabric)[2] == pytest.approx([0.5] * 3)

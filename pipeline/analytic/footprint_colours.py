@@ -1,0 +1,163 @@
+"""Colours of the components where ends or picks differ in colour, for methods that know four components.
+
+The mean colour of the ends (picks) in the footprint: each thread counts by the footprint's mass on its cells, times the
+share of each cell in which it is seen from straight above. Shadows, highlights and oblique views change these shares;
+pipeline.truth.thread_colours has the exact ones. Whatever the footprint, the mean over the cloth is that of the truth,
+and nothing aliases: the masses are integrals of a Gaussian.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pipeline.compiled.arrays import Float64
+from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.truth.footprint.mixture import COARSE_LINE, along_axes, line_points
+from pipeline.truth.query import Queries
+from weaves.colour_order import ThreadColours
+from weaves.fabric import Fabric
+
+_REACH: Final = 5.5  # in standard deviations; what lies beyond is 4e-8
+_SPREAD_OUT: Final = 0.8  # in repeats: an axis of a Gaussian this wide covers the repeat evenly, to 6e-6
+_POINTS: Final = COARSE_LINE.points
+_MOST: Final = COARSE_LINE.most
+_HIDDEN: Final = 1e-6  # share of a cell that a yarn covers in any case: where it is not seen it has a colour, too
+
+
+class Check(NamedTuple):
+    """A coloured fabric as kernels read it.
+
+    Attributes
+    ----------
+    warp, weft : float64 (n, 9)
+        k_s, k_d and k_dt of each end (pick) of the sequence.
+    warp_seen, weft_seen : float64 (ends, picks), (picks, ends)
+        Share of each cell in which the yarn is seen from above.
+    """
+
+    warp: Float64
+    weft: Float64
+    warp_seen: Float64
+    weft_seen: Float64
+
+
+def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
+    """Return the colours of the components of N queries, float64 (N, 4, 3), linear sRGB.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    queries : Queries
+        Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider.
+    """
+    wide = [np.ascontiguousarray(queries[k], np.float64) for k in (0, 1, 2, 5, 6)]
+    means = mean_colours(_check(fabric), *wide).reshape(-1, 2, 3, 3)
+    through = (queries.wi[:, 2] * queries.wo[:, 2] < 0.0)[:, None, None]
+    diffuse = np.where(through, means[:, :, 2], means[:, :, 1])
+    return np.concatenate([means[:, :, 0], diffuse], axis=1)
+
+
+@lru_cache(maxsize=64)
+def _check(fabric: Fabric) -> Check:
+    over = fabric.weave.warp_over
+    warp, weft = fabric.warp.width, fabric.weft.width
+    warp_seen = np.where(over, warp, (1.0 - weft) * warp)
+    weft_seen = np.where(over, (1.0 - warp) * weft, weft)
+
+    def stacked(colours: ThreadColours) -> Float64:
+        return np.ascontiguousarray(np.concatenate(colours, axis=1))
+
+    first, second = fabric.thread_colours()
+    return Check(
+        stacked(first),
+        stacked(second),
+        np.ascontiguousarray(np.maximum(warp_seen.T, _HIDDEN)),
+        np.ascontiguousarray(np.maximum(weft_seen, _HIDDEN)),
+    )
+
+
+@allocating_kernel
+def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Float64, angle: Float64) -> Float64:
+    """Return k_s, k_d and k_dt of the ends and of the picks in N footprints, (N, 2, 9)."""
+    ends, picks = check.warp_seen.shape
+    found = np.zeros((len(u), 2, 9))
+    weights = np.zeros(2)
+    masses = np.zeros(ends), np.zeros(picks)
+    sums = np.zeros((ends, 9)), np.zeros((picks, 9))
+    even = np.zeros((ends, 9)), np.zeros((picks, 9))
+    _fold_evenly(check.warp, even[0])
+    _fold_evenly(check.weft, even[1])
+    points = np.zeros((2, _POINTS), np.float32)
+    for row in range(len(u)):
+        x, y, correlation = along_axes(major[row], minor[row], angle[row])
+        correlation = min(max(correlation, -_MOST), _MOST)
+        blur, shift = math.sqrt(1.0 - abs(correlation)), math.sqrt(abs(correlation))
+        weights[:] = 0.0
+        for point in range(line_points(correlation, COARSE_LINE, points[0], points[1])):
+            z = points[0, point] * shift
+            _fold(check.warp, u[row] + z * x, blur * x, even[0], masses[0], sums[0])
+            _fold(check.weft, v[row] + math.copysign(z, z * correlation) * y, blur * y, even[1], masses[1], sums[1])
+            share = points[1, point]
+            weights[0] += _add(check.warp_seen, masses[1], masses[0], sums[0], share, found[row, 0])
+            weights[1] += _add(check.weft_seen, masses[0], masses[1], sums[1], share, found[row, 1])
+        for family in range(2):
+            for c in range(9):
+                found[row, family, c] /= weights[family]
+    return found
+
+
+@kernel
+def _fold_evenly(colours: Float64, sums: Float64) -> None:
+    """Write the mean colour of the threads that fall on each thread of the weave's repeat, over their number."""
+    threads = len(sums)
+    whole = threads * len(colours)  # a common multiple of both repeats
+    for thread in range(whole):
+        for c in range(9):
+            sums[thread % threads, c] += colours[thread % len(colours), c] / whole
+
+
+@kernel
+def _fold(colours: Float64, centre: float, sigma: float, even: Float64, masses: Float64, sums: Float64) -> None:
+    """Write the mass of an axis of a footprint on each thread of the weave's repeat, and the same times its colour."""
+    threads = len(masses)
+    if sigma >= _SPREAD_OUT * threads * len(colours):
+        masses[:] = 1.0 / threads
+        for thread in range(threads):
+            for c in range(9):
+                sums[thread, c] = even[thread, c]
+        return
+    masses[:], sums[:] = 0.0, 0.0
+    first, last = math.floor(centre - _REACH * sigma), math.floor(centre + _REACH * sigma)
+    scale = 1.0 / (math.sqrt(2.0) * sigma)
+    below = -1.0
+    for thread in range(first, last + 1):
+        above = 1.0 if thread == last else math.erf((thread + 1 - centre) * scale)
+        mass = 0.5 * (above - below)
+        below = above
+        place, colour = thread % threads, thread % len(colours)
+        masses[place] += mass
+        for c in range(9):
+            sums[place, c] += mass * colours[colour, c]
+
+
+@kernel
+def _add(seen: Float64, across: Float64, masses: Float64, sums: Float64, share: float, found: Float64) -> float:
+    """Add the colours of a family's threads, by what is seen of them; return the added weight.
+
+    `seen` is (threads, crossing threads), `across` the mass on each crossing thread.
+    """
+    weight = 0.0
+    for thread in range(len(masses)):
+        if masses[thread] > 0.0:
+            visible = 0.0
+            for crossing in range(len(across)):
+                visible += share * seen[thread, crossing] * across[crossing]
+            weight += masses[thread] * visible
+            for c in range(9):
+                found[c] += sums[thread, c] * visible
+    return weight

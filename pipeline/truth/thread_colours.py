@@ -1,0 +1,216 @@
+"""Colours of the components where ends or picks differ in colour: the truth, by sampling.
+
+Each component of a patch is a sum over the yarns in it. Its colour is the mean colour of their threads, each thread
+weighted by its share of the component:
+
+    f_P = sum_c colour_c component_c,    colour_c = sum_r N_rc k_r / sum_r N_rc
+
+with the numerators N of a component over the threads r. Points of the footprint are those of the Owen-scrambled
+estimator (monte_carlo), placed in the repeat of weave and colours together.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.compiled.arrays import Float64, Index
+from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.footprint.place import place_pair
+from pipeline.truth.footprint.sequences import derive, owen_pair
+from pipeline.truth.geometry.heightfield import GAP, WARP
+from pipeline.truth.geometry.march import wrap
+from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries, validate
+from pipeline.truth.scattering.point import point_share
+from weaves.colour_order import ThreadColours
+from weaves.fabric import Fabric
+
+
+class ComponentColours(NamedTuple):
+    """Colours of the components of N queries, linear sRGB.
+
+    Attributes
+    ----------
+    mean : float64 (N, 4, 3)
+        Colour of each component, in the order of `pipeline.truth.conventions.COMPONENTS`.
+    standard_error : float64 (N, 3)
+        Standard error that the colours bring into the patch BSDF, 1/sr.
+    """
+
+    mean: Float64
+    standard_error: Float64
+
+
+class Threads(NamedTuple):
+    """Colours of the threads as kernels read them.
+
+    Attributes
+    ----------
+    warp, weft : float64 (n, 2, 3)
+        Specular and diffuse colour of each end (pick) of the sequence.
+    ends, picks : int
+        Repeat of weave and colours together.
+    """
+
+    warp: Float64
+    weft: Float64
+    ends: int
+    picks: int
+
+
+def threads_of(fabric: Fabric, transmitted: bool) -> Threads:
+    """Return the colours of a fabric's threads; those of the diffuse components for light from one side or both."""
+
+    def stacked(colours: ThreadColours) -> Float64:
+        diffuse = colours.diffuse_transmission if transmitted else colours.diffuse
+        return np.ascontiguousarray(np.stack([colours.specular, diffuse], axis=1))
+
+    warp, weft = fabric.thread_colours()
+    return Threads(stacked(warp), stacked(weft), *fabric.repeat)
+
+
+def component_colours(
+    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
+) -> ComponentColours:
+    """Return the colours of the components of queries about a fabric.
+
+    Points are doubled until the standard error of the patch BSDF's colour is `options.relative_error` of its size.
+    Parameters are those of `pipeline.truth.estimator.estimate`; the estimator of the options does not matter.
+
+    Raises
+    ------
+    BadInput
+        If a query has no answer; see `pipeline.truth.query.faults`.
+    """
+    validate(queries)
+    rows = len(queries.u)
+    found = ComponentColours(np.zeros((rows, 4, 3)), np.zeros((rows, 3)))
+    behind, through = queries.wo[:, 2] < 0, queries.wi[:, 2] * queries.wo[:, 2] < 0
+    for side in (False, True):
+        for transmitted in (False, True):
+            index = np.flatnonzero((behind == side) & (through == transmitted))
+            if not index.size:
+                continue
+            threads = threads_of(fabric, transmitted)
+            if fabric.colours is None:
+                found.mean[index] = np.stack([threads.warp[0], threads.weft[0]], axis=1).reshape(4, 3)
+                continue
+            cloth, columns = cloth_side(fabric, options, side), columns_of(queries.take(index), side)
+            found.mean[index], found.standard_error[index] = sample_colours(
+                cloth, columns, start + index, threads, options.relative_error, options.min_count, options.max_count,
+                np.uint64(seed),
+            )  # fmt: skip
+    return found
+
+
+@allocating_kernel
+def sample_colours(
+    cloth: ClothSide,
+    columns: Columns,
+    index: Index,
+    threads: Threads,
+    relative_error: float,
+    min_count: int,
+    max_count: int,
+    seed: np.uint64,
+) -> tuple[Float64, Float64]:
+    """Return the colours of every row's components (N, 4, 3), and the standard error in the patch BSDF (N, 3)."""
+    rows = len(index)
+    means, errors = np.zeros((rows, 4, 3)), np.zeros((rows, 3))
+    # Numerators of the components, the same with colours, and the denominator.
+    plain, coloured = np.zeros((RANDOMISATIONS, 4)), np.zeros((RANDOMISATIONS, 4, 3))
+    area = np.zeros(RANDOMISATIONS)
+    for row in range(rows):
+        key = derive(seed, index[row])
+        plain[:], coloured[:], area[:] = 0.0, 0.0, 0.0
+        done, target = 0, min_count // RANDOMISATIONS
+        while True:
+            for r in range(RANDOMISATIONS):
+                _add_points(cloth, columns, row, threads, derive(key, r), done, target, plain[r], coloured[r], area[r:])
+            done = target
+            size, error = _colours(threads, plain, coloured, area, means[row], errors[row])
+            if error <= relative_error * size or done * RANDOMISATIONS >= max_count:
+                break
+            target = 2 * done
+    return means, errors
+
+
+@kernel
+def _add_points(
+    cloth: ClothSide,
+    columns: Columns,
+    row: int,
+    threads: Threads,
+    randomisation: np.uint64,
+    first: int,
+    last: int,
+    plain: Float64,
+    coloured: Float64,
+    area: Float64,
+) -> None:
+    """Add the points from `first` to `last` of a randomisation to its sums; area[0] is the denominator."""
+    directions = query_directions(columns, row)
+    picks, ends = cloth.front.top.shape
+    for k in range(first, last):
+        a, b = owen_pair(randomisation, k)
+        x, y, weight = place_pair(
+            cloth.shape,
+            columns.u[row],
+            columns.v[row],
+            columns.sigma[row],
+            columns.sigma_minor[row],
+            columns.angle[row],
+            float(threads.ends),
+            float(threads.picks),
+            a,
+            b,
+        )
+        family, seen, specular, diffuse, _ = point_share(
+            cloth.front, cloth.back, wrap(x, float(ends)), wrap(y, float(picks)), directions, cloth.choices
+        )
+        area[0] += weight * seen
+        if family == GAP:
+            continue
+        thread = (
+            threads.warp[int(x) % len(threads.warp)] if family == WARP else threads.weft[int(y) % len(threads.weft)]
+        )
+        plain[family] += weight * specular
+        plain[2 + family] += weight * diffuse
+        for c in range(3):
+            coloured[family, c] += weight * specular * thread[0, c]
+            coloured[2 + family, c] += weight * diffuse * thread[1, c]
+
+
+@kernel
+def _colours(
+    threads: Threads, plain: Float64, coloured: Float64, area: Float64, mean: Float64, error: Float64
+) -> tuple[float, float]:
+    """Write the colours of the components and the standard error; return the norms of the patch's colour and of it."""
+    whole = area.sum()
+    for q in range(4):
+        total = plain[:, q].sum()
+        sequence = threads.warp if q % 2 == WARP else threads.weft
+        for c in range(3):
+            # A component of which no point was seen has the mean colour of all its threads.
+            mean[q, c] = coloured[:, q, c].sum() / total if total > 0.0 else sequence[:, q // 2, c].mean()
+    if whole <= 0.0:
+        error[:] = 0.0
+        return 0.0, 0.0
+    size, doubt = 0.0, 0.0
+    for c in range(3):
+        spread, value = 0.0, 0.0
+        for r in range(RANDOMISATIONS):
+            residual = 0.0
+            for q in range(4):
+                residual += coloured[r, q, c] - mean[q, c] * plain[r, q]
+                value += coloured[r, q, c]
+            spread += residual * residual
+        error[c] = math.sqrt(spread * RANDOMISATIONS / (RANDOMISATIONS - 1)) / whole
+        size += (value / whole) ** 2
+        doubt += error[c] ** 2
+    return math.sqrt(size), math.sqrt(doubt)

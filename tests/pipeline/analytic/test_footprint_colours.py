@@ -1,0 +1,66 @@
+"""Mean colours of the threads in a footprint, against integrals on a lattice."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.footprint_colours import footprint_colours
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric, load_fabric
+from weaves.surface import surface_at
+
+PALETTE = {"red": {"diffuse": [0.9, 0.1, 0.2], "specular": [0.4, 0.2, 0.1]}, "blue": {"diffuse": [0.1, 0.2, 0.8]}}
+
+
+def coloured(name, **order):
+    return Fabric.model_validate(load_fabric(name).model_dump() | {"colours": {"palette": PALETTE} | order})
+
+
+def queries(rows, rng, minor=None, behind=False):
+    wi, wo = np.tile([0.6, 0.0, -0.8 if behind else 0.8], (rows, 1)), np.tile([0.0, 0.0, 1.0], (rows, 1))
+    found = Queries.round(rng.random(rows) * 30, rng.random(rows) * 30, np.exp(rng.uniform(-2, 0, rows)), wi, wo)
+    return found if minor is None else found._replace(sigma_minor=found.sigma * np.float32(minor), angle=found.u)
+
+
+@pytest.mark.parametrize("minor", [None, 0.4])
+def test_diffuse_colours_are_means_over_what_is_seen_from_above(minor):
+    fabric = coloured("gauze", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    asked = queries(3, np.random.default_rng(1), minor)
+    found = footprint_colours(fabric, asked)
+    step = (np.arange(1200) + 0.5) / 1200 * 9.0 - 4.5
+    for row in range(3):
+        size, turn = float(asked.sigma[row]), float(asked.angle[row])
+        x, y = np.broadcast_arrays(asked.u[row] + size * step[None, :], asked.v[row] + size * step[:, None])
+        along = (x - asked.u[row]) * math.cos(turn) + (y - asked.v[row]) * math.sin(turn)
+        across = (y - asked.v[row]) * math.cos(turn) - (x - asked.u[row]) * math.sin(turn)
+        mass = np.exp(-0.5 * (along / size) ** 2 - 0.5 * (across / float(asked.sigma_minor[row])) ** 2)
+        cell = surface_at(fabric, np.floor(x) + 0.5, np.floor(y) + 0.5)
+        for family, place in enumerate((x, y)):
+            colours = fabric.thread_colours()[family].diffuse
+            yarn, other = (fabric.warp, fabric.weft) if family == 0 else (fabric.weft, fabric.warp)
+            weight = mass * np.where(cell.yarn == family, 1.0, 1.0 - other.width) * yarn.width
+            expected = (weight[..., None] * colours[np.floor(place).astype(int) % 5]).sum(axis=(0, 1)) / weight.sum()
+            # A coarse line has components 2 % off the ellipse's waves.
+            assert found[row, 2 + family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
+
+
+def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
+    """Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads."""
+    fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
+    u, v = np.mgrid[0 : fabric.repeat[0] : 0.125, 0 : fabric.repeat[1] : 0.125].reshape(2, -1)
+    wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
+    wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
+    for size in (2.0, 7.0, 40.0):
+        found = footprint_colours(fabric, Queries.round(u, v, np.full(u.size, size), wi, wo))
+        assert found.mean(axis=0) == pytest.approx(wide[0], abs=0.01)
+    assert np.ptp(found, axis=0) == pytest.approx(np.zeros((4, 3)), abs=1e-4)
+
+
+def test_light_from_behind_takes_the_transmission_colours():
+    palette = {"red": {"diffuse": [0.4, 0.1, 0.2], "diffuse_transmission": [0.5, 0.3, 0.1]}}
+    fabric = coloured("voile", palette=palette, ends=[["red", 1]])
+    found = footprint_colours(fabric, queries(2, np.random.default_rng(1), behind=True))
+    assert found[:, 2] == pytest.approx(np.tile([0.5, 0.3, 0.1], (2, 1)))
+    assert found[:, 0] == pytest.approx(np.tile(fabric.warp.specular_rgb, (2, 1)))
+    assert found[:, 3] == pytest.approx(np.tile(fabric.weft.diffuse_transmission_rgb, (2, 1)))
