@@ -300,6 +300,12 @@ METRICS: Final[dict[str, MetricRow]] = {
             table="truth_calibration",
         ),
         MetricRow("bias", "bias", better="near 0", format="percent", table="truth_bias"),
+        MetricRow("colour_loss", "loss by mean colours", format="percent", table="truth_colours"),
+        MetricRow("colour_bias", "bias of mean colours", better="near 0", format="percent", table="truth_colours"),
+        MetricRow("mean_colours_time", "time of mean colours", unit="s/query", table="truth_colours", of_machine=True),
+        MetricRow(
+            "exact_colours_time", "time of exact colours", unit="s/query", table="truth_colours", of_machine=True
+        ),
         MetricRow("kind_share", "share of the queries", better="", format="percent", table="truth_effort"),
         MetricRow("kind_points", "points a query", unit="points/query", format="grouped", table="truth_effort"),
         MetricRow("kind_time", "time of a query", unit="s/query", table="truth_effort", of_machine=True),

@@ -6,7 +6,7 @@ end (pick) of the draft and repeats on its own: its length need not fit the repe
 
 from __future__ import annotations
 
-from typing import Annotated, Final, NamedTuple, Self
+from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -55,10 +55,10 @@ class PaletteColour(BaseModel):
 
     def on(self, yarn: Yarn) -> Yarn:
         """Return a yarn in this colour; ValidationError if it would make light."""
-        through = self.diffuse_transmission
+        through: Any = self.diffuse_transmission
         if through is None:
-            back = linear_rgb(self.diffuse)
-            through = tuple(min(k, 1.0 - b) for k, b in zip(yarn.diffuse_transmission_rgb, back, strict=True))
+            limits = zip(yarn.diffuse_transmission_rgb, linear_rgb(self.diffuse), strict=True)
+            through = tuple(min(k, 1.0 - back) for k, back in limits)
         specular = yarn.specular if self.specular is None else self.specular
         given = {"specular": specular, "diffuse": self.diffuse, "diffuse_transmission": through}
         return Yarn.model_validate(yarn.model_dump() | given)

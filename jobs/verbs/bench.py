@@ -84,11 +84,11 @@ def stability(out: Path) -> None:
 
 
 def truth(out: Path) -> None:
-    """Measure speed, accuracy, calibration, bias and effort; print the tables and write the Records."""
+    """Measure speed, accuracy, calibration, bias, effort and colours; print the tables and write the Records."""
     from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.tables import truth_rows
-    from reports.truth import accuracy, bias, calibration, effort, throughput
+    from reports.truth import accuracy, bias, calibration, effort, footprint_colours, throughput
 
     console = Terminal()
     with console.status("the truth") as status:
@@ -106,9 +106,11 @@ def truth(out: Path) -> None:
         calibrations = all_of("calibration of errors", calibration.measure())
         biases = all_of("bias", bias.measure())
         efforts = all_of("effort", effort.measure())
+        losses = all_of("colours of threads", footprint_colours.measure())
     records = throughput.RECORDS.to_records(rates) + accuracy.RECORDS.to_records(accuracies)
     records += calibration.RECORDS.to_records(calibrations)
     records += bias.RECORDS.to_records(biases) + effort.RECORDS.to_records(efforts)
+    records += footprint_colours.RECORDS.to_records(losses)
     path = out / TRUTH
     write_records(path, records, this_machine(1))
     console.print(_columns(("what", "fabric", "rate", "note"), truth_rows.rate_rows(records)))
@@ -117,6 +119,7 @@ def truth(out: Path) -> None:
     console.print(_columns(("estimator", *truth_rows.CALIBRATION), truth_rows.calibration_rows(calibrations)))
     console.print(_columns(("fabric", *truth_rows.BIAS), truth_rows.bias_rows(biases)))
     console.print(_columns(("fabric", *truth_rows.EFFORT), truth_rows.effort_rows(efforts)))
+    console.print(_columns(("fabric", *truth_rows.COLOURS), truth_rows.colour_rows(losses)))
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
 
 

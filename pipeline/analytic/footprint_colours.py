@@ -2,8 +2,7 @@
 
 The mean colour of the ends (picks) in the footprint: each thread counts by the footprint's mass on its cells, times the
 share of each cell in which it is seen from straight above. Shadows, highlights and oblique views change these shares;
-pipeline.truth.thread_colours has the exact ones. Whatever the footprint, the mean over the cloth is that of the truth,
-and nothing aliases: the masses are integrals of a Gaussian.
+pipeline.truth.scattering.thread_colours has the exact ones. Nothing aliases: the masses are integrals of a Gaussian.
 """
 
 from __future__ import annotations

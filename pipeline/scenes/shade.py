@@ -53,7 +53,7 @@ def shade(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.ND
     return coloured(components, colours_of(fabric, queries))
 
 
-def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3), from components (N, 4) and the colours of each, (N, 4, 3)."""
     return np.asarray(np.einsum("nc,ncx->nx", np.asarray(components, np.float64), colours))
 

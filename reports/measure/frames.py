@@ -16,7 +16,7 @@ from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.shade import coloured, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
-from pipeline.truth.thread_colours import component_colours
+from pipeline.truth.scattering.thread_colours import component_colours
 from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance

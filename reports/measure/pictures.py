@@ -20,7 +20,7 @@ from pipeline.scenes.options import View
 from pipeline.scenes.shade import coloured, compose, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
-from pipeline.truth.thread_colours import component_colours
+from pipeline.truth.scattering.thread_colours import component_colours
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
 from reports.options import PictureOptions, Role

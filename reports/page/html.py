@@ -32,7 +32,7 @@ from reports.tables.sentences import (
     least_flicker_sentences,
     scene_sentences,
 )
-from reports.truth import accuracy, bias, calibration, effort, sampling
+from reports.truth import accuracy, bias, calibration, effort, footprint_colours, sampling
 from reports.truth.finding import RECORDS as FINDINGS
 
 SECTIONS: Final = {
@@ -180,6 +180,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
         "exceeded": percent(calibration.EXCEEDED),
         "biases": truth_rows.bias_rows(measured["truth_bias"]),
         "efforts": truth_rows.effort_rows(measured["truth_effort"]),
+        "colour_losses": truth_rows.colour_rows(measured["truth_colours"]),
         "samplers": truth_rows.sampler_rows(measured["sampler"]),
         "limit": percent(bias.LIMIT),
         "target": percent(effort.RELATIVE_ERROR),
@@ -188,6 +189,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
             "calibration": truth_rows.CALIBRATION,
             "bias": truth_rows.BIAS,
             "effort": truth_rows.EFFORT,
+            "colours": truth_rows.COLOURS,
             "sampler": truth_rows.SAMPLERS,
         },
         "titles": {name: plain(name) for name in accuracies},
@@ -228,6 +230,7 @@ def truth_measurements(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
         "truth_calibration": calibration.RECORDS.from_records(records),
         "truth_bias": bias.RECORDS.from_records(records),
         "truth_effort": effort.RECORDS.from_records(records),
+        "truth_colours": footprint_colours.RECORDS.from_records(records),
         "sampler": sampling.RECORDS.from_records(records),
     }
 

@@ -30,7 +30,7 @@ from reports.tables.number_format import (
 )
 from reports.tables.readme import three_decimals
 from reports.tables.sentences import equal_time_sentences
-from reports.truth import accuracy, bias, calibration, effort, sampling
+from reports.truth import accuracy, bias, calibration, effort, footprint_colours, sampling
 from weaves.errors import BadInput
 
 
@@ -158,6 +158,7 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     biases, efforts = bias.RECORDS.from_records(records), effort.RECORDS.from_records(records)
     samplers = sampling.RECORDS.from_records(records)
     calibrations = calibration.RECORDS.from_records(records)
+    losses = footprint_colours.RECORDS.from_records(records)
     if rates or accuracies or biases or efforts:
         yield "## The ground truth (`twillight bench truth`)"
     if rates:
@@ -175,6 +176,9 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
     if efforts:
         yield "### Where the time of `auto` goes"
         yield markdown_table(("fabric", *truth_rows.EFFORT), truth_rows.effort_rows(efforts))
+    if losses:
+        yield "### Loss by mean colours of the footprint where ends and picks differ in colour"
+        yield markdown_table(("fabric", *truth_rows.COLOURS), truth_rows.colour_rows(losses))
     if samplers:
         yield "## Sampling directions (`twillight bench sampler`)"
         yield "How many times less variance than a cosine has, and the time of one direction."

@@ -13,6 +13,7 @@ from reports.truth.bias import Bias
 from reports.truth.calibration import Calibration
 from reports.truth.effort import Effort
 from reports.truth.finding import Finding
+from reports.truth.footprint_colours import ColourLoss
 from reports.truth.sampling import SETTINGS, Saving
 
 COMPONENT_TITLES: Final = ("S warp", "S weft", "C warp", "C weft")
@@ -81,6 +82,25 @@ def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
             f"{row.ratio_through:.2f} · {percent(row.exceeded_through, 2)}",
         ]
         for row in sorted(found, key=lambda row: row.estimator)
+    ]
+
+
+COLOURS: Final = ("footprint", "loss", "bias", "time of mean colours", "of exact colours")
+"""Columns of `colour_rows` after the fabric."""
+
+
+def colour_rows(found: Sequence[ColourLoss]) -> list[list[str]]:
+    """Return the rows of the table of colours: fabric, then `COLOURS`."""
+    return [
+        [
+            plain(row.fabric),
+            f"{row.size} yarns",
+            percent(row.loss),
+            f"{100 * row.bias:+.2f} %".replace("-", "−"),
+            f"{1e6 * row.seconds:.2g} µs",
+            f"{1e3 * row.exact_seconds:.2g} ms",
+        ]
+        for row in found
     ]
 
 

@@ -27,7 +27,7 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.shade import coloured, colours_of, compose, shade
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import Queries
-from pipeline.truth.thread_colours import component_colours
+from pipeline.truth.scattering.thread_colours import component_colours
 from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -212,11 +212,10 @@ def read_shot(path: Path) -> Shot:
         cloths = []
         for key, fabric in about["cloths"].items():
             queries = Queries(*(file[f"{key}.{column}"] for column in Queries._fields))
-            rest = (file[f"{key}.{column}"] for column in _COLUMNS)
             cloth = Fabric.model_validate(fabric)
-            plain = cloth.colours is None
-            colours = colours_of(cloth, queries) if plain else file[f"{key}.colours"]
-            cloths.append(ClothQueries(cloth, queries, *rest, colours))
+            columns = {column: file[f"{key}.{column}"] for column in _COLUMNS}
+            colours = colours_of(cloth, queries) if cloth.colours is None else file[f"{key}.colours"]
+            cloths.append(ClothQueries(cloth, queries, **columns, colours=colours))
         return Shot(about["name"], file["base"], cloths)
 
 

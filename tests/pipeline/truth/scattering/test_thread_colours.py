@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.thread_colours import component_colours
+from pipeline.truth.scattering.thread_colours import component_colours
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
 
