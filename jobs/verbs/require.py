@@ -157,7 +157,7 @@ def _queries_of(
         for key, gbuffer in render(loaded, float(index), options.size).gbuffers.items():
             cloth, fabric = loaded.cloths[key]
             fabrics[fabric.name] = (cloth.fabric or key, fabric)
-            found.setdefault(fabric.name, []).append(gbuffer.queries(fabric.weave.repeat))
+            found.setdefault(fabric.name, []).append(gbuffer.queries(fabric.repeat))
     return {
         name: Queries(*(np.concatenate([getattr(part, column) for part in parts]) for column in Queries._fields))
         for name, parts in found.items()

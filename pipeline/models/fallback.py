@@ -23,6 +23,7 @@ from pipeline.compiled.arrays import Float32, Mask
 from pipeline.models.domain import Domain
 from pipeline.models.method import Method
 from pipeline.models.options import RoundFootprint
+from pipeline.scenes.shade import colours_of
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import COARSE_LINE
@@ -119,6 +120,10 @@ class Fallback:
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, (N,), by the fallback; no light changes it."""
         return fallback_rows(fabric, looks, seed)[:, 4]
+
+    def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Return the colours of the components of N queries, (N, 4, 3): the mean colours of their footprints."""
+        return colours_of(fabric, queries).astype(np.float32)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes; all methods share the tables of the fallback."""

@@ -25,13 +25,13 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.frame import Frame, render
-from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import Loaded, Window
-from pipeline.scenes.shade import compose, shade
+from pipeline.scenes.shade import coloured, compose
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.thread_colours import component_colours
 from weaves.fabric import Fabric
 
 QUERIES: Final = 2**20
@@ -57,6 +57,9 @@ class Answerer(Protocol):
     def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
         """Return the transparency of N footprints, (N,)."""
 
+    def colours(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Return the colours of the components of N queries, (N, 4, 3)."""
+
 
 class TruthAnswers:
     """The ground truth."""
@@ -72,6 +75,10 @@ class TruthAnswers:
     def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
         """Return the transparency of N footprints, (N,)."""
         return estimate(fabric, looks, self._options, seed).transparency
+
+    def colours(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Return the colours of the components of N queries, (N, 4, 3): those of their own threads."""
+        return component_colours(fabric, queries, self._options, seed).mean.astype(np.float32)
 
 
 class Part(NamedTuple):
@@ -169,15 +176,15 @@ class _UnderWay:
     ) -> None:
         self._loaded, self._answerer, self._pool, self._names = loaded, answerer, pool, names
         self._window, self._frame = window, frame
-        self._asked = {
-            key: self._ask(answerer.rows, key, gbuffer.queries(self._fabric(key).weave.repeat), "query")
-            for key, gbuffer in frame.gbuffers.items()
-        }
+        queries = {key: gbuffer.queries(self._fabric(key).repeat) for key, gbuffer in frame.gbuffers.items()}
+        self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
+        self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
 
     def part(self, side: int, layers: bool) -> Part:
         """Return the finished window, when its queries are answered."""
         frame = self._frame
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
+        colours = {key: _gathered(asked, (0, 4, 3)) for key, asked in self._colours.items()}
         through = {key: self._transparency(key, answers[key][:, 4]) for key in answers}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}
         for key, gbuffer in frame.gbuffers.items():
@@ -188,7 +195,7 @@ class _UnderWay:
             planes[name] = np.zeros(frame.backdrop.shape, np.float32)
             for key, gbuffer in frame.gbuffers.items():
                 own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
-                planes[name] = compose(gbuffer, self._light(key, gbuffer, own), planes[name])
+                planes[name] = compose(gbuffer, coloured(own, colours[key]), planes[name])
         if layers:
             planes["cloth"] = np.any([gbuffer.mask for gbuffer in frame.gbuffers.values()], axis=0)[..., None]
         planes = {name: _mean(plane, side) for name, plane in planes.items()}
@@ -201,9 +208,6 @@ class _UnderWay:
     def _fabric(self, key: str) -> Fabric:
         return self._loaded.cloths[key][1]
 
-    def _light(self, key: str, gbuffer: GBuffer, components: Float32) -> npt.NDArray[np.float64]:
-        return shade(self._fabric(key), components, gbuffer.transmitted)
-
     def _transparency(self, key: str, known: Float32) -> Float32:
         """Return the transparency of each place, from any of its queries or else asked for; 0 if all behind is dark."""
         gbuffer = self._frame.gbuffers[key]
@@ -212,7 +216,7 @@ class _UnderWay:
         result[gbuffer.place[answered]] = known[answered]
         behind = self._frame.backdrop.reshape(-1, 3)[gbuffer.pixel].any(axis=1)
         rest = np.flatnonzero(np.isnan(result) & behind)
-        looks = gbuffer.looks(self._fabric(key).weave.repeat).take(rest)
+        looks = gbuffer.looks(self._fabric(key).repeat).take(rest)
         result[rest] = _gathered(self._ask(self._answerer.transparency, key, looks, "look"), (0,))
         return np.nan_to_num(result, nan=0.0)
 

@@ -10,6 +10,7 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import Window, load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers, picture, sharpened, windows
+from pipeline.scenes.shade import colours_of
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
@@ -27,6 +28,9 @@ class Flat:
 
     def transparency(self, fabric, looks, seed):
         return np.full(len(looks.u), 0.25, np.float32)
+
+    def colours(self, fabric, queries, seed):
+        return colours_of(fabric, queries).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
