@@ -52,7 +52,7 @@ class Answerer(Protocol):
     """A method that answers any query."""
 
     def rows(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
-        """Return components and transparency of N queries, (N, 5); a transparency may be NaN: it is asked for then."""
+        """Return components and transparency of N queries, (N, 5); a transparency may be NaN: it is queried then."""
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
         """Return the transparency of N footprints, (N,)."""
@@ -209,7 +209,7 @@ class _UnderWay:
         return self._loaded.cloths[key][1]
 
     def _transparency(self, key: str, known: Float32) -> Float32:
-        """Return the transparency of each place, from any of its queries or else asked for; 0 if all behind is dark."""
+        """Return the transparency of each place, from any of its queries or a new one; 0 if all behind is dark."""
         gbuffer = self._frame.gbuffers[key]
         result = np.full(len(gbuffer.pixel), np.nan, np.float32)
         answered = np.isfinite(known)
