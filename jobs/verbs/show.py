@@ -1,6 +1,6 @@
 """`twillight show`: a fabric's drawdown and yarns on the terminal, and its pictures.
 
-Pictures are a lit swatch, drawdown, height and normals as PNG, and the maps of the geometry as EXR.
+Pictures are a lit swatch, the drawdown (also in colours), height and normals as PNG; maps of the geometry are EXR.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pipeline.atomic import atomic_write
 from pipeline.scenes.catalogue import load_scene
 from reports.images import tiles
 from reports.images.exr import write_exr
+from weaves.colour_order import ColourOrder
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, surface_maps
 from weaves.yarn import Yarn
@@ -33,6 +34,7 @@ LEAST_YARNS: Final = 48
 MOST_YARNS: Final = 400
 """Yarns across a swatch, at most: they are a pixel wide."""
 
+_RUNS = 16  # shown of a sequence of colours
 _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"}
 
 
@@ -52,8 +54,8 @@ def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
     tangent as X (along the weft), Y (along the warp) and Z, the yarn (0 warp, 1 weft, 2 gap), and A = 0 in gaps.
     """
     paths = []
-    for kind, draw in (("drawdown", tiles.drawdown), ("height", tiles.height), ("normals", tiles.normals)):
-        paths.append(folder / f"{fabric.name}-{kind}.png")
+    for draw in (tiles.drawdown, tiles.colours, tiles.height, tiles.normals):
+        paths.append(folder / f"{fabric.name}-{draw.__name__}.png")
         atomic_write(paths[-1], draw(fabric))
     surface = surface_maps(fabric, TEXELS_PER_YARN)
     solid = surface.yarn != GAP
@@ -96,9 +98,21 @@ def fabric_page(fabric: Fabric) -> RenderableType:
         Text(fabric.weave.text()),
         Text(""),
         table,
+        *([Text(_colours(fabric.colours))] if fabric.colours else []),
         Text(f"optical thickness {fabric.optical_thickness:g}"),
         Text(fabric.source),
     )
+
+
+def _colours(order: ColourOrder) -> str:
+    """Return the runs of both sequences; of many, the first."""
+    lines = []
+    for axis, runs in (("ends", order.ends), ("picks", order.picks)):
+        shown = ", ".join(f"{count} {name}" for name, count in runs[:_RUNS])
+        more = f", and {len(runs) - _RUNS} more runs" if len(runs) > _RUNS else ""
+        threads = len(order.threads(axis))
+        lines.append(f"{axis}: {shown}{more}; repeats after {threads}" if runs else f"{axis}: all of one colour")
+    return "\n".join(lines)
 
 
 def _value(value: object) -> str:

@@ -32,6 +32,8 @@ SCALE: Final = 2
 CELLS: Final = 16
 """Yarns shown in each direction by the maps of the repeat."""
 CELL_PIXELS: Final = 12
+MOST_CELLS: Final = 512
+"""Most threads, and pixels, shown in each direction by the drawdown in colours."""
 
 Bytes8 = npt.NDArray[np.uint8]
 
@@ -85,6 +87,19 @@ def drawdown(fabric: Fabric) -> bytes:
     lines = np.arange(len(grey)) % CELL_PIXELS == 0
     grey[lines], grey[:, lines] = 190, 190
     return png(_opaque(np.stack([grey] * 3, axis=-1)), 1)
+
+
+def colours(fabric: Fabric) -> bytes:
+    """Return the drawdown in the diffuse colour of the thread on top, the first pick at the bottom.
+
+    It shows the repeat of weave and colours, at least `CELLS` and at most `MOST_CELLS` threads in each direction.
+    """
+    warp, weft = (encoded(threads.diffuse) for threads in fabric.thread_colours())
+    ends, picks = (np.arange(min(max(extent, CELLS), MOST_CELLS)) for extent in fabric.repeat)
+    over = fabric.weave.warp_over[picks[:, None] % fabric.weave.repeat[1], ends % fabric.weave.repeat[0]]
+    shown = np.where(over[..., None], warp[ends % len(warp)][None], weft[picks % len(weft)][:, None])[::-1]
+    side = max(1, MOST_CELLS // max(over.shape))
+    return png(_opaque(shown.repeat(side, axis=0).repeat(side, axis=1)), 1)
 
 
 def height(fabric: Fabric) -> bytes:

@@ -48,6 +48,16 @@ def test_drawdown_starts_at_the_bottom_left():
     assert (cells[picks : 2 * picks, :ends] == fabric.weave.warp_over).all()
 
 
+def test_the_drawdown_in_colours_shows_the_thread_on_top():
+    fabric = load_fabric("houndstooth")
+    picture = decoded(tiles.colours(fabric))
+    side = len(picture) // tiles.CELLS
+    cells = picture[side // 2 :: side, side // 2 :: side, :3][::-1]
+    dark = np.arange(tiles.CELLS) % 8 < 4
+    over = np.tile(fabric.weave.warp_over, (4, 4))
+    assert ((cells.max(axis=-1) < 100) == np.where(over, dark[None, :], dark[:, None])).all()
+
+
 @pytest.mark.parametrize("draw", [tiles.height, tiles.normals])
 def test_maps_repeat_with_the_weave(draw):
     fabric = load_fabric("denim")
