@@ -54,7 +54,7 @@ COMPONENTS: Final = {
     REFINED: Factors(0.85, 0.1, 0.0005, 5.5),
     SAMPLED: Factors(1.0, math.inf, 0.0, 4.7),
     QUADRATURE: Factors(0.14, 0.3, 0.0015, 11.0),
-    QUADRATURE_CURVED: Factors(0.35, 0.15, 0.002, 6.5),
+    QUADRATURE_CURVED: Factors(0.17, 3.0, 0.001, 12.0),
 }
 """Factors of the four components, light and viewer in front of the cloth."""
 
@@ -62,8 +62,8 @@ BEHIND: Final = COMPONENTS | {
     COARSE_TABLE: Factors(0.8, 0.03, 0.002, 6.0),
     FINE_TABLE: Factors(0.8, 0.1, 0.0015, 10.0),
     REFINED: Factors(1.1, 0.1, 0.0005, 5.0),
-    QUADRATURE: Factors(1.0, 0.2, 0.004, 6.0),
-    QUADRATURE_CURVED: Factors(1.0, 0.2, 0.004, 6.0),
+    QUADRATURE: Factors(0.8, 0.2, 0.0035, 9.0),
+    QUADRATURE_CURVED: Factors(0.8, 0.2, 0.0035, 9.0),
 }
 """Factors of the four components, light or viewer behind the cloth: yarns are lit through gaps."""
 

@@ -7,8 +7,9 @@ allowed beyond a bound. Over the queries and the four components of a class,
     ratio     = rms(answer - reference) / rms(standard error), 1 if errors are calibrated,
     exceeded  = share of |answer - reference| > bound, .3 % at most.
 
-Errors have heavy tails: of a thousand queries, ten may hold half the square of the errors. The interval of a ratio is a
-bootstrap over queries, and a ratio is wrong only if its interval lies outside `RATIOS`.
+Errors have heavy tails: of a thousand queries, ten may hold half the square of the errors. So a ratio has an interval,
+by the bootstrap over queries, and is wrong only if this lies outside `RATIOS`; a share is wrong only if a binomial test
+says that it is above `EXCEEDED`. Both at `LEVEL`.
 """
 
 from __future__ import annotations
@@ -99,7 +100,9 @@ class Calibration:
     @property
     def holds(self) -> bool:
         """True unless errors of the components are not calibrated, or beyond their bounds."""
-        return self.low <= RATIOS[1] and self.high >= RATIOS[0] and self.exceeded <= EXCEEDED
+        values = 4 * self.count
+        beyond = stats.binomtest(round(self.exceeded * values), values, EXCEEDED, alternative="greater")
+        return self.low <= RATIOS[1] and self.high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - LEVEL
 
 
 def measure(
