@@ -88,7 +88,7 @@ def render(
     gbuffers = {}
     shown = np.zeros(aovs["uv"].shape[:2], np.bool_)
     for key, (cloth, _) in loaded.cloths.items():
-        mask = np.isin(aovs["shape_index"][..., 0], np.array(loaded.worn[key]) + 1)
+        mask = np.isin(aovs["shape_index"][..., 0], loaded.worn[key])
         gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
         shown |= mask
     something = aovs["shape_index"][..., 0] > 0

@@ -76,7 +76,8 @@ def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
     if distant:
         return Light(True, _vector(sample.d), _vector(power))
     place = _vector(sample.p)
-    seen_from.p = mi.Point3f(place[0] + 1.0, place[1], place[2])
+    x, y, z = place.tolist()  # Mitsuba's LLVM variant takes no numbers of NumPy
+    seen_from.p = mi.Point3f(x + 1.0, y, z)
     return Light(False, place, _vector(emitter.sample_direction(seen_from, mi.Point2f(0.5, 0.5))[1]))
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.scenes.aovs import shape_numbers
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
@@ -104,7 +105,7 @@ class Loaded:
     cloths : dict
         The cloth of each key, and its fabric.
     worn : dict
-        For every key the indices of the shapes that wear it, in the order of `world.shapes()`.
+        For every key the numbers of the shapes that wear it (`pipeline.scenes.aovs.shape_numbers`).
     lights : list of Light
         What shines.
     camera : Camera
@@ -137,10 +138,12 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
     world = _world(mi, scene, where)
     shapes = world.shapes()
     worn: dict[str, list[int]] = {}
-    for index, shape in enumerate(shapes):
+    wearing: dict[str, list[Any]] = {}
+    for number, shape in zip(shape_numbers(mi, shapes), shapes, strict=True):
         key = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if key.startswith(PREFIX):
-            worn.setdefault(key.removeprefix(PREFIX), []).append(index)
+            worn.setdefault(key.removeprefix(PREFIX), []).append(number)
+            wearing.setdefault(key, []).append(shape)
             if shape.is_mesh() and not _has_uv(mi, shape):
                 raise BadInput(
                     where, "shape", shape.id() or shape.class_name(), "a shape that wears a fabric needs uv coordinates"
@@ -153,7 +156,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
             raise BadInput(where, f"cloths.{key}", key, f"no shape has the bsdf {PREFIX + key!r}; {nearest(key, worn)}")
     described = {key: scene.cloths.get(key, Cloth()) for key in worn}
     cloths = {key: (cloth, _fabric(where, key, cloth)) for key, cloth in described.items()}
-    dressed = [shapes[index] for indices in worn.values() for index in indices]
+    dressed = [shape for shapes_of_cloth in wearing.values() for shape in shapes_of_cloth]
     lights = lights_of(mi, world, where, options)
     rest = [*(shape for shape in shapes if shape not in dressed), *world.emitters()]
     return Loaded(

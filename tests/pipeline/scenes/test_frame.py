@@ -10,6 +10,7 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.shipped.dinner_table import TABLE
 from pipeline.scenes.shipped.sphere import SPHERE
 from pipeline.scenes.variant import llvm_works
 from pipeline.truth.query import faults
@@ -233,3 +234,15 @@ def test_variants_agree():
         # Places on the edge of two triangles may fall to either.
         assert np.isclose(a, b, rtol=1e-3, atol=1e-4).mean() > 0.99, name
     assert abs(len(one.place) - len(other.place)) < 0.002 * len(one.place)
+
+
+@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+def test_variants_agree_on_who_wears_what_and_on_the_lamp():
+    """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""
+    one, other = (
+        render(load(TABLE, o), size=SIZE) for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
+    )
+    for key, gbuffer in one.gbuffers.items():
+        assert (gbuffer.mask == other.gbuffers[key].mask).mean() > 0.999 and gbuffer.mask.any(), key
+        total = [found.gbuffers[key].irradiance.sum(axis=0) for found in (one, other)]
+        np.testing.assert_allclose(*total, rtol=2e-3)
