@@ -152,6 +152,28 @@ def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
     assert (tmp_path / "a.png").read_bytes() == b"before"
 
 
+OWN = """
+<scene version="3.0.0">
+  <sensor type="perspective"><transform name="to_world"><lookat origin="0,-3,2" target="0,0,0" up="0,0,1"/></transform>
+    <film type="hdrfilm"><integer name="width" value="20"/><integer name="height" value="10"/></film></sensor>
+  <emitter type="directional"><vector name="direction" value="0.3,0.2,-1"/></emitter>
+  <shape type="rectangle"><bsdf type="diffuse" id="fabric_mine"/></shape>
+</scene>
+"""
+
+
+def test_a_mitsuba_file_has_its_own_size_and_wears_the_fabric_that_is_named(render, tmp_path):
+    (tmp_path / "own.xml").write_text(OWN)
+    code, _, complaint = render("own.xml", "--out", "a.exr", "--method", "soft_nodes")
+    assert code == 2 and "fabric_mine" in complaint
+    fabric = load_fabric("denim").model_copy(update={"name": "mine"})
+    (tmp_path / "mine.toml").write_text(fabric.to_toml())
+    assert render("own.xml", "--out", "a.exr", "--method", "soft_nodes", "--fabric", "mine.toml")[0] == 0
+    exr = read_exr(tmp_path / "a.exr")
+    assert exr.channels["R"].shape == (10, 20) and exr.attributes["fabrics"] == "1 mine"
+    assert exr.stack(*"RGB")[exr.channels["A"] == 1].mean() > 0.05
+
+
 BARE = '<scene version="3.0.0"><shape type="sphere"/></scene>'
 
 
