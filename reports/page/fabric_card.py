@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
 
 from reports.images.tiles import EXPOSURE, hex_colour
 from reports.tables.number_format import plain
 from weaves.fabric import Fabric
+
+MOST_CHIPS: Final = 8
+"""Most different colours shown of a yarn's threads."""
 
 
 def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     """Return the title, weave, source and yarns of a fabric as text, and the colours of the yarns."""
     ends, picks = fabric.weave.repeat
     yarns = []
-    average = fabric.average()
-    for family, yarn in (("warp", average.warp), ("weft", average.weft)):
+    families = zip(("warp", "weft"), (fabric.warp, fabric.weft), fabric.thread_colours(), strict=True)
+    for family, yarn, threads in families:
         numbers = [
             f"{yarn.bend:.3g}°",
             f"{yarn.twist:.3g}°".replace("-", "−"),
@@ -22,7 +28,7 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
             f"{yarn.relief:.3g}",
             f"{yarn.width:.3g}",
         ]
-        colours = [hex_colour([EXPOSURE * c for c in rgb]) for rgb in (yarn.diffuse_rgb, yarn.specular_rgb)]
+        colours = [(kind, shown) for kind in ("diffuse", "specular") for shown in _chips(getattr(threads, kind))]
         yarns.append({"family": family, "cells": numbers, "colours": colours})
     return {
         "name": fabric.name,
@@ -33,3 +39,8 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
         "source": fabric.source,
         "yarns": yarns,
     }
+
+
+def _chips(threads: npt.NDArray[np.float64]) -> list[str]:
+    """Return the different colours of some threads (n, 3) as they are shown, in their order."""
+    return list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in threads))[:MOST_CHIPS]

@@ -157,7 +157,8 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
         shown = {file.stem: film(read_exr(file.path)) for file in files}
         yield f"film-{scene}.png", filmstrip(shown, liveliest(shown))
     for fabric, _ in page.fabrics:
-        for kind, draw in (("drawdown", tiles.drawdown), ("height", tiles.height), ("normals", tiles.normals)):
+        drawdown = tiles.drawdown if fabric.colours is None else tiles.colours
+        for kind, draw in (("drawdown", drawdown), ("height", tiles.height), ("normals", tiles.normals)):
             yield f"{fabric.name}-{kind}.png", draw(fabric)
     spheres = [exr for (fabric, scene), exr in truths.items() if fabric and scene == "sphere"]
     if spheres:
