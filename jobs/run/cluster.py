@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -176,5 +177,10 @@ def _local(workers: int) -> Iterator[Any]:
             yield client
         finally:
             with ends_deferred(), interrupts_held():
-                client.close()  # type: ignore[no-untyped-call]
-                cluster.close()
+                try:
+                    client.close()  # type: ignore[no-untyped-call]
+                    cluster.close()
+                except TimeoutError:
+                    # On a busy machine a worker may not end in time while it compiles; its products are whole or not.
+                    for worker in multiprocessing.active_children():
+                        worker.kill()

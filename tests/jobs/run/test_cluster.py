@@ -256,6 +256,24 @@ def test_a_stranger_gets_no_answer_from_the_cluster_on_this_machine():
         assert client.submit(os.getpid).result() != os.getpid()
 
 
+def test_a_cluster_that_does_not_end_in_time_is_killed(monkeypatch):
+    """As on a busy machine, where a worker compiles while it is to end."""
+    from distributed import LocalCluster
+
+    left = []
+
+    def close(cluster, timeout=None):
+        left.append(cluster)
+        raise TimeoutError
+
+    with monkeypatch.context() as patched, connected(HERE, 1, str) as client:
+        worker = psutil.Process(client.submit(os.getpid).result())
+        patched.setattr(LocalCluster, "close", close)
+    psutil.wait_procs([worker], timeout=20)
+    assert not worker.is_running()
+    left[0].close()
+
+
 def listening():
     """Return the ports at which this process and those it started wait for others."""
     driver = psutil.Process()
