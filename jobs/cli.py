@@ -162,27 +162,35 @@ def export(
     *,
     mesh: Annotated[Local | None, Parameter(help="Triangle mesh to write, ending in .ply.")] = None,
     wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
+    maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
     vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
     repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
+    size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
 ) -> None:
-    """Write a fabric for other programs: its surface as a mesh, or its draft."""
+    """Write a fabric for other programs: a mesh, a draft, or texture maps and materials."""
     from jobs.terminal import Terminal
     from weaves.fabric import load_fabric
 
     cloth = load_fabric(fabric)
-    if (mesh is None) == (wif is None):
-        raise BadInput("export", "", f"{'no' if mesh is None else 'more than one'} file", "--mesh or --wif is needed")
+    chosen = [option for option, path in (("--mesh", mesh), ("--wif", wif), ("--maps", maps)) if path is not None]
+    if len(chosen) != 1:
+        raise BadInput("export", "", " and ".join(chosen) or "nothing", "one of --mesh, --wif and --maps is needed")
+    for option, value, owner in (("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps)):
+        if value is not None and owner is None:
+            raise BadInput("export", option, value, f"is not for {chosen[0]}; leave it out")
     if mesh is not None:
         from jobs.verbs.exchange.export_mesh import write_mesh
 
         triangles = write_mesh(cloth, mesh, 64 if vertices is None else vertices, 1 if repeats is None else repeats)
         said = f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up"
-    else:
+    elif wif is not None:
         from jobs.verbs.exchange.export_draft import write_draft
 
-        if vertices is not None or repeats is not None:
-            raise BadInput("export", "--wif", str(wif), "--vertices and --repeats are for --mesh alone")
-        said = write_draft(cloth, Path(str(wif)))
+        said = write_draft(cloth, wif)
+    else:
+        from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
+
+        said = export_maps(cloth, Path(str(maps)), SIZE if size is None else size)
     Terminal().print(said, soft_wrap=True)
 
 

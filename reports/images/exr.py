@@ -43,6 +43,7 @@ def write_exr(
     channels: Mapping[str, npt.ArrayLike],
     attributes: Mapping[str, str | int | float] | None = None,
     half: Collection[str] = (),
+    durable: bool = True,
 ) -> None:
     """Write a picture whole or not at all.
 
@@ -56,13 +57,15 @@ def write_exr(
         Metadata; names may not be those that OpenEXR itself uses.
     half : collection of str
         Channels that are stored as float16; the others are float32.
+    durable : bool
+        As for `pipeline.atomic.atomic_path`.
     """
     kinds = {name: np.float16 if name in half else np.float32 for name in channels}
     planes = {name: np.ascontiguousarray(plane, dtype=kinds[name]) for name, plane in channels.items()}
     if len({plane.shape for plane in planes.values()}) != 1 or next(iter(planes.values())).ndim != 2:
         raise ValueError(f"channels must be planes of one size, got { ({n: p.shape for n, p in planes.items()}) }")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **(attributes or {})}
-    with atomic_path(path) as temporary, OpenEXR.File(header, planes) as file:
+    with atomic_path(path, durable=durable) as temporary, OpenEXR.File(header, planes) as file:
         file.write(str(temporary))
 
 

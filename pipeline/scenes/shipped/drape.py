@@ -8,18 +8,22 @@ the hem, that hide light and view from one another. uv are the flat cloth's own 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pipeline.scenes.scene import Cloth, Scene
-from pipeline.scenes.shipped.sheet import camera, developed, sheet, sun
+from pipeline.scenes.shipped.sheet import Floats, camera, developed, sheet, sun
+
+DRAPE_YARNS: Final = 80.0
+"""Yarns along a unit of uv."""
 
 _FOLDS = 7
 _ROWS, _COLUMNS = 24, 2048
 
 
-def _build(mi: Any) -> dict[str, Any]:
+def drape_surface() -> tuple[Floats, Floats, Floats]:
+    """Return points (R, C, 3), unit normals (R, C, 3) and uv (R, C, 2) of the cloth; z is up."""
     turn = np.linspace(0.0, 2.0 * np.pi, _COLUMNS + 1)
     # Latitude from straight down; the waves are uneven, as folds are.
     wave = np.cos(_FOLDS * turn + 0.8 * np.sin(2.0 * turn)) * (1.0 + 0.3 * np.sin(3.0 * turn + 1.0))
@@ -30,9 +34,13 @@ def _build(mi: Any) -> dict[str, Any]:
     radius = np.linspace(0.25, 1.6, _ROWS + 1)[::-1, None]
     points = radius[..., None] * curve
     uv = np.stack([radius * np.sin(angle), -radius * np.cos(angle)], axis=-1)
+    return points, np.broadcast_to(normal, points.shape), uv
+
+
+def _build(mi: Any) -> dict[str, Any]:
     return {
         "type": "scene",
-        "cloth": sheet(mi, "wool_gabardine", points, np.broadcast_to(normal, points.shape), uv),
+        "cloth": sheet(mi, "wool_gabardine", *drape_surface()),
         "sun": sun(mi, [-0.75, -0.6, 0.45], 3.0),
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": [0.12, 0.13, 0.15]}},
         "camera": camera(mi, [0, -3.6, -0.55], [0, 0, -0.88], 24, (256, 192)),
@@ -42,7 +50,7 @@ def _build(mi: Any) -> dict[str, Any]:
 DRAPE = Scene(
     name="drape",
     source=_build,
-    cloths={"wool_gabardine": Cloth(yarns=(80.0, 80.0))},
+    cloths={"wool_gabardine": Cloth(yarns=(DRAPE_YARNS, DRAPE_YARNS))},
     frames=24,
     step=(0.003, 0.001, 0.0),
 )

@@ -1,0 +1,203 @@
+"""A draped sample of a cloth as GLB, in metres, y up: the shape of the scene `drape` with the cloth's material.
+
+Base colour with opacity, metallic-roughness, normal, and the extensions of glTF 2.0 [Khronos2021GLTF]
+KHR_materials_anisotropy, KHR_materials_specular (coloured), KHR_materials_ior and KHR_materials_sheen. Gaps are
+transparent by `alphaMode`. Light that goes diffusely through yarns has no ratified extension and is left out.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jobs.verbs.exchange.maps.about import spacing_cm, yarns_per_cm
+from pipeline.materials.layout import Layout
+from pipeline.materials.lobes import SHEEN_ROUGHNESS
+from pipeline.materials.textures import Constants, Textures, across_direction, gltf_strength
+from pipeline.scenes.shipped.drape import DRAPE_YARNS, drape_surface
+from reports.images.texture import png_bytes
+from weaves.fabric import Fabric
+
+FILE: Final = "sample.glb"
+
+LARGEST_TEXTURE: Final = 1024
+"""Longest side of the textures in the file."""
+
+Floats = npt.NDArray[np.float64]
+
+
+class _Mesh(NamedTuple):
+    """Vertices in metres, y up, with unit normals and tangents, texture coordinates, and triangles."""
+
+    points: Floats
+    normals: Floats
+    tangents: Floats
+    uv: Floats
+    faces: npt.NDArray[np.uint32]
+
+
+def write_sample(path: Path, fabric: Fabric, found: Layout, level: Textures, material: Constants) -> None:
+    """Write the sample.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, ending in ``.glb``.
+    fabric : Fabric
+        The cloth.
+    found : Layout
+        Yarns of a map.
+    level : Textures
+        Maps of the level to embed.
+    material : Constants
+        Numbers that hold for all texels.
+    """
+    import pygltflib as gltf
+
+    file = _File(gltf)
+    mesh = _draped(fabric, found)
+    attributes = gltf.Attributes(
+        POSITION=file.vertices(mesh.points, gltf.VEC3),
+        NORMAL=file.vertices(mesh.normals, gltf.VEC3),
+        TANGENT=file.vertices(mesh.tangents, gltf.VEC4),
+        TEXCOORD_0=file.vertices(mesh.uv, gltf.VEC2),
+    )
+    primitive = gltf.Primitive(attributes=attributes, indices=file.triangles(mesh.faces), material=0)
+    document = file.document
+    document.meshes.append(gltf.Mesh(name=fabric.name, primitives=[primitive]))
+    document.nodes.append(gltf.Node(name=fabric.name, mesh=0))
+    document.scenes.append(gltf.Scene(nodes=[0]))
+    document.scene = 0
+    document.materials.append(_material(gltf, file, fabric.name, level, material))
+    document.asset = gltf.Asset(version="2.0", generator="twillight")
+    file.finish(path)
+
+
+def _material(gltf: Any, file: _File, name: str, level: Textures, material: Constants) -> Any:
+    """Return the material of the sample; its textures are added to the file."""
+    ones = np.ones_like(level.opacity)
+    surface = np.stack([ones, np.sqrt(level.alpha_along), 0.0 * ones], axis=-1)
+    strength = gltf_strength(level.alpha_along, level.alpha_across)
+    direction = 0.5 + 0.5 * across_direction(level.normal, level.tangent)
+    colour = np.concatenate([level.base_color, level.opacity[..., None]], axis=-1)
+    base = file.texture("base_color", png_bytes(colour if material.open_cloth else level.base_color, "colour"))
+    specular = file.texture("specular_color", png_bytes(level.specular_color, "colour"))
+    turned = file.texture("anisotropy", png_bytes(np.concatenate([direction, strength[..., None]], axis=-1), "share"))
+    extensions: dict[str, Any] = {
+        "KHR_materials_anisotropy": {"anisotropyStrength": 1.0, "anisotropyTexture": {"index": turned}},
+        "KHR_materials_specular": {"specularFactor": 1.0, "specularColorTexture": {"index": specular}},
+        "KHR_materials_ior": {"ior": material.ior},
+        "KHR_materials_sheen": {
+            "sheenColorFactor": material.sheen.tolist(),
+            "sheenRoughnessFactor": SHEEN_ROUGHNESS,
+        },
+    }
+    file.document.extensionsUsed = sorted(extensions)
+    return gltf.Material(
+        name=name,
+        doubleSided=True,
+        alphaMode=gltf.BLEND if material.open_cloth else gltf.OPAQUE,
+        alphaCutoff=None,
+        pbrMetallicRoughness=gltf.PbrMetallicRoughness(
+            baseColorTexture=gltf.TextureInfo(index=base),
+            metallicRoughnessTexture=gltf.TextureInfo(index=file.texture("roughness", png_bytes(surface, "share"))),
+            metallicFactor=0.0,
+            roughnessFactor=1.0,
+        ),
+        normalTexture=gltf.NormalMaterialTexture(
+            index=file.texture("normal", png_bytes(0.5 + 0.5 * level.normal, "direction"))
+        ),
+        extensions=extensions,
+    )
+
+
+class _File:
+    """A glTF document with one buffer, filled part by part."""
+
+    def __init__(self, gltf: Any) -> None:
+        self.gltf = gltf
+        self.document = gltf.GLTF2()
+        linear, repeat = gltf.LINEAR_MIPMAP_LINEAR, gltf.REPEAT
+        self.document.samplers.append(gltf.Sampler(magFilter=gltf.LINEAR, minFilter=linear, wrapS=repeat, wrapT=repeat))
+        self._bytes = b""
+
+    def vertices(self, values: Floats, kind: str) -> int:
+        """Add an attribute of the vertices, and return its index."""
+        single = np.ascontiguousarray(values, np.float32)
+        view = self._view(single.tobytes(), self.gltf.ARRAY_BUFFER)
+        low, high = (single.min(axis=0).tolist(), single.max(axis=0).tolist())
+        return self._accessor(view, self.gltf.FLOAT, len(single), kind, low, high)
+
+    def triangles(self, faces: npt.NDArray[np.uint32]) -> int:
+        """Add the corners of the triangles, and return their index."""
+        view = self._view(np.ascontiguousarray(faces, np.uint32).tobytes(), self.gltf.ELEMENT_ARRAY_BUFFER)
+        low, high = [int(faces.min())], [int(faces.max())]
+        return self._accessor(view, self.gltf.UNSIGNED_INT, faces.size, self.gltf.SCALAR, low, high)
+
+    def texture(self, name: str, png: bytes) -> int:
+        """Add a picture as a texture, and return its index."""
+        view = self._view(png, None)
+        self.document.images.append(self.gltf.Image(name=name, bufferView=view, mimeType=self.gltf.IMAGEPNG))
+        self.document.textures.append(self.gltf.Texture(sampler=0, source=len(self.document.images) - 1))
+        return len(self.document.textures) - 1
+
+    def finish(self, path: Path) -> None:
+        """Write the file."""
+        self.document.buffers.append(self.gltf.Buffer(byteLength=len(self._bytes)))
+        self.document.set_binary_blob(self._bytes)
+        self.document.save_binary(str(path))
+
+    def _view(self, content: bytes, target: int | None) -> int:
+        start = len(self._bytes)
+        view = self.gltf.BufferView(buffer=0, byteOffset=start, byteLength=len(content), target=target)
+        self.document.bufferViews.append(view)
+        self._bytes += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
+        return len(self.document.bufferViews) - 1
+
+    def _accessor(self, view: int, component: int, count: int, kind: str, low: list[Any], high: list[Any]) -> int:
+        accessor = self.gltf.Accessor(
+            bufferView=view, componentType=component, count=count, type=kind, min=low, max=high
+        )
+        self.document.accessors.append(accessor)
+        return len(self.document.accessors) - 1
+
+
+def _draped(fabric: Fabric, found: Layout) -> _Mesh:
+    """Return the mesh of the scene `drape`, in the size in which the cloth's yarns have their spacing."""
+    points, normals, lengths = drape_surface()
+    metres = DRAPE_YARNS * spacing_cm(fabric) / 100.0
+    per_cm = np.array(yarns_per_cm(fabric))
+    # Texture coordinates count maps; those of glTF run downwards.
+    uv = lengths * metres * 100.0 * per_cm / (found.ends, found.picks)
+    tangents = _tangents(points, normals, uv)
+    rows, columns = points.shape[:2]
+    corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return _Mesh(
+        _upright(points.reshape(-1, 3)) * metres,
+        _upright(normals.reshape(-1, 3)),
+        np.concatenate([_upright(tangents[..., :3].reshape(-1, 3)), tangents[..., 3:].reshape(-1, 1)], axis=-1),
+        (uv * (1.0, -1.0) + (0.0, 1.0)).reshape(-1, 2),
+        faces,
+    )
+
+
+def _tangents(points: Floats, normals: Floats, uv: Floats) -> Floats:
+    """Return the unit direction of growing u at every vertex, and 1 where growing v is at its left, else -1."""
+    (p_row, p_column), (t_row, t_column) = (np.gradient(values, axis=(0, 1)) for values in (points, uv))
+    determinant = t_column[..., 0] * t_row[..., 1] - t_row[..., 0] * t_column[..., 1]
+    along_u = (p_column * t_row[..., 1:] - p_row * t_column[..., 1:]) / determinant[..., None]
+    along_v = (p_row * t_column[..., :1] - p_column * t_row[..., :1]) / determinant[..., None]
+    along_u = along_u - normals * (along_u * normals).sum(axis=-1, keepdims=True)
+    along_u /= np.linalg.norm(along_u, axis=-1, keepdims=True)
+    left = (np.cross(normals, along_u) * along_v).sum(axis=-1, keepdims=True)
+    return np.concatenate([along_u, np.where(left < 0.0, -1.0, 1.0)], axis=-1)
+
+
+def _upright(vectors: Floats) -> Floats:
+    """Turn vectors from z up to y up."""
+    return np.stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]], axis=-1)

@@ -1,0 +1,165 @@
+"""Sums of a fabric's surface over the texels of a map, and their mip levels.
+
+A texel holds sums over its points, weighted by the coverage c (1 on a yarn, 0 in a gap). They are linear, so a texel
+of the next mip level is the mean of four texels, and nothing that differs below a texel is lost:
+
+    normals    c n
+    fibres     c (1 - alpha^2) t t^T,    by which the mean flake matrix is S = I - (1 - alpha^2) E[t t^T]
+    colours    c k, for each of k_d, k_s and k_dt times the reflectance of its family
+
+S is the matrix of SGGX microflakes of fibres along t with roughness alpha. Its mean over a texel is the flake matrix
+of the texel [Heitz2015SGGX, section 5]: it holds the variance of the fibres' directions, as LEAN mapping holds that of
+normals [Olano2010LEAN].
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.compiled.arrays import Float32, Float64
+from pipeline.materials.layout import Layout
+from pipeline.materials.reflectance import Reflectance
+from weaves.fabric import Fabric
+from weaves.surface import GAP, WARP, Surface, surface_at
+
+SAMPLES_PER_YARN: Final = 16
+"""Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
+
+PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Axes of the six stored entries of a symmetric matrix."""
+
+_BAND: Final = 1 << 18
+"""Points evaluated at once."""
+
+
+class Planes(NamedTuple):
+    """Means over the texels of one level, float32 (H, W) and (H, W, n), pick 0 in row 0.
+
+    Attributes
+    ----------
+    coverage : (H, W)
+        Share of the texel that is covered.
+    height : (H, W)
+        Height in yarn spacings; gaps count as the lowest point of the cloth.
+    normal : (H, W, 3)
+        c n.
+    fibres : (H, W, 6)
+        c (1 - alpha^2) t t^T, entries in the order of `PAIRS`.
+    base, specular, through : (H, W, 3)
+        c times the diffuse, the specular and the transmitted colour, linear RGB.
+    """
+
+    coverage: Float32
+    height: Float32
+    normal: Float32
+    fibres: Float32
+    base: Float32
+    specular: Float32
+    through: Float32
+
+    def halved(self) -> Planes:
+        """Return the next mip level: half of each side that is longer than one texel."""
+        return Planes(*(_halved(plane) for plane in self))
+
+
+def planes(fabric: Fabric, found: Layout, share: Reflectance) -> Planes:
+    """Sum a fabric's surface over the texels of the finest level.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    found : Layout
+        Yarns and texels of the map.
+    share : Reflectance
+        Reflectance of the families.
+    """
+    per_texel = _samples(found)
+    width, height = found.width * per_texel, found.height * per_texel
+    lowest = _lowest(fabric)
+    x = (np.arange(width) + 0.5) * (found.ends / width)
+    y = (np.arange(height) + 0.5) * (found.picks / height)
+    rows = max(1, _BAND // width // per_texel) * per_texel
+    bands = []
+    for first in range(0, height, rows):
+        surface = surface_at(fabric, x[None, :], y[first : first + rows, None])
+        sums = _sums(fabric, surface, x, y[first : first + rows], share, lowest)
+        for _ in range(per_texel.bit_length() - 1):
+            sums = sums.halved()
+        bands.append(sums)
+    return Planes(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
+
+
+def yarn_ids(fabric: Fabric, found: Layout) -> npt.NDArray[np.int32]:
+    """Return the number of the yarn at each texel centre, (H, W): 0 in gaps, then the ends, then the picks."""
+    x = (np.arange(found.width) + 0.5) * (found.ends / found.width)
+    y = (np.arange(found.height) + 0.5) * (found.picks / found.height)
+    rows = max(1, _BAND // found.width)
+    bands = []
+    for first in range(0, found.height, rows):
+        part = y[first : first + rows]
+        yarn = surface_at(fabric, x[None, :], part[:, None]).yarn
+        end, pick = 1 + x.astype(np.int32), 1 + found.ends + part.astype(np.int32)
+        bands.append(np.where(yarn == GAP, 0, np.where(yarn == WARP, end[None, :], pick[:, None])).astype(np.int32))
+    return np.concatenate(bands)
+
+
+def _samples(found: Layout) -> int:
+    """Return the points of a texel along each side, a power of two."""
+    count = 1
+    while count * found.texels_per_yarn < SAMPLES_PER_YARN:
+        count *= 2
+    return count
+
+
+def _lowest(fabric: Fabric) -> float:
+    """Return the lowest height of the yarns."""
+    ends, picks = fabric.weave.repeat
+    count = max(8, min(64, 1024 // max(ends, picks)))
+    x, y = ((np.arange(extent * count) + 0.5) / count for extent in (ends, picks))
+    height = surface_at(fabric, x[None, :], y[:, None]).height
+    return float(height[np.isfinite(height)].min())
+
+
+def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, share: Reflectance, lowest: float) -> Planes:
+    """Return the sums of single points."""
+    yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
+    tangent = surface.tangent
+    smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
+    fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
+    colours = (_colours(fabric, surface, x, y, kind, share) for kind in range(3))
+    return Planes(
+        *(
+            np.asarray(plane, np.float32)
+            for plane in (
+                covered[..., 0],
+                np.where(np.isfinite(surface.height), surface.height, lowest),
+                covered * surface.normal,
+                fibres,
+                *colours,
+            )
+        )
+    )
+
+
+def _colours(fabric: Fabric, surface: Surface, x: Float64, y: Float64, kind: int, share: Reflectance) -> Float64:
+    """Return the diffuse (0), specular (1) or transmitted (2) colour of points, 0 in gaps."""
+    name = ("diffuse", "specular", "diffuse_transmission")[kind]
+    factor = share.per_area((share.diffuse, share.specular, share.transmitted)[kind])
+    ends, picks = (getattr(colours, name) * factor[family] for family, colours in enumerate(fabric.thread_colours()))
+    of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
+    yarn = surface.yarn[..., None]
+    on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])
+    return np.asarray(np.where(yarn == GAP, 0.0, on_yarn))
+
+
+def _halved(plane: Float32) -> Float32:
+    """Return the means of two by two texels."""
+    if plane.shape[0] > 1:
+        plane = 0.5 * (plane[0::2] + plane[1::2])
+    if plane.shape[1] > 1:
+        plane = 0.5 * (plane[:, 0::2] + plane[:, 1::2])
+    return np.asarray(plane, np.float32)
