@@ -26,6 +26,12 @@ _DIRECTIONS: Final = 4096
 _VIEWS: Final = tuple(math.radians(a) for a in (5.0, 35.0, 65.0, 95.0, 125.0, 155.0))
 
 
+def ggx_density(half: Float64, along: float, across: float) -> Float64:
+    """Return D at unit half vectors (N, 3), (N,), in 1/sr; parameters as for `ggx`."""
+    scaled = half / (along, across, 1.0)
+    return np.asarray(1.0 / (math.pi * along * across * (scaled**2).sum(axis=-1) ** 2))
+
+
 def ggx(wi: Float64, wo: Float64, along: float, across: float, f0: Float64) -> Float64:
     """Return the GGX lobe without the incident cosine.
 
@@ -47,14 +53,12 @@ def ggx(wi: Float64, wo: Float64, along: float, across: float, f0: Float64) -> F
     """
     half = wi + wo
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    scaled = half / (along, across, 1.0)
-    density = 1.0 / (math.pi * along * across * (scaled**2).sum(axis=-1) ** 2)
 
     def masking(w: Float64) -> Float64:
         slopes = ((along * w[..., 0]) ** 2 + (across * w[..., 1]) ** 2) / w[..., 2] ** 2
         return np.asarray(0.5 * (np.sqrt(1.0 + slopes) - 1.0))
 
-    common = density / (1.0 + masking(wi) + masking(wo)) / (4.0 * wi[:, 2] * wo[2])
+    common = ggx_density(half, along, across) / (1.0 + masking(wi) + masking(wo)) / (4.0 * wi[:, 2] * wo[2])
     fresnel = f0 + (1.0 - f0) * ((1.0 - np.clip(half @ wo, 0.0, 1.0)) ** 5)[:, None]
     return np.asarray(fresnel * common[:, None])
 

@@ -80,8 +80,8 @@ def planes(fabric: Fabric, found: Layout, share: Reflectance) -> Planes:
     per_texel = _samples(found)
     width, height = found.width * per_texel, found.height * per_texel
     lowest = _lowest(fabric)
-    x = (np.arange(width) + 0.5) * (found.ends / width)
-    y = (np.arange(height) + 0.5) * (found.picks / height)
+    x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (found.ends / width)
+    y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (found.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
     bands = []
     for first in range(0, height, rows):

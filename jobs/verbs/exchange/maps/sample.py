@@ -188,7 +188,7 @@ def _draped(fabric: Fabric, found: Layout) -> _Mesh:
 
 def _tangents(points: Floats, normals: Floats, uv: Floats) -> Floats:
     """Return the unit direction of growing u at every vertex, and 1 where growing v is at its left, else -1."""
-    (p_row, p_column), (t_row, t_column) = (np.gradient(values, axis=(0, 1)) for values in (points, uv))
+    p_row, p_column, t_row, t_column = (np.asarray(np.gradient(v, axis=a)) for v in (points, uv) for a in (0, 1))
     determinant = t_column[..., 0] * t_row[..., 1] - t_row[..., 0] * t_column[..., 1]
     along_u = (p_column * t_row[..., 1:] - p_row * t_column[..., 1:]) / determinant[..., None]
     along_v = (p_row * t_column[..., :1] - p_column * t_row[..., :1]) / determinant[..., None]

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from pipeline.materials.layout import Layout, layout
+from pipeline.materials.planes import planes, yarn_ids
+from pipeline.materials.reflectance import Reflectance
+from weaves.fabric import load_fabric
+
+HALF = np.full(2, 0.5)
+SHARE = Reflectance(HALF, HALF, HALF / 4, HALF / 2, HALF, HALF / 4)
+
+
+@pytest.mark.parametrize("name", ["denim", "gauze", "gingham"])
+def test_maps_tile_without_a_seam(name):
+    fabric = load_fabric(name)
+    once = layout(fabric, 128)
+    twice = Layout(2 * once.ends, 2 * once.picks, 2 * once.width, 2 * once.height)
+    for one, two in zip(planes(fabric, once, SHARE), planes(fabric, twice, SHARE), strict=True):
+        for dy in (0, once.height):
+            for dx in (0, once.width):
+                part = two[dy : dy + once.height, dx : dx + once.width]
+                np.testing.assert_allclose(part, one, atol=1e-5)
+        for axis in (0, 1):
+            step = np.abs(np.diff(one, axis=axis)).max()
+            seam = np.abs(np.take(one, 0, axis) - np.take(one, -1, axis)).max()
+            assert seam <= step + 1e-6
+
+
+def test_means_over_the_map_are_kept_by_every_level():
+    level = planes(load_fabric("gauze"), layout(load_fabric("gauze"), 64), SHARE)
+    means = [plane.mean(axis=(0, 1)) for plane in level]
+    while level.coverage.size > 1:
+        level = level.halved()
+        for plane, mean in zip(level, means, strict=True):
+            np.testing.assert_allclose(plane.mean(axis=(0, 1)), mean, rtol=1e-4, atol=1e-6)
+
+
+def test_coverage_is_the_area_of_the_yarns():
+    fabric = load_fabric("gauze")
+    level = planes(fabric, layout(fabric, 256), SHARE)
+    open_area = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
+    assert level.coverage.mean() == pytest.approx(1.0 - open_area, abs=0.02)
+    assert np.isfinite(level.height).all()
+
+
+def test_yarns_are_numbered_ends_first():
+    fabric = load_fabric("denim")
+    found = layout(fabric, 64)
+    numbers = yarn_ids(fabric, found)
+    assert sorted(np.unique(numbers)) == list(range(1, 9))
+    over = fabric.weave.warp_over
+    for pick in range(4):
+        for end in range(4):
+            centre = numbers[16 * pick + 8, 16 * end + 8]
+            assert centre == (1 + end if over[pick, end] else 5 + pick)
+    assert set(np.unique(yarn_ids(load_fabric("gauze"), layout(load_fabric("gauze"), 64)))) == {0, 1, 2, 3, 4}
