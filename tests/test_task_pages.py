@@ -41,13 +41,13 @@ def check_pictures(page, made):
         assert np.abs(new - old).mean() < 0.5 / 255, f"{name} is out of date: run `make pictures`"
 
 
-@pytest.mark.parametrize("name", ["weaving_draft"])
-def test_a_page_can_be_followed_word_for_word(name, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("name", "commands"), [("weaving_draft", 4), ("blender", 1)])
+def test_a_page_can_be_followed_word_for_word(name, commands, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
     (tmp_path / "weaves").symlink_to(ROOT / "weaves")
     found = steps(ROOT / "docs" / f"{name}.md")
-    assert len(found) >= 4
+    assert len(found) >= commands
     same = doctest.OutputChecker().check_output
     for (program, *tokens), printed in found:
         assert (program, main(tokens)) == ("twillight", 0)

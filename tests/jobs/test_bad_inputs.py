@@ -258,6 +258,15 @@ export denim --mesh good.json/a.ply --vertices 2
 export denim --mesh folder.ply --vertices 2
 export denim --wif a.txt
 export denim --wif a.wif --mesh a.ply
+export denim --maps a --size 0
+export denim --maps a --size -2048
+export denim --maps a --size 1000000
+export denim --maps a --size {10**30}
+export denim --maps a --size 1000
+export denim --maps a --vertices 8
+export denim --maps good.json
+export denim --maps good.json/a
+export denim --wif a.wif --size 64
 export denim --wif a.wif --repeats 2
 export denim --wif good.json/a.wif
 import nothing.wif --out a.toml

@@ -247,6 +247,7 @@ def test_a_ledger_sees_what_it_has_written(switch, tmp_path):
         ["show", "denim", "--out", "s3://products/a"],
         ["export", "denim", "--mesh", "s3://products/a.ply"],
         ["export", "denim", "--wif", "s3://products/a.wif"],
+        ["export", "denim", "--maps", "s3://products/maps"],
         ["import", "s3://products/a.wif", "--out", "a.toml"],
         ["results", "quick", "--file", "s3://products/a.md"],
     ],

@@ -1,0 +1,209 @@
+"""The folder of maps, read back by other readers, and the sentences for what cannot be written."""
+
+import errno
+import json
+
+import MaterialX
+import numpy as np
+import OpenEXR
+import pygltflib
+import pytest
+import trimesh
+from PIL import Image
+
+from jobs.cli import main
+from jobs.verbs.exchange.maps import export_maps
+from jobs.verbs.exchange.maps.about import AboutMaps
+
+SIZE = 64
+
+
+def call(*tokens):
+    return main(["export", *tokens])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return the maps of an open cloth that lets light through."""
+    made = tmp_path_factory.mktemp("maps") / "gauze"
+    assert call("gauze", "--maps", str(made), "--size", str(SIZE)) == 0
+    return made
+
+
+@pytest.fixture(scope="module")
+def about(folder):
+    return AboutMaps.model_validate_json((folder / "maps.json").read_text(encoding="utf-8"))
+
+
+def test_every_map_is_there_in_every_size(folder, about):
+    assert about.texels == (SIZE, SIZE) and about.yarns == (2, 2)
+    assert about.mip_levels == [(SIZE >> k, SIZE >> k) for k in range(1, 7)]
+    places = {(SIZE, SIZE): folder} | {(w, h): folder / "mips" / f"{w}x{h}" for w, h in about.mip_levels}
+    for (width, height), place in places.items():
+        names = set(about.maps) - ({"yarn_id"} if place != folder else set())
+        assert {path.stem for path in place.glob("*.exr")} == {path.stem for path in place.glob("*.png")} == names
+        for name in names:
+            with Image.open(place / f"{name}.png") as picture:
+                assert picture.size == (width, height)
+            with OpenEXR.File(str(place / f"{name}.exr")) as file:
+                (pixels,) = [channel.pixels for channel in file.channels().values()]
+                assert pixels.shape[:2] == (height, width) and np.isfinite(pixels).all()
+
+
+def exr(folder, name):
+    with OpenEXR.File(str(folder / f"{name}.exr")) as file:
+        (channel,) = file.channels().values()
+        return np.array(channel.pixels, np.float64)
+
+
+def png(folder, name):
+    with Image.open(folder / f"{name}.png") as picture:
+        return np.asarray(picture).astype(float)
+
+
+def test_both_files_of_a_map_hold_the_same(folder, about):
+    for name, row in about.maps.items():
+        values, codes = exr(folder, name), png(folder, name)
+        if row.kind == "number":
+            np.testing.assert_array_equal(values, codes)
+        elif row.kind == "height":
+            low, high = about.height_span
+            np.testing.assert_allclose(low + codes / 65535 * (high - low), values, atol=2e-5)
+        elif row.kind == "colour":
+            shown = np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1 / 2.4) - 0.055)
+            np.testing.assert_allclose(codes / 255, shown, atol=0.004)
+        else:
+            np.testing.assert_allclose(codes / 255, values, atol=0.003)
+
+
+def test_normals_of_both_conventions_differ_in_green_alone(folder):
+    up, down = exr(folder, "normal_opengl"), exr(folder, "normal_directx")
+    np.testing.assert_allclose(up[..., [0, 2]], down[..., [0, 2]])
+    np.testing.assert_allclose(up[..., 1] + down[..., 1], 1.0, atol=1e-3)
+
+
+def test_normals_are_slopes_of_the_height(folder, about):
+    """Green up means: where the height rises towards the top of the picture, green is below a half."""
+    height, normal = exr(folder, "height"), 2.0 * exr(folder, "normal_opengl") - 1.0
+    solid = exr(folder, "opacity") == 1.0
+    inside = solid & np.roll(solid, 1, 0) & np.roll(solid, -1, 0) & (normal[..., 2] > 0.5)
+    per_row = about.yarns[1] / SIZE
+    towards_top = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / (2 * per_row)
+    slope = -normal[..., 1] / normal[..., 2]
+    assert np.median(np.abs(towards_top - slope)[inside]) < 0.05
+
+
+def test_sizes_are_stated(folder, about, tmp_path, capsys):
+    assert about.yarns_per_cm == (20.0, 20.0) and about.yarns_per_cm_source == "default"
+    assert about.size_cm == (0.1, 0.1)
+    text = (folder / "maps.json").read_text(encoding="utf-8")
+    assert set(json.loads(text)) == set(AboutMaps.model_json_schema()["properties"])
+    (tmp_path / "draft.toml").write_text(own_fabric("yarns_per_cm = [18.0, 16.0]\n"), encoding="utf-8")
+    assert call(str(tmp_path / "draft.toml"), "--maps", str(tmp_path / "own"), "--size", "64") == 0
+    assert "assumed" not in capsys.readouterr().out
+    found = AboutMaps.model_validate_json((tmp_path / "own" / "maps.json").read_text(encoding="utf-8"))
+    assert found.yarns_per_cm == (18.0, 16.0) and found.yarns_per_cm_source == "fabric"
+    assert found.size_cm == pytest.approx((found.yarns[0] / 18.0, found.yarns[1] / 16.0))
+
+
+def own_fabric(line):
+    yarns = "".join(f"[{name}]\nbend = 20.0\nroughness = 0.4\n" for name in ("warp", "weft"))
+    return f'name = "own"\n{line}[draft]\nfamily = "plain"\n{yarns}'
+
+
+def test_the_document_is_valid_materialx_and_names_files_that_exist(folder):
+    library, document = MaterialX.createDocument(), MaterialX.createDocument()
+    MaterialX.loadLibraries(MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath(), library)
+    MaterialX.readFromXmlFile(document, str(folder / "material.mtlx"))
+    document.setDataLibrary(library)
+    valid, reason = document.validate()
+    assert valid, reason
+    (shader,) = document.getNodes("open_pbr_surface")
+    assert {"base_color", "specular_roughness_anisotropy", "geometry_opacity", "subsurface_weight"} <= {
+        given.getName() for given in shader.getInputs()
+    }
+    files = [node.getInput("file").getValueString() for node in document.getNodes("tiledimage")]
+    assert len(files) >= 8 and all((folder / name).is_file() for name in files)
+
+
+def test_the_sample_is_read_by_other_libraries(folder):
+    document = pygltflib.GLTF2().load(str(folder / "sample.glb"))
+    (material,) = document.materials
+    assert (
+        set(material.extensions)
+        == set(document.extensionsUsed)
+        == {
+            "KHR_materials_anisotropy",
+            "KHR_materials_ior",
+            "KHR_materials_sheen",
+            "KHR_materials_specular",
+        }
+    )
+    assert material.alphaMode == "BLEND" and material.doubleSided
+    assert len(document.images) == 5
+    mesh = trimesh.load(folder / "sample.glb", force="mesh", process=False)
+    assert len(mesh.faces) == 2 * 24 * 2048
+    # A cone of slant 1.6, in units of 80 yarns of half a millimetre.
+    low, high = mesh.bounds
+    assert 0.03 < high[1] - low[1] < 0.08 and high[1] < 0.0
+    lengths = np.linalg.norm(mesh.visual.uv[mesh.edges[:, 0]] - mesh.visual.uv[mesh.edges[:, 1]], axis=-1)
+    # A map shows a millimetre: texture coordinates are millimetres, and no yarn is stretched.
+    np.testing.assert_allclose(lengths / 1000.0, mesh.edges_unique_length[mesh.edges_unique_inverse], rtol=0.05)
+
+
+def test_maps_of_before_are_replaced_and_other_folders_are_not(folder, tmp_path, capsys):
+    made = tmp_path / "made"
+    for name in ("denim", "gauze"):
+        assert call(name, "--maps", str(made), "--size", "64") == 0
+    assert (made / "maps.json").read_bytes() == (folder / "maps.json").read_bytes()
+    assert list(tmp_path.iterdir()) == [made]
+    (tmp_path / "letters").mkdir()
+    (tmp_path / "letters" / "to_mother.txt").write_text("dear", encoding="utf-8")
+    capsys.readouterr()
+    assert call("denim", "--maps", str(tmp_path / "letters"), "--size", "64") == 2
+    assert "is not empty" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "letters").iterdir()] == ["to_mother.txt"]
+
+
+def test_a_full_disk_leaves_the_maps_of_before(tmp_path, monkeypatch, capsys):
+    made = tmp_path / "made"
+    made.mkdir()
+    (made / "maps.json").write_text("before", encoding="utf-8")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(export_maps, "write_texture", full)
+    assert call("denim", "--maps", str(made), "--size", "64") == 1
+    assert "No space left" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [made] and (made / "maps.json").read_text(encoding="utf-8") == "before"
+
+
+@pytest.mark.parametrize(
+    ("tokens", "sentence"),
+    [
+        (["--maps", "a", "--size", "0"], "must be a power of two from 64 to 4096"),
+        (["--maps", "a", "--size", "1000000"], "must be a power of two from 64 to 4096"),
+        (["--maps", "file"], "is no folder"),
+        (["--maps", "file/a"], "a folder that can be written is needed"),
+        (["--maps", "a", "--vertices", "8"], "--vertices = 8: is not for --maps"),
+        (["--mesh", "a.ply", "--size", "64"], "--size = 64: is not for --mesh"),
+    ],
+)
+def test_what_cannot_be_written_is_said_in_one_sentence(tmp_path, monkeypatch, capsys, tokens, sentence):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    (tmp_path / "file").touch()
+    assert call("denim", *tokens) == 2
+    said = capsys.readouterr().err
+    assert sentence in said and len(said.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("library", ["MaterialX", "pygltflib"])
+def test_a_missing_library_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, capsys, library):
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(export_maps, "find_spec", lambda name: None if name == library else True)
+    assert call("denim", "--maps", str(tmp_path / "a")) == 2
+    said = capsys.readouterr().err
+    assert library in said and "pip install 'twillight[materials]'" in said
