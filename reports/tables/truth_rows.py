@@ -74,11 +74,15 @@ CALIBRATION: Final = ("cloth", "components", "transparency")
 
 def calibration_rows(found: Sequence[Calibration]) -> list[list[str]]:
     """Return the rows of the table of calibration: estimator, then `CALIBRATION`."""
+
+    def between(row: Calibration) -> str:
+        return "" if row.low is None or row.high is None else f" ({row.low:.2f} to {row.high:.2f})"
+
     return [
         [
             plain(row.estimator),
             row.kind,
-            f"{row.ratio:.2f} ({row.low:.2f} to {row.high:.2f}) · {percent(row.exceeded, 2)}",
+            f"{row.ratio:.2f}{between(row)} · {percent(row.exceeded, 2)}",
             f"{row.ratio_through:.2f} · {percent(row.exceeded_through, 2)}",
         ]
         for row in sorted(found, key=lambda row: row.estimator)

@@ -86,9 +86,9 @@ class Calibration:
     """rms(error) / rms(standard error), over the four components."""
     exceeded: float
     """Share of errors beyond their bound."""
-    low: float
-    """Lower end of the ratio's interval, at `LEVEL`."""
-    high: float
+    low: float | None
+    """Lower end of the ratio's interval, at `LEVEL`; None in Records of before intervals."""
+    high: float | None
     """Upper end."""
     ratio_through: float
     """`ratio` of the transparency."""
@@ -102,7 +102,8 @@ class Calibration:
         """True unless errors of the components are not calibrated, or beyond their bounds."""
         values = 4 * self.count
         beyond = stats.binomtest(round(self.exceeded * values), values, EXCEEDED, alternative="greater")
-        return self.low <= RATIOS[1] and self.high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - LEVEL
+        low, high = (self.ratio if end is None else end for end in (self.low, self.high))
+        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - LEVEL
 
 
 def measure(

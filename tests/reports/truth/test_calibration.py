@@ -34,6 +34,7 @@ def test_a_row_holds_within_its_limits():
         return Calibration("auto", "solid", ratio, exceeded, low, high, 1.0, 0.0, 2000)
 
     assert row(0.9, 0.002, 0.85, 0.95).holds
+    assert row(0.9, 0.002, None, None).holds and not row(0.7, 0.002, None, None).holds
     assert row(0.7, 0.002, 0.5, 0.85).holds
     assert not row(0.7, 0.002, 0.65, 0.75).holds
     assert not row(1.4, 0.002, 1.3, 1.5).holds
