@@ -36,12 +36,16 @@ class Check(NamedTuple):
         k_s, k_d and k_dt of each end (pick) of the sequence.
     warp_seen, weft_seen : float64 (ends, picks), (picks, ends)
         Share of each cell in which the yarn is seen from above.
+    ends, picks : int
+        Repeat of weave and colours together.
     """
 
     warp: Float64
     weft: Float64
     warp_seen: Float64
     weft_seen: Float64
+    ends: int
+    picks: int
 
 
 def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
@@ -77,6 +81,7 @@ def _check(fabric: Fabric) -> Check:
         stacked(second),
         np.ascontiguousarray(np.maximum(warp_seen.T, _HIDDEN)),
         np.ascontiguousarray(np.maximum(weft_seen, _HIDDEN)),
+        *fabric.repeat,
     )
 
 
@@ -89,8 +94,8 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
     masses = np.zeros(ends), np.zeros(picks)
     sums = np.zeros((ends, 9)), np.zeros((picks, 9))
     even = np.zeros((ends, 9)), np.zeros((picks, 9))
-    _fold_evenly(check.warp, even[0])
-    _fold_evenly(check.weft, even[1])
+    _fold_evenly(check.warp, check.ends, even[0])
+    _fold_evenly(check.weft, check.picks, even[1])
     points = np.zeros((2, _POINTS), np.float32)
     for row in range(len(u)):
         x, y, correlation = along_axes(major[row], minor[row], angle[row])
@@ -99,8 +104,16 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
         weights[:] = 0.0
         for point in range(line_points(correlation, COARSE_LINE, points[0], points[1])):
             z = points[0, point] * shift
-            _fold(check.warp, u[row] + z * x, blur * x, even[0], masses[0], sums[0])
-            _fold(check.weft, v[row] + math.copysign(z, z * correlation) * y, blur * y, even[1], masses[1], sums[1])
+            _fold(check.warp, check.ends, u[row] + z * x, blur * x, even[0], masses[0], sums[0])
+            _fold(
+                check.weft,
+                check.picks,
+                v[row] + math.copysign(z, z * correlation) * y,
+                blur * y,
+                even[1],
+                masses[1],
+                sums[1],
+            )
             share = points[1, point]
             weights[0] += _add(check.warp_seen, masses[1], masses[0], sums[0], share, found[row, 0])
             weights[1] += _add(check.weft_seen, masses[0], masses[1], sums[1], share, found[row, 1])
@@ -111,20 +124,21 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
 
 
 @kernel
-def _fold_evenly(colours: Float64, sums: Float64) -> None:
+def _fold_evenly(colours: Float64, repeat: int, sums: Float64) -> None:
     """Write the mean colour of the threads that fall on each thread of the weave's repeat, over their number."""
     threads = len(sums)
-    whole = threads * len(colours)  # a common multiple of both repeats
-    for thread in range(whole):
+    for thread in range(repeat):
         for c in range(9):
-            sums[thread % threads, c] += colours[thread % len(colours), c] / whole
+            sums[thread % threads, c] += colours[thread % len(colours), c] / repeat
 
 
 @kernel
-def _fold(colours: Float64, centre: float, sigma: float, even: Float64, masses: Float64, sums: Float64) -> None:
+def _fold(
+    colours: Float64, repeat: int, centre: float, sigma: float, even: Float64, masses: Float64, sums: Float64
+) -> None:
     """Write the mass of an axis of a footprint on each thread of the weave's repeat, and the same times its colour."""
     threads = len(masses)
-    if sigma >= _SPREAD_OUT * threads * len(colours):
+    if sigma >= _SPREAD_OUT * repeat:
         masses[:] = 1.0 / threads
         for thread in range(threads):
             for c in range(9):

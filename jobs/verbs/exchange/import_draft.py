@@ -37,9 +37,8 @@ def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Map
     """
     if out.suffix != ".toml":
         raise BadInput("import", "--out", str(out), "a path that ends in .toml is needed")
-    file = read_draft(
-        draft
-    )  # first: reading the colours of a fabric loads much, which a damaged draft need not wait for
+    # First: reading the colours of a fabric loads much, which a damaged draft need not wait for.
+    file = read_draft(draft)
     yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
     found = fabric_of(file, yarns, own, str(draft), given)
