@@ -13,5 +13,16 @@ from pipeline.scenes.shipped.roll import ROLL
 from pipeline.scenes.shipped.sphere import SPHERE
 from pipeline.scenes.shipped.swatch import SWATCH
 
-SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in (PLANE, SPHERE, DRAPE, ROLL, CURTAIN, TABLE, SWATCH)}
+SHIPPED: Final[dict[str, Scene]] = {
+    scene.name: scene
+    for scene in (
+        PLANE,
+        SPHERE,
+        DRAPE,
+        ROLL,
+        CURTAIN,
+        TABLE,
+        SWATCH,
+    )
+}
 """Every shipped scene by its name."""
