@@ -64,8 +64,8 @@ CLASSES: Final = {
 }
 """Classes of cloth and queries."""
 
-SEED: Final = 3_000
-"""Seed of the fabrics and queries; those that factors were chosen by (tests/fits) are others."""
+SEED: Final = 4_000
+"""Seed of the fabrics and queries. No factor was chosen by it; rows of 1,000 and 3,000 were looked at on the way."""
 
 _FABRICS, _ROWS, _REFERENCE = 4, 40, 1 << 15
 _PRECISE = 0.03
