@@ -29,7 +29,7 @@ from pipeline.compiled.reproducible import make_reproducible
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-PACKAGES = ("pipeline.compiled", "pipeline.truth", "pipeline.analytic", "reports.truth")
+PACKAGES = ("pipeline.compiled", "pipeline.truth", "pipeline.analytic", "pipeline.materials", "reports.truth")
 """Packages that hold kernels; each may call those before it."""
 
 _HOME = Path(__file__).parent

@@ -17,7 +17,8 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64
-from pipeline.materials.reflectance import GRAZING, even_sky
+from pipeline.materials.reflectance import GRAZING, Reflectance, even_sky
+from weaves.fabric import Fabric
 
 SHEEN_ROUGHNESS: Final = 0.5
 """Roughness of the sheen, fixed."""
@@ -77,6 +78,13 @@ def ggx_reflectance(along: float, across: float, f0: Float64) -> Float64:
     """Return the hemispherical reflectance of GGX at the grazing view, the mean over azimuths, (3,)."""
     wi = even_sky(_DIRECTIONS)
     return np.asarray(math.pi * np.mean([ggx(wi, wo, along, across, f0).mean(axis=0) for wo in _grazing()], axis=0))
+
+
+def white_f0(fabric: Fabric, share: Reflectance) -> Float64:
+    """Return F0 of white yarns by family, (2,): GGX returns the truth's specular reflectance towards the normal."""
+    normal, wi = np.array([0.0, 0.0, 1.0]), even_sky(_DIRECTIONS)
+    whole = [math.pi * ggx(wi, normal, y.roughness, 1.0, np.ones(3))[:, 0].mean() for y in (fabric.warp, fabric.weft)]
+    return share.per_area(share.specular) / np.array(whole)
 
 
 def sheen_reflectance(roughness: float = SHEEN_ROUGHNESS) -> float:

@@ -5,7 +5,7 @@ of the next mip level is the mean of four texels, and nothing that differs below
 
     normals    c n
     fibres     c (1 - alpha^2) t t^T,    by which the mean flake matrix is S = I - (1 - alpha^2) E[t t^T]
-    colours    c k, for each of k_d, k_s and k_dt times the reflectance of its family
+    colours    c k, for each of k_d, k_s and k_dt times a factor of its family (pipeline.materials.textures)
 
 S is the matrix of SGGX microflakes of fibres along t with roughness alpha. Its mean over a texel is the flake matrix
 of the texel [Heitz2015SGGX, section 5]: it holds the variance of the fibres' directions, as LEAN mapping holds that of
@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.materials.layout import Layout
+from pipeline.materials.lobes import white_f0
 from pipeline.materials.reflectance import Reflectance
 from weaves.fabric import Fabric
 from weaves.surface import GAP, WARP, Surface, surface_at
@@ -33,6 +34,9 @@ PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 _BAND: Final = 1 << 18
 """Points evaluated at once."""
+
+_Factors = tuple[Float64, Float64, Float64]
+"""Factors of the diffuse, the specular and the transmitted colour, by family."""
 
 
 class Planes(NamedTuple):
@@ -80,13 +84,14 @@ def planes(fabric: Fabric, found: Layout, share: Reflectance) -> Planes:
     per_texel = _samples(found)
     width, height = found.width * per_texel, found.height * per_texel
     lowest = _lowest(fabric)
+    factors = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
     x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (found.ends / width)
     y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (found.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
     bands = []
     for first in range(0, height, rows):
         surface = surface_at(fabric, x[None, :], y[first : first + rows, None])
-        sums = _sums(fabric, surface, x, y[first : first + rows], share, lowest)
+        sums = _sums(fabric, surface, x, y[first : first + rows], factors, lowest)
         for _ in range(per_texel.bit_length() - 1):
             sums = sums.halved()
         bands.append(sums)
@@ -124,13 +129,13 @@ def _lowest(fabric: Fabric) -> float:
     return float(height[np.isfinite(height)].min())
 
 
-def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, share: Reflectance, lowest: float) -> Planes:
+def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, factors: _Factors, lowest: float) -> Planes:
     """Return the sums of single points."""
     yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
     tangent = surface.tangent
     smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
     fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
-    colours = (_colours(fabric, surface, x, y, kind, share) for kind in range(3))
+    colours = (_colours(fabric, surface, x, y, kind, factors) for kind in range(3))
     return Planes(
         *(
             np.asarray(plane, np.float32)
@@ -145,11 +150,12 @@ def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, share: Refle
     )
 
 
-def _colours(fabric: Fabric, surface: Surface, x: Float64, y: Float64, kind: int, share: Reflectance) -> Float64:
+def _colours(fabric: Fabric, surface: Surface, x: Float64, y: Float64, kind: int, factors: _Factors) -> Float64:
     """Return the diffuse (0), specular (1) or transmitted (2) colour of points, 0 in gaps."""
     name = ("diffuse", "specular", "diffuse_transmission")[kind]
-    factor = share.per_area((share.diffuse, share.specular, share.transmitted)[kind])
-    ends, picks = (getattr(colours, name) * factor[family] for family, colours in enumerate(fabric.thread_colours()))
+    ends, picks = (
+        getattr(colours, name) * factors[kind][family] for family, colours in enumerate(fabric.thread_colours())
+    )
     of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
     yarn = surface.yarn[..., None]
     on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])

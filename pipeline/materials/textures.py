@@ -6,7 +6,8 @@ A material of base colour, specular and roughness cannot have the optics of a ya
                         from above, c the coverage of its family; so the mean of base colour times opacity is the
                         diffuse albedo of the truth
     transmitted colour  k_dt rho_dt / c, likewise, for a sky behind the cloth
-    specular F0         k_s rho_s / c, as index of refraction of the largest F0, and a colour of at most 1
+    specular F0         k_s rho_s / (c E), E the share that GGX of F = 1 and the yarn's roughness returns towards the
+                        normal; as index of refraction of the largest F0, and a colour of at most 1
     roughness           with S the mean flake matrix of the texel (pipeline.materials.planes), n its mean normal, and
                         e_1, e_2 the axes of S in the plane across n:
                             alpha_along^2 = e_1 S e_1 / n S n,   alpha_across^2 = min(1, e_2 S e_2 / n S n)
@@ -26,7 +27,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.materials.lobes import ggx_reflectance, sheen_reflectance
+from pipeline.materials.lobes import ggx_reflectance, sheen_reflectance, white_f0
 from pipeline.materials.planes import PAIRS, Planes
 from pipeline.materials.reflectance import Reflectance
 from weaves.fabric import Fabric
@@ -93,7 +94,7 @@ class Textures(NamedTuple):
 def constants(fabric: Fabric, share: Reflectance) -> Constants:
     """Return the numbers of a fabric's material that hold for all texels."""
     threads = fabric.thread_colours()
-    factor = share.per_area(share.specular)
+    factor = white_f0(fabric, share)
     largest = max(float((colours.specular * factor[f]).max()) for f, colours in enumerate(threads))
     largest = min(max(largest, 1e-4), 0.9)
     root = largest**0.5
@@ -174,7 +175,7 @@ def _flakes(normal: Float64, fibres: Float64) -> tuple[Float64, Float64, Float64
 def _sheen(fabric: Fabric, share: Reflectance) -> Float64:
     """Return the colour of the sheen; formula in the module's docstring."""
     missing = np.zeros(3)
-    factor = share.per_area(share.specular)
+    factor = white_f0(fabric, share)
     for family, (yarn, colours) in enumerate(zip((fabric.warp, fabric.weft), fabric.thread_colours(), strict=True)):
         k_d, k_s = colours.diffuse.mean(axis=0), colours.specular.mean(axis=0)
         lobe = share.coverage[family] * ggx_reflectance(yarn.roughness, 1.0, k_s * factor[family])

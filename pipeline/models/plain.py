@@ -10,11 +10,14 @@ from weaves.errors import BadInput
 _ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ
 
 
-def refuse_other(queries: Queries, method: str, stretch: bool = False) -> None:
-    """Refuse queries that are not plain, or not round without `stretch`: a BadInput that names row and column."""
+def refuse_other(queries: Queries, method: str, stretch: bool = False, behind: bool = False) -> None:
+    """Refuse queries that are not plain: a BadInput that names row and column.
+
+    Footprints may be stretched with `stretch`, and the light may come from behind with `behind`.
+    """
     for name, rows, allowed in (
         ("wo", queries.wo[:, 2] < 0, "viewers in front of the cloth"),
-        ("wi", queries.wi[:, 2] < 0, "light from the viewer's side"),
+        ("wi", (queries.wi[:, 2] < 0) & (not behind), "light from the viewer's side"),
         (
             "sigma_minor",
             (np.abs(queries.sigma_minor - queries.sigma) > _ROUND * queries.sigma) & (not stretch),

@@ -29,6 +29,7 @@ MARKERS: Final[Mapping[str, Marker]] = {
     "point_sampled": "s",
     "r2_points": "D",
     "prefiltered": "P",
+    "map_material": (8, 1, 0),
     "gauss_nodes": "^",
     "soft_nodes": ">",
 }
@@ -100,6 +101,7 @@ LIGHT: Final = Scheme(
         "point_sampled": "#d9622b",
         "r2_points": "#a67806",
         "prefiltered": "#6f7484",
+        "map_material": "#b3263f",
         "gauss_nodes": "#8e44ad",
         "soft_nodes": "#d24fa2",
     },
@@ -127,6 +129,7 @@ DARK: Final = Scheme(
         "point_sampled": "#ff9a5c",
         "r2_points": "#e3bf4e",
         "prefiltered": "#a7adbd",
+        "map_material": "#ff8fa3",
         "gauss_nodes": "#d29bf0",
         "soft_nodes": "#f9a8d8",
     },

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.materials.layout import layout
+from pipeline.materials.lobes import white_f0
 from pipeline.materials.planes import planes
 from pipeline.materials.reflectance import reflectance
 from pipeline.materials.textures import across_direction, constants, gltf_strength, openpbr_roughness, textures
@@ -122,11 +123,11 @@ def test_roughness_of_openpbr_and_gltf_give_both_alphas_back():
     np.testing.assert_allclose(along + (1.0 - along) * s**2, across, rtol=1e-5)
 
 
-def test_the_specular_colour_and_index_of_refraction_return_the_truths_share():
+def test_the_specular_colour_and_index_of_refraction_are_the_f0_of_the_yarns():
     fabric = load_fabric("satin_8")
     share, maps = reflectance(fabric), maps_of(fabric, 256)
     material = constants(fabric, share)
     f0 = ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
     found = f0 * maps.specular_color.mean(axis=(0, 1))
     colours = [thread.specular[0] for thread in fabric.thread_colours()]
-    np.testing.assert_allclose(found, share.specular @ np.array(colours), rtol=0.02)
+    np.testing.assert_allclose(found, (share.coverage * white_f0(fabric, share)) @ np.array(colours), rtol=0.02)

@@ -1,0 +1,248 @@
+"""A material of texture maps, read over a footprint and evaluated: what a renderer without yarns does.
+
+Maps are read bilinearly within a mip level and linearly between levels: texels of width h, read so, average as a
+Gaussian of standard deviation h / 2 does, so the level is log2(2 sigma / h_0). A long footprint is the mean of up to
+`TAPS` readings along its longer axis, as anisotropic filters of hardware take it. What is read goes into one evaluation
+(the lobes and their sources are in pipeline.materials.lobes):
+
+    opacity [ (1 - E s) (GGX + (1 - F) base / pi) + s charlie ] cos_i      light and viewer on one side
+    opacity (1 - E s) through / pi |cos_i|                                  light from behind
+
+F is Schlick's term, s the sheen, E the reflectance of a white sheen. The normal and the cosine are those of the map.
+Where the map's normal turns away from light or viewer the material is black. Maps are in unit colours, red for the
+warp and green for the weft; each component has its share of F.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from pipeline.compiled.arrays import Float32, Float64, Index
+from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.materials.layout import Layout
+from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie
+from pipeline.materials.planes import Planes
+from pipeline.materials.reflectance import even_sky
+from pipeline.materials.textures import Constants, textures
+from pipeline.truth.query import Queries
+
+TAPS: Final = 16
+"""Most readings along a footprint's longer axis."""
+
+CHANNELS: Final = 15
+"""Numbers of a texel: opacity, base (2), F0 (2), through (2), normal (3), tangent (3), alpha along and across."""
+
+_0, _1, _HALF, _4 = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(4.0)
+_TINY = np.float32(1e-12)
+_INVERSE_PI = np.float32(1.0 / math.pi)
+_LOBE = np.float32(1.0 / SHEEN_ROUGHNESS**2)
+_VIEWS: Final = 64
+
+
+class MipLevels(NamedTuple):
+    """Maps of one cloth in unit colours, and the sheen.
+
+    Attributes
+    ----------
+    texels : float32 (T, CHANNELS)
+        All levels, finest first, row by row.
+    levels : int64 (L, 3)
+        First texel, columns and rows of each level.
+    extent : float64 (2,)
+        Ends and picks that the maps show.
+    finest : float
+        Width of the finest texels, in yarn spacings (the root of width times height).
+    sheen : float32 (4,)
+        Share of the sheen of each component, in unit colours.
+    specular : float32
+        Specular colour of the yarns; the F0 of the maps has it as a factor.
+    white : float32 (n,)
+        Reflectance of a white sheen, by the viewer's cosine from 0 to 1.
+    taps : float64 (TAPS + 1, TAPS)
+        In row n the places of n readings along an axis: of mean 0 and variance 1.
+    """
+
+    texels: Float32
+    levels: Index
+    extent: Float64
+    finest: float
+    sheen: Float32
+    specular: np.float32
+    white: Float32
+    taps: Float64
+
+
+def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64, specular: float) -> MipLevels:
+    """Return the maps of a cloth at all levels, down to one texel.
+
+    Parameters
+    ----------
+    level : Planes
+        Sums of the finest level; red is the warp's, green the weft's.
+    material : Constants
+        Numbers of the material.
+    found : Layout
+        Yarns and texels of the finest level.
+    sheen : float64 (4,)
+        Share of the sheen of each component.
+    specular : float
+        Specular colour of the yarns in the maps.
+    """
+    parts, levels, first = [], [], 0
+    while True:
+        maps = textures(level, material)
+        height, width = maps.opacity.shape
+        planes = (
+            maps.opacity[..., None],
+            maps.base_color[..., :2],
+            maps.specular_color[..., :2] * material.largest_f0,
+            maps.transmission_color[..., :2],
+            maps.normal,
+            maps.tangent,
+            maps.alpha_along[..., None],
+            maps.alpha_across[..., None],
+        )
+        parts.append(np.concatenate(planes, axis=-1).reshape(-1, CHANNELS))
+        levels.append((first, width, height))
+        first += width * height
+        if width == height == 1:
+            break
+        level = level.halved()
+    return MipLevels(
+        texels=np.concatenate(parts).astype(np.float32),
+        levels=np.array(levels, np.int64),
+        extent=np.array([found.ends, found.picks], np.float64),
+        finest=math.sqrt(found.ends / found.width * found.picks / found.height),
+        sheen=sheen.astype(np.float32),
+        specular=np.float32(specular),
+        white=_white_sheen(),
+        taps=_taps(),
+    )
+
+
+def answer(maps: MipLevels, queries: Queries) -> Float32:
+    """Return the components of N queries about flat cloth seen from the front, (N, 4)."""
+    shape = (queries.u, queries.v, queries.sigma, queries.sigma_minor, queries.angle, queries.wi, queries.wo)
+    return _answer(maps, *(np.ascontiguousarray(column, np.float32) for column in shape))
+
+
+def _white_sheen() -> Float32:
+    """Return the reflectance of a white sheen at cosines (i + 1/2) / `_VIEWS`."""
+    wi, found = even_sky(4096), []
+    for cosine in (np.arange(_VIEWS) + 0.5) / _VIEWS:
+        found.append(math.pi * charlie(wi, np.array([math.sqrt(1.0 - cosine**2), 0.0, cosine]), SHEEN_ROUGHNESS).mean())
+    return np.array(found, np.float32)
+
+
+def _taps() -> Float64:
+    """Return quantiles of the normal distribution, scaled to variance 1; one reading is in the middle."""
+    table = np.zeros((TAPS + 1, TAPS))
+    for count in range(2, TAPS + 1):
+        places = ndtri((np.arange(count) + 0.5) / count)
+        table[count, :count] = places / np.sqrt((places**2).mean())
+    return table
+
+
+@allocating_kernel
+def _answer(
+    maps: MipLevels, u: Float32, v: Float32, major: Float32, minor: Float32, angle: Float32, wi: Float32, wo: Float32
+) -> Float32:
+    result = np.zeros((len(u), 4), np.float32)
+    read = np.zeros(CHANNELS, np.float32)
+    for row in range(len(u)):
+        read[:] = _0
+        _read(maps, u[row], v[row], major[row], minor[row], angle[row], read)
+        if read[0] > _0:
+            _evaluate(maps, read, wi[row], wo[row], result[row])
+    return result
+
+
+@kernel
+def _read(maps: MipLevels, u: float, v: float, major: float, minor: float, angle: float, read: Float32) -> None:
+    """Add the mean of the maps over a footprint to `read`."""
+    last = len(maps.levels) - 1
+    narrow = max(minor, major / TAPS)
+    count = min(max(math.ceil(major / narrow - 0.01), 1), TAPS)
+    spread = math.sqrt(max(major * major - narrow * narrow, 0.0)) if count > 1 else 0.0
+    level = min(max(math.log2(2.0 * narrow / maps.finest), 0.0), float(last))
+    below = min(int(level), max(last - 1, 0))
+    share, weight = level - below, 1.0 / count
+    for tap in range(count):
+        along = spread * maps.taps[count, tap]
+        x = (np.float64(u) + along * math.cos(angle)) / maps.extent[0]
+        y = (np.float64(v) + along * math.sin(angle)) / maps.extent[1]
+        x, y = x - math.floor(x), y - math.floor(y)
+        _add(maps.texels, maps.levels[below], x, y, np.float32(weight * (1.0 - share)), read)
+        if share > 0.0:
+            _add(maps.texels, maps.levels[below + 1], x, y, np.float32(weight * share), read)
+
+
+@kernel
+def _add(texels: Float32, level: Index, x: float, y: float, share: np.float32, read: Float32) -> None:
+    """Add one level, read bilinearly around shares x and y of the maps' extent."""
+    first, width, height = level[0], level[1], level[2]
+    x, y = x * width - 0.5, y * height - 0.5
+    column, line = math.floor(x), math.floor(y)
+    right, up = np.float32(x - column), np.float32(y - line)
+    for dy in range(2):
+        weight_y = up if dy == 1 else _1 - up
+        for dx in range(2):
+            weight = share * weight_y * (right if dx == 1 else _1 - right)
+            texel = first + ((line + dy + height) % height) * width + (column + dx + width) % width
+            for c in range(CHANNELS):
+                read[c] += weight * texels[texel, c]
+
+
+@kernel
+def _evaluate(maps: MipLevels, read: Float32, wi: Float32, wo: Float32, result: Float32) -> None:
+    """Write the four components of a material, with the incident cosine."""
+    size = _1 / np.sqrt(max(read[7] * read[7] + read[8] * read[8] + read[9] * read[9], _TINY))
+    nx, ny, nz = read[7] * size, read[8] * size, read[9] * size
+    cos_i, cos_o = wi[0] * nx + wi[1] * ny + wi[2] * nz, wo[0] * nx + wo[1] * ny + wo[2] * nz
+    if cos_o <= _0:
+        return
+    specular, lost = _1 / maps.specular, maps.sheen[0] + maps.sheen[1] + maps.sheen[2] + maps.sheen[3]
+    under = _1 - lost * maps.white[min(int(cos_o * np.float32(_VIEWS)), _VIEWS - 1)]
+    if wi[2] < _0:
+        for family in range(2):
+            result[2 + family] = read[0] * under * read[5 + family] * _INVERSE_PI * max(-cos_i, _0)
+        return
+    if cos_i <= _0:
+        return
+    # The fibres' frame: the tangent, laid across the normal.
+    along = read[10] * nx + read[11] * ny + read[12] * nz
+    tx, ty, tz = read[10] - along * nx, read[11] - along * ny, read[12] - along * nz
+    size = _1 / np.sqrt(max(tx * tx + ty * ty + tz * tz, _TINY))
+    tx, ty, tz = tx * size, ty * size, tz * size
+    bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
+    size = _1 / np.sqrt(max(hx * hx + hy * hy + hz * hz, _TINY))
+    hx, hy, hz = hx * size, hy * size, hz * size
+    h_n, edge = hx * nx + hy * ny + hz * nz, _1 - min(hx * wo[0] + hy * wo[1] + hz * wo[2], _1)
+    a, b = read[13], read[14]
+    slopes = ((hx * tx + hy * ty + hz * tz) / a) ** 2 + ((hx * bx + hy * by + hz * bz) / b) ** 2 + h_n * h_n
+    masking_i = _masking(wi[0] * tx + wi[1] * ty + wi[2] * tz, wi[0] * bx + wi[1] * by + wi[2] * bz, cos_i, a, b)
+    masking_o = _masking(wo[0] * tx + wo[1] * ty + wo[2] * tz, wo[0] * bx + wo[1] * by + wo[2] * bz, cos_o, a, b)
+    ggx = _INVERSE_PI / (a * b * slopes * slopes * (_1 + masking_i + masking_o) * _4 * cos_o)
+    sine = np.sqrt(max(_1 - h_n * h_n, _TINY))
+    charlie = (np.float32(2.0) + _LOBE) * sine**_LOBE * _HALF * _INVERSE_PI
+    charlie *= cos_i / (_4 * (cos_i + cos_o - cos_i * cos_o))
+    f0 = read[3] + read[4]
+    edge = edge * edge * edge * edge * edge
+    fresnel = f0 + (_1 - f0) * edge
+    for family in range(2):
+        own = read[3 + family] / max(f0, _TINY) * fresnel
+        base = (_1 - fresnel) * read[1 + family] * _INVERSE_PI * cos_i
+        result[family] = read[0] * specular * (under * own * ggx + maps.sheen[family] * charlie)
+        result[2 + family] = read[0] * (under * base + maps.sheen[2 + family] * charlie)
+
+
+@kernel
+def _masking(along: np.float32, across: np.float32, cosine: np.float32, a: np.float32, b: np.float32) -> np.float32:
+    """Return Smith's Lambda of a direction."""
+    slopes = ((a * along) ** 2 + (b * across) ** 2) / (cosine * cosine)
+    return _HALF * (np.sqrt(_1 + slopes) - _1)
