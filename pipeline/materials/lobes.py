@@ -84,7 +84,7 @@ def white_f0(fabric: Fabric, share: Reflectance) -> Float64:
     """Return F0 of white yarns by family, (2,): GGX returns the truth's specular reflectance towards the normal."""
     normal, wi = np.array([0.0, 0.0, 1.0]), even_sky(_DIRECTIONS)
     whole = [math.pi * ggx(wi, normal, y.roughness, 1.0, np.ones(3))[:, 0].mean() for y in (fabric.warp, fabric.weft)]
-    return share.per_area(share.specular) / np.array(whole)
+    return np.asarray(share.per_area(share.specular) / np.array(whole))
 
 
 def sheen_reflectance(roughness: float = SHEEN_ROUGHNESS) -> float:

@@ -245,4 +245,4 @@ def _evaluate(maps: MipLevels, read: Float32, wi: Float32, wo: Float32, result: 
 def _masking(along: np.float32, across: np.float32, cosine: np.float32, a: np.float32, b: np.float32) -> np.float32:
     """Return Smith's Lambda of a direction."""
     slopes = ((a * along) ** 2 + (b * across) ** 2) / (cosine * cosine)
-    return _HALF * (np.sqrt(_1 + slopes) - _1)
+    return np.float32(_HALF * (np.sqrt(_1 + slopes) - _1))

@@ -1,1 +1,1 @@
-"""`map_material`: the texture maps that `twillight export --maps` writes, evaluated as a renderer does."""
+"""`map_material`: texture maps of `twillight export --maps`, evaluated as a renderer does."""

@@ -13,18 +13,30 @@ ROOT = Path(__file__).parents[5]
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:'Material.use_nodes':DeprecationWarning")
 def test_blender_renders_the_sample_and_the_maps(tmp_path, monkeypatch):
     pytest.importorskip("bpy", reason="Blender's module is not installed: pip install bpy")
     monkeypatch.chdir(tmp_path)
     assert main(["export", "denim", "--maps", "pictures/denim", "--size", "512"]) == 0
     scripts = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/blender.md").read_text(encoding="utf-8"), re.M | re.S)
-    assert len(scripts) == 1
+    assert len(scripts) == 2
     for script in scripts:
         exec(compile(script, "docs/blender.md", "exec"), {})
-    with Image.open("sample.png") as picture:
-        shown = np.asarray(picture.convert("RGB")).astype(float) / 255
-    cloth = shown[shown.max(axis=-1) > 0.02]
-    assert len(cloth) > 0.1 * shown[..., 0].size
+    sample, plane = shown("sample.png"), shown("plane.png")
+    cloth = sample[sample.max(axis=-1) > 0.02]
+    assert len(cloth) > 0.1 * sample[..., 0].size
     red, _, blue = cloth.mean(axis=0)
     assert blue > 1.2 * red  # denim is blue
     assert cloth.std() > 0.03  # folds have light and shadow
+    # The plane fills the picture: a quarter of the cells is the grey weft, the rest the blue warp.
+    lit = plane[plane.max(axis=-1) > 0.15]
+    grey = np.abs(lit[:, 2] - lit[:, 0]) < 0.1
+    assert len(lit) > 0.6 * plane[..., 0].size
+    assert 0.1 < grey.mean() < 0.4
+    assert (lit[~grey, 2] > 1.3 * lit[~grey, 0]).mean() > 0.9
+
+
+def shown(name):
+    """Return a picture as shares of white, (H, W, 3)."""
+    with Image.open(name) as picture:
+        return np.asarray(picture.convert("RGB")).astype(float) / 255
