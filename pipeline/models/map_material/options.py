@@ -1,4 +1,4 @@
-"""Options of `map_material`: resolution of the maps, and whether there is a sheen."""
+"""Options of `map_material`: resolution of the maps, specular colour and sheen."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class MapMaterialOptions(Options):
     specular: float = Field(default=0.3, gt=0, le=1)
     """Specular colour of the yarns in terms that are not linear in it: what highlights take from the diffuse light."""
     sheen: bool = True
-    """Whether the material has a sheen, as glTF has."""
+    """True for a material with a sheen, as that of glTF."""
 
     @property
     def kinds(self) -> frozenset[str]:
