@@ -121,4 +121,4 @@ def _installed() -> dict[str, str]:
 def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:
     """Return what is allowed in place of an unknown name."""
     names = nearest(model, known, "model")
-    return names if replacement("model", model) else f"{names}; code of your own is given with --add FILE.py:CLASS"
+    return names if replacement("model", model) else f"code of your own is given with --add FILE.py:CLASS; {names}"
