@@ -1,8 +1,9 @@
 """Colours of the components where ends or picks differ in colour, for methods that know four components.
 
-The mean colour of the ends (picks) in the footprint: each thread counts by the footprint's mass on its cells, times the
-share of each cell in which it is seen from straight above. Shadows, highlights and oblique views change these shares;
-pipeline.truth.scattering.thread_colours has the exact ones. Nothing aliases: the masses are integrals of a Gaussian.
+Light and viewer in front: soft nodes are summed thread by thread of the weave's repeat (pipeline.analytic.soft_nodes),
+each component apart, and each thread has the mean colour of its copies in the footprint. From behind, each thread
+counts by the footprint's mass on its cells, times the share of each cell in which it is seen from straight above.
+pipeline.truth.scattering.thread_colours has the exact colours. Nothing aliases: masses are integrals of a Gaussian.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pipeline.analytic.soft_nodes.answer import SMALLEST, query_sums
+from pipeline.analytic.soft_nodes.nodes import Table, tabulate
+from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
 from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.footprint.mixture import COARSE_LINE, along_axes, line_points
+from pipeline.truth.footprint.mixture import COARSE_LINE, along_axes, deviations, line_points
 from pipeline.truth.query import Queries
 from weaves.colour_order import ThreadColours
 from weaves.fabric import Fabric
@@ -25,6 +29,9 @@ _SPREAD_OUT: Final = 0.8  # in repeats: an axis of a Gaussian this wide covers t
 _POINTS: Final = COARSE_LINE.points
 _MOST: Final = COARSE_LINE.most
 _HIDDEN: Final = 1e-6  # share of a cell that a yarn covers in any case: where it is not seen it has a colour, too
+_CHUNK: Final = 4096  # queries whose sums are held at a time
+_FAINT: Final = 1e-6  # share of the light by which threads count in any case
+_TINY: Final = 1e-30
 
 
 class Check(NamedTuple):
@@ -56,13 +63,45 @@ def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
     fabric : Fabric
         The cloth.
     queries : Queries
-        Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider.
+        Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
     """
+    front = (queries.wi[:, 2] > 0.0) & (queries.wo[:, 2] > 0.0)
+    result = np.empty((len(front), 4, 3))
+    if front.any():
+        result[front] = _by_sums(fabric, queries.take(front))
+    if not front.all():
+        result[~front] = _from_above(fabric, queries.take(~front))
+    return result
+
+
+def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
+    """Return the colours of N queries by the sums of each thread, (N, 4, 3)."""
+    table, check = _table(fabric), _check(fabric)
+    result = np.empty((len(queries.u), 4, 3))
+    for start in range(0, len(result), _CHUNK):
+        part = queries.take(slice(start, start + _CHUNK))
+        sums, _ = query_sums(table, part)
+        x, y, _ = deviations(part, SMALLEST)
+        columns = [np.ascontiguousarray(column, np.float64) for column in (part.u, part.v, x, y)]
+        weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
+        result[start : start + _CHUNK] = (
+            weighed_colours(check, *columns, weights).transpose(0, 2, 1, 3).reshape(-1, 4, 3)
+        )
+    return result
+
+
+def _from_above(fabric: Fabric, queries: Queries) -> Float64:
+    """Return the colours of N queries by what is seen from straight above, (N, 4, 3)."""
     wide = [np.ascontiguousarray(queries[k], np.float64) for k in (0, 1, 2, 5, 6)]
     means = mean_colours(_check(fabric), *wide).reshape(-1, 2, 3, 3)
     through = (queries.wi[:, 2] * queries.wo[:, 2] < 0.0)[:, None, None]
     diffuse = np.where(through, means[:, :, 2], means[:, :, 1])
     return np.concatenate([means[:, :, 0], diffuse], axis=1)
+
+
+@lru_cache(maxsize=16)
+def _table(fabric: Fabric) -> Table:
+    return tabulate(fabric, by_thread=True)
 
 
 @lru_cache(maxsize=64)
@@ -121,6 +160,46 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
             for c in range(9):
                 found[row, family, c] /= weights[family]
     return found
+
+
+@allocating_kernel
+def weighed_colours(check: Check, u: Float64, v: Float64, x: Float64, y: Float64, weights: Float64) -> Float64:
+    """Return k_s and k_d of the ends and of the picks in N footprints of deviations x and y, (N, 2, 2, 3).
+
+    `weights` (N, ends + picks, 2) are the specular and diffuse light of each thread of the weave's repeat.
+    """
+    ends, picks = check.warp_seen.shape
+    found = np.zeros((len(u), 2, 2, 3))
+    masses = np.zeros(ends), np.zeros(picks)
+    sums = np.zeros((ends, 9)), np.zeros((picks, 9))
+    even = np.zeros((ends, 9)), np.zeros((picks, 9))
+    _fold_evenly(check.warp, check.ends, even[0])
+    _fold_evenly(check.weft, check.picks, even[1])
+    for row in range(len(u)):
+        _fold(check.warp, check.ends, u[row], x[row], even[0], masses[0], sums[0])
+        _fold(check.weft, check.picks, v[row], y[row], even[1], masses[1], sums[1])
+        _weigh(masses[0], sums[0], weights[row, :ends], found[row, 0])
+        _weigh(masses[1], sums[1], weights[row, ends:], found[row, 1])
+    return found
+
+
+@kernel
+def _weigh(masses: Float64, sums: Float64, weights: Float64, found: Float64) -> None:
+    """Write the mean colours of a family's threads, (2, 3), by the light of each."""
+    for kind in range(2):
+        total = 0.0
+        for thread in range(len(masses)):
+            total += weights[thread, kind]
+        # Threads of a family that sends no light count by their mass.
+        least, whole = max(_FAINT * total, _TINY), 0.0
+        for thread in range(len(masses)):
+            if masses[thread] > 0.0:
+                weight = weights[thread, kind] / masses[thread] + least
+                whole += weight * masses[thread]
+                for c in range(3):
+                    found[kind, c] += weight * sums[thread, 3 * kind + c]
+        for c in range(3):
+            found[kind, c] /= whole
 
 
 @kernel

@@ -29,7 +29,7 @@ def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64
 def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
     """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own.
 
-    Where ends or picks differ in colour, these are the mean colours of the footprint's threads
+    Where ends or picks differ in colour, these are mean colours of the footprint's threads
     (`pipeline.analytic.footprint_colours`).
     """
     if fabric.colours is not None:

@@ -1,6 +1,6 @@
 """Loss by mean colours of the footprint where ends and picks differ in colour, by size of the footprint.
 
-Methods that know four components take the mean colours of the threads in a footprint
+Methods take the mean colours of the threads in a footprint, weighed by few nodes
 (`pipeline.analytic.footprint_colours`); the truth weighs each thread by its share of each component
 (`pipeline.truth.scattering.thread_colours`). With the truth's components in both, over random patches of a size and
 random directions,

@@ -29,8 +29,9 @@ from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel
-from pipeline.truth.footprint.mixture import COARSE_LINE, line_points, narrow_axis
+from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points, narrow_axis
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, RADIUS
+from pipeline.truth.query import Queries
 
 LONG: Final = 0.75
 """Largest deviation along the wider axis for which nodes are placed in a footprint that is narrow along the other axis.
@@ -39,12 +40,22 @@ This bounds the number of nodes."""
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
 
+SMALLEST: Final = np.float32(1e-3)
+"""Least deviation of a footprint: a thousandth of a yarn is a point. Smaller ones would fall between the digits of a
+place."""
+
 # Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
 _MOST_NODES = 3 * _MOST_CELLS * MOST_ACROSS**2
 _POINTS = COARSE_LINE.points
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+
+
+def query_sums(table: Table, queries: Queries) -> tuple[Float32, Float32]:
+    """Return what `sum_queries` returns for N queries about flat cloth, light and viewer in front."""
+    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo)
+    return sum_queries(table, *(np.ascontiguousarray(column, np.float32) for column in columns))
 
 
 @allocating_kernel
@@ -71,11 +82,13 @@ def sum_queries(
 
     Returns
     -------
-    float32 (N, 2, SUMS), float32 (N,)
-        The sums of warp and weft, and the area seen through gaps.
+    float32 (N, K, SUMS), float32 (N,)
+        The sums of each kind of yarn (`Table.kinds`), and the area seen through gaps.
     """
     count = len(u)
-    result, gaps = np.zeros((count, 2, SUMS), np.float32), np.zeros(count, np.float32)
+    of_warp, of_weft = table.kinds[0], table.kinds[1]
+    kinds = of_warp + of_weft
+    result, gaps = np.zeros((count, kinds, SUMS), np.float32), np.zeros(count, np.float32)
     ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
     yarn, starts, nodes, evenly = table.yarn, table.starts, table.nodes, table.evenly
     mean, sharpness, thickness = table.mean, table.sharpness, np.float32(table.thickness)
@@ -83,20 +96,20 @@ def sum_queries(
     per_azimuth, per_grid = size * size, AZIMUTHS * size * size
     grid = table.grid.reshape(table.grid.size)
 
-    # Scratch: weights of fixed nodes, and nodes placed in the footprint, of both families.
-    weight = np.zeros((starts[3], BLOCK_NODES), np.float32)
-    lines = weight.reshape(starts[3] * BLOCK_NODES // COLUMNS, COLUMNS)
+    # Scratch: weights of fixed nodes, and nodes placed in the footprint, of all kinds.
+    weight = np.zeros((starts[kinds + 1], BLOCK_NODES), np.float32)
+    lines = weight.reshape(starts[kinds + 1] * BLOCK_NODES // COLUMNS, COLUMNS)
     turns = np.zeros((TURN_ROWS, HIGHEST + 1), np.float32)
     density_x = np.zeros((ends, len(table.places), COLUMNS), np.float32)
     density_y = np.zeros((picks, len(table.places), COLUMNS), np.float32)
     touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
     columns, rows = np.zeros(ends, np.uint32), np.zeros(picks, np.uint32)
     most = (_MOST_NODES + BLOCK_NODES - 1) // BLOCK_NODES
-    own_nodes = np.zeros((2, most, ROWS, BLOCK_NODES), np.float32)
-    cells = np.zeros((2, most, BLOCK_NODES), np.uint32)
-    flat_cells = cells.reshape(2, most * BLOCK_NODES)
+    own_nodes = np.zeros((kinds, most, ROWS, BLOCK_NODES), np.float32)
+    cells = np.zeros((kinds, most, BLOCK_NODES), np.uint32)
+    flat_cells = cells.reshape(kinds, most * BLOCK_NODES)
     line = np.zeros((LINE_ROWS, 8), np.float32)
-    stops = np.zeros(2, np.int64)
+    stops = np.zeros(kinds, np.int64)
     line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
 
     for n in range(count):
@@ -142,8 +155,9 @@ def sum_queries(
                         rows[:along], ends, line_shares[point], lines,
                     )  # fmt: skip
             near_i, near_o = (high_i if turn_i > _HALF else low_i), (high_o if turn_o > _HALF else low_o)
-            for family in range(2):
-                a, b = starts[family], starts[family + 1]
+            for kind in range(kinds):
+                family = 0 if kind < of_warp else 1
+                a, b = starts[kind], starts[kind + 1]
                 d = directions(ix, iy, iz, ox, oy, oz, family)
                 found = shade_fixed(
                     nodes[a:b], shares[a:b], mean[low_i, a:b], mean[high_i, a:b], sharpness[near_i, a:b], turn_i,
@@ -151,8 +165,8 @@ def sum_queries(
                     thickness, yarn[family, BLEND],
                 )  # fmt: skip
                 for q in range(SUMS):
-                    result[n, family, q] = found[q]
-            a, b = starts[2], starts[3]
+                    result[n, kind, q] = found[q]
+            a, b = starts[kinds], starts[kinds + 1]
             if b > a:
                 gaps[n] = shade_gaps(
                     shares[a:b], mean[low_o, a:b], mean[high_o, a:b], sharpness[near_o, a:b], turn_o, oz
@@ -180,21 +194,23 @@ def sum_queries(
                             np.float32(x_high), np.float32(y_low), np.float32(y_high),
                         )  # fmt: skip
                     else:
-                        stops[family] = place_nodes(
+                        kind = column % of_warp if family == 0 else of_warp + row % of_weft
+                        stops[kind] = place_nodes(
                             bounds[p], first, size, yarn[family, RADIUS], family, np.float32(x - column),
                             np.float32(y - row), dx, dy, np.float32(x_low), np.float32(x_high), np.float32(y_low),
-                            np.float32(y_high), own_nodes[family], flat_cells[family], stops[family], line,
+                            np.float32(y_high), own_nodes[kind], flat_cells[kind], stops[kind], line,
                         )  # fmt: skip
-        for family in range(2):
-            if stops[family] == 0:
+        for kind in range(kinds):
+            if stops[kind] == 0:
                 continue
-            blocks = fill_block(own_nodes[family], flat_cells[family], stops[family])
+            family = 0 if kind < of_warp else 1
+            blocks = fill_block(own_nodes[kind], flat_cells[kind], stops[kind])
             d = directions(ix, iy, iz, ox, oy, oz, family)
             found = shade_footprint(
-                own_nodes[family, :blocks], cells[family, :blocks], grid, np.uint32(low_i * per_azimuth),
+                own_nodes[kind, :blocks], cells[kind, :blocks], grid, np.uint32(low_i * per_azimuth),
                 np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
                 np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
             )  # fmt: skip
             for q in range(SUMS):
-                result[n, family, q] = found[q]
+                result[n, kind, q] = found[q]
     return result, gaps

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.soft_nodes.answer import sum_queries
+from pipeline.analytic.soft_nodes.answer import SMALLEST, query_sums
 from pipeline.analytic.soft_nodes.nodes import Table
 from pipeline.analytic.soft_nodes.shade import (
     AREA,
@@ -42,7 +42,6 @@ from pipeline.analytic.soft_nodes.shade import (
 )
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel
-from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
 from pipeline.truth.query import Queries
 
@@ -65,7 +64,6 @@ _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least
 _FADED = np.float32(1e-4)  # of the bare area: of patches of which less is seen, most are hidden, and answer 0
 _TINY = np.float32(1e-18)
-_SMALLEST = np.float32(1e-3)  # standard deviation, in yarn spacings
 _STEEPEST = np.float32(3.0)  # slope of a half vector
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
@@ -166,15 +164,10 @@ def read_queries(table: Table, queries: Queries) -> Reading:
     queries : Queries
         Footprints of any shape.
     """
-    # A thousandth of a yarn is a point: smaller footprints would fall between the digits of a place.
-    footprints = deviations(queries, _SMALLEST)
-    size = np.sqrt(np.maximum(queries.sigma, _SMALLEST) * np.maximum(queries.sigma_minor, _SMALLEST))
-    u, v, x, y, correlation, wi, wo = (
-        np.ascontiguousarray(column, np.float32)
-        for column in (queries.u, queries.v, *footprints, queries.wi, queries.wo)
-    )
-    found, gaps = sum_queries(table, u, v, x, y, correlation, wi, wo)
-    reading = Reading(*(np.empty((len(u), width), np.float32) for width in (FEATURES, 4, 4)))
+    found, gaps = query_sums(table, queries)
+    size = np.sqrt(np.maximum(queries.sigma, SMALLEST) * np.maximum(queries.sigma_minor, SMALLEST))
+    wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
+    reading = Reading(*(np.empty((len(wi), width), np.float32) for width in (FEATURES, 4, 4)))
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
     _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, *reading)
     return reading

@@ -1,6 +1,7 @@
 """Groups of similar pieces: the pieces of a repeat that share nodes.
 
-Pieces of one shape that lie alike on floats of one length form a group. A draft of many different floats has too many
+Pieces of one shape that lie alike on floats of one length form a group, of one thread alone where sums are wanted by
+thread. A draft of many different floats has too many
 groups: then the two most alike are merged, again and again (Ward's distance between their inclinations), until the
 nodes of all groups are few enough.
 """
@@ -38,11 +39,14 @@ class PieceGroup(NamedTuple):
         Cells of the pieces.
     blocks : list of int
         Numbers of their horizons, one for each cell.
+    thread : int
+        The end or pick that they belong to; 0 if groups hold pieces of all threads.
     """
 
     piece: Piece
     cells: list[Cell]
     blocks: list[int]
+    thread: int = 0
 
     @property
     def lines(self) -> int:
@@ -57,18 +61,27 @@ class PieceGroup(NamedTuple):
         return COLUMNS * self.lines
 
 
-def gather(pieces: Sequence[tuple[Cell, Piece, int]]) -> list[PieceGroup]:
-    """Return the groups of pieces, given with their cell (end, pick) and the name of their horizons; warps first."""
+def gather(pieces: Sequence[tuple[Cell, Piece, int]], by_thread: bool = False) -> list[PieceGroup]:
+    """Return the groups of pieces, given with their cell (end, pick) and the name of their horizons.
+
+    Warps come first, then wefts and gaps; with `by_thread` those of each thread follow each other.
+    """
     alike: dict[tuple[float | int, ...], PieceGroup] = {}
     for cell, piece, block in pieces:
+        thread = cell[piece.family] if by_thread and piece.family != GAP else 0
         numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
-        group = alike.setdefault((piece.family, piece.side, *(round(n, 6) for n in numbers)), PieceGroup(piece, [], []))
+        key = (piece.family, piece.side, thread, *(round(n, 6) for n in numbers))
+        group = alike.setdefault(key, PieceGroup(piece, [], [], thread))
         group.cells.append(cell)
         group.blocks.append(block)
     groups: list[PieceGroup] = []
     for side, most in MOST_NODES.items():
-        groups += _merged([group for group in alike.values() if group.piece.side == side], most)
-    return sorted(groups, key=lambda group: group.piece.family)
+        # Pieces of different threads are not merged, so each thread has its own number of nodes.
+        for thread in sorted({group.thread for group in alike.values()}):
+            groups += _merged(
+                [group for group in alike.values() if group.piece.side == side and group.thread == thread], most
+            )
+    return sorted(groups, key=lambda group: (group.piece.family, group.thread))
 
 
 def _merged(groups: list[PieceGroup], most: int) -> list[PieceGroup]:
@@ -115,4 +128,4 @@ def _together(first: PieceGroup, second: PieceGroup) -> PieceGroup:
     middle = mean(one.offset * one.curve, other.offset * other.curve)
     # The length only tells where the arc of a yarn beneath ends.
     piece = one._replace(offset=middle / curve if curve else 0.0, curve=curve, half=max(one.half, other.half))
-    return PieceGroup(piece, cells, first.blocks + second.blocks)
+    return PieceGroup(piece, cells, first.blocks + second.blocks, first.thread)

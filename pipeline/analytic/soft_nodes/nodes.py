@@ -64,8 +64,11 @@ class Table(NamedTuple):
         Mean length of the floats of each family over the cells that show them; 1 if none does.
     uniform, waves_from : float
         Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves give its weights.
-    starts : int64 (4,)
-        First block of the nodes on warps, on wefts, in gaps; their end.
+    starts : int64 (K + 2,)
+        First block of the nodes of each kind of yarn, and of gaps; their end. Kinds are warps and wefts, K = 2, or all
+        ends, then all picks.
+    kinds : int64 (2,)
+        Kinds of warps, kinds of wefts: 1 and 1, or ends and picks.
     nodes : float32 (B, ROWS, BLOCK_NODES)
         See `surface`.
     evenly : float32 (B, BLOCK_NODES)
@@ -99,6 +102,7 @@ class Table(NamedTuple):
     uniform: float
     waves_from: float
     starts: Index
+    kinds: Index
     nodes: Float32
     evenly: Float32
     mean: Float32
@@ -122,8 +126,11 @@ class Table(NamedTuple):
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 
-def tabulate(fabric: Fabric) -> Table:
-    """Build the table of a fabric's front, as the default model of the truth sees it."""
+def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
+    """Build the table of a fabric's front, as the default model of the truth sees it.
+
+    With `by_thread` every end and pick of the repeat has nodes of its own.
+    """
     model = cloth_side(fabric, TruthOptions())
     front = model.front
     picks, ends = front.top.shape
@@ -144,14 +151,16 @@ def tabulate(fabric: Fabric) -> Table:
     size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
     grid = _horizon_grids(front, model.back, samples, size)
 
-    # The nodes of every group, each family in whole blocks.
-    groups = gather(located)
+    # The nodes of every group, each kind in whole blocks.
+    groups = gather(located, by_thread)
     rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
-    for family in (WARP, WEFT, GAP):
+    kinds = (ends, picks) if by_thread else (1, 1)
+    of_kinds = [(WARP, end) for end in range(kinds[0])] + [(WEFT, pick) for pick in range(kinds[1])] + [(GAP, 0)]
+    for kind in of_kinds:
         starts.append(stop // BLOCK_NODES)
         for group in groups:
-            if group.piece.family == family:
+            if (group.piece.family, group.thread) == kind:
                 first_nodes.append(stop)
                 stop += group.nodes
         stop += -stop % BLOCK_NODES
@@ -180,9 +189,10 @@ def tabulate(fabric: Fabric) -> Table:
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         float_length=_float_lengths(front),
-        uniform=_EVEN * longest_period(front),
+        uniform=_EVEN * (max(ends, picks) if by_thread else longest_period(front)),
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
+        kinds=np.array(kinds, np.int64),
         nodes=np.ascontiguousarray(in_blocks(nodes).transpose(1, 0, 2)),
         evenly=in_blocks(evenly),
         mean=in_blocks(mean),

@@ -1,4 +1,4 @@
-"""Mean colours of the threads in a footprint, against integrals on a lattice."""
+"""Mean colours of the threads in a footprint, against the exact ones and against integrals on a lattice."""
 
 import math
 
@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.footprint_colours import footprint_colours
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.thread_colours import component_colours
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
 
@@ -24,9 +28,9 @@ def queries(rows, rng, minor=None, behind=False):
 
 
 @pytest.mark.parametrize("minor", [None, 0.4])
-def test_diffuse_colours_are_means_over_what_is_seen_from_above(minor):
+def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
     fabric = coloured("gauze", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
-    asked = queries(3, np.random.default_rng(1), minor)
+    asked = queries(3, np.random.default_rng(1), minor, behind=True)
     found = footprint_colours(fabric, asked)
     step = (np.arange(1200) + 0.5) / 1200 * 9.0 - 4.5
     for row in range(3):
@@ -37,12 +41,30 @@ def test_diffuse_colours_are_means_over_what_is_seen_from_above(minor):
         mass = np.exp(-0.5 * (along / size) ** 2 - 0.5 * (across / float(asked.sigma_minor[row])) ** 2)
         cell = surface_at(fabric, np.floor(x) + 0.5, np.floor(y) + 0.5)
         for family, place in enumerate((x, y)):
-            colours = fabric.thread_colours()[family].diffuse
+            colours = fabric.thread_colours()[family].specular
             yarn, other = (fabric.warp, fabric.weft) if family == 0 else (fabric.weft, fabric.warp)
             weight = mass * np.where(cell.yarn == family, 1.0, 1.0 - other.width) * yarn.width
             expected = (weight[..., None] * colours[np.floor(place).astype(int) % 5]).sum(axis=(0, 1)) / weight.sum()
             # A coarse line has components 2 % off the ellipse's waves.
-            assert found[row, 2 + family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
+            assert found[row, family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
+
+
+@pytest.mark.parametrize("name", ["twill_4_4", "gauze", "crepe"])
+@pytest.mark.parametrize(
+    ("sigma", "stretch", "bound"), [((0.1, 0.6), 1.0, 0.02), ((0.8, 2.0), 1.0, 0.03), ((0.2, 0.5), 3.0, 0.04)]
+)
+def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, bound):
+    """RMSE of the colour over its mean square, against the exact shares; components are those of the truth in both."""
+    fabric = coloured(name, ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 96)
+    components = estimate(fabric, asked, TruthOptions(), 1).mean
+    exact = component_colours(fabric, asked, TruthOptions(relative_error=0.003, max_count=1 << 14), 2).mean
+    truth, found = coloured_by(components, exact), coloured_by(components, footprint_colours(fabric, asked))
+    assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < bound
+
+
+def coloured_by(components, colours):
+    return np.einsum("nc,ncx->nx", components, colours)
 
 
 def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.answer import sum_queries
+from pipeline.analytic.soft_nodes.answer import query_sums, sum_queries
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
@@ -140,3 +140,21 @@ def test_irregular_drafts_of_many_floats(side):
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
     truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
     assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.04
+
+
+@pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.5, 1.2), (6.0, 9.0)], ids=["narrow", "middle", "wide"])
+@pytest.mark.parametrize("name", ["cotton_twill", "gauze"])
+def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
+    fabric = load_fabric(name)
+    ends, picks = fabric.weave.repeat
+    queries = draw_queries(QueryOptions(sigma=sigma, stretch=4.0, max_angle=60.0), (ends, picks), 3, 0, 200)
+    whole, gaps = query_sums(tabulate(fabric), queries)
+    parts, own_gaps = query_sums(tabulate(fabric, by_thread=True), queries)
+    assert parts.shape[1] == ends + picks
+    added = np.stack([parts[:, :ends].sum(axis=1), parts[:, ends:].sum(axis=1)], axis=1)
+    # Weights are not normalised: components are shares of the area.
+    whole /= np.maximum(whole[:, :, BARE_AREA].sum(axis=1) + gaps, 1e-9)[:, None, None]
+    added /= np.maximum(added[:, :, BARE_AREA].sum(axis=1) + own_gaps, 1e-9)[:, None, None]
+    # Horizons are means over the cells of one thread in place of those of all, and regimes end elsewhere.
+    assert (np.sqrt(np.mean((added - whole) ** 2, axis=0)) < 0.05 * whole.mean(axis=0) + 1e-4).all()
+    np.testing.assert_allclose(added.mean(axis=0), whole.mean(axis=0), rtol=0.02, atol=1e-4)

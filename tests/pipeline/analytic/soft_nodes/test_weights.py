@@ -14,7 +14,7 @@ from weaves.fabric import load_fabric
 
 def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
     """Return the weights by products; those of an ellipse at an angle from 401 points of its line."""
-    weight = np.zeros((table.starts[3] * BLOCK_NODES // COLUMNS, COLUMNS), np.float32)
+    weight = np.zeros((table.starts[-1] * BLOCK_NODES // COLUMNS, COLUMNS), np.float32)
     blur, line = np.sqrt(1.0 - abs(correlation)), np.sqrt(abs(correlation))
     places = np.linspace(-4.0, 4.0, 401) if correlation else np.zeros(1)
     shares = np.exp(-0.5 * places**2) / np.exp(-0.5 * places**2).sum()
