@@ -81,12 +81,10 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
     for start in range(0, len(result), _CHUNK):
         part = queries.take(slice(start, start + _CHUNK))
         sums, _ = query_sums(table, part)
-        x, y, _ = deviations(part, SMALLEST)
-        columns = [np.ascontiguousarray(column, np.float64) for column in (part.u, part.v, x, y)]
+        u, v, x, y = (np.ascontiguousarray(a, np.float64) for a in (part.u, part.v, *deviations(part, SMALLEST)[:2]))
         weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
-        result[start : start + _CHUNK] = (
-            weighed_colours(check, *columns, weights).transpose(0, 2, 1, 3).reshape(-1, 4, 3)
-        )
+        found = weighed_colours(check, u, v, x, y, weights)
+        result[start : start + _CHUNK] = found.transpose(0, 2, 1, 3).reshape(-1, 4, 3)
     return result
 
 
