@@ -27,7 +27,7 @@ MODELS: Final[dict[str, int]] = {
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 4
+FALLBACK: Final = 5
 """Answers to queries outside a method's domain (`pipeline.models.fallback`)."""
 
 SCENES: Final = 1

@@ -44,8 +44,9 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     if model.of_one_material:
         optics = [fabric.optics() for fabric in recipe.seen + recipe.unseen]
         known = [fabric for fabric in fabrics if fabric.optics() in optics]
-    method: Any = _DomainOnly(_domain(model, recipe))
-    fallback = Fallback(method, model.options.kinds, recipe.bench.scenes.footprint)
+    options = model.options
+    method: Any = _DomainOnly(None if options.answers_outside else _domain(model, recipe))
+    fallback = Fallback(method, options.kinds | options.without_training, recipe.bench.scenes.footprint)
     fallback_rows = [
         fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
         for fabric, queries in queries_by_fabric

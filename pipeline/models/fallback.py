@@ -4,7 +4,8 @@ A query is first brought into the nearest form that the method knows: an ellipse
 area (or of its major axis, which blurs and never aliases), and curvature is left out. Light from behind, yarns unlike
 those of the training (open cloth after solid cloth alone), and footprints and directions beyond its ranges have no such
 form: they are out of the method's domain (`pipeline.models.domain`), and the fallback answers them. The share of such
-queries is part of every result.
+queries is part of every result. A method with a function `outside_domain` answers them itself; what remains for the
+fallback is a viewer behind the cloth.
 
 The fallback is a node table of the ground truth with other nodes (`NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. Queries
@@ -14,7 +15,7 @@ the estimator `quadrature`.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Final
 
 import numpy as np
@@ -92,6 +93,8 @@ class Fallback:
         self.name, self.setting = method.name, method.setting
         self._method, self._footprint = method, footprint
         self._domain: Domain | None = getattr(method, "domain", None)
+        # Some methods answer outside their domain themselves, in another way than within it.
+        self._outside: Callable[[Fabric, Queries], Float32] | None = getattr(method, "outside_domain", None)
         # A method may know a kind and not be trained on it: a scene's own recipe leaves out kinds that never occur
         # there.
         self._kinds = frozenset(kinds)
@@ -110,7 +113,7 @@ class Fallback:
         """Answer N queries of any kind, float32 (N, 4)."""
         outside = self.out_of_domain(fabric, queries)
         if not outside.any():
-            return self._method.predict(fabric, self._known(fabric, queries), seed)
+            return self._answers(fabric, queries, seed)
         return self._rows(fabric, queries, outside, seed)[:, :4]
 
     def rows(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
@@ -118,8 +121,16 @@ class Fallback:
         return self._rows(fabric, queries, self.out_of_domain(fabric, queries), seed)
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
-        """Return the transparency of N footprints, (N,), by the fallback; no light changes it."""
-        return fallback_rows(fabric, looks, seed)[:, 4]
+        """Return the transparency of N footprints, (N,), by the method or the fallback; no light changes it."""
+        own = getattr(self._method, "transparency", None)
+        if own is None:
+            return fallback_rows(fabric, looks, seed)[:, 4]
+        result, behind = np.empty(len(looks.u), np.float32), looks.wo[:, 2] < 0.0
+        if behind.any():
+            result[behind] = fallback_rows(fabric, looks.take(behind), seed)[:, 4]
+        if not behind.all():
+            result[~behind] = own(fabric, self._nearest(looks.take(~behind)))
+        return result
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the colours of the components of N queries, (N, 4, 3): the mean colours of their footprints."""
@@ -130,24 +141,37 @@ class Fallback:
         return self._method.bytes_stored(fabric)
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
-        """Return which queries about a fabric are out of the method's domain, (N,)."""
+        """Return which queries about a fabric are left to the fallback, (N,)."""
         # Seen from behind, cloth is another cloth: no method but the truth turns it over.
         behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
-        return behind if self._domain is None else behind | self._domain.out_of_domain(fabric, self._nearest(queries))
+        if self._domain is None or self._outside is not None:
+            return behind
+        return behind | self._domain.out_of_domain(fabric, self._nearest(queries))
 
     def _rows(self, fabric: Fabric, queries: Queries, outside: Mask, seed: int) -> Float32:
         result = np.full((len(outside), 5), np.nan, np.float32)
         if outside.any():
             result[outside] = fallback_rows(fabric, queries.take(outside), seed)
         if not outside.all():
-            inside = self._known(fabric, queries.take(~outside))
-            result[~outside, :4] = self._method.predict(fabric, inside, seed)
+            result[~outside, :4] = self._answers(fabric, queries.take(~outside), seed)
         return result
 
-    def _known(self, fabric: Fabric, queries: Queries) -> Queries:
-        """Return queries in the nearest form; footprints that see the average are no larger than trained on."""
+    def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Answer queries by the method, in the nearest form that it knows."""
         nearest = self._nearest(queries)
-        return nearest if self._domain is None else self._domain.within(fabric, nearest)
+        if self._domain is None:
+            return self._method.predict(fabric, nearest, seed)
+        alone = self._domain.out_of_domain(fabric, nearest) if self._outside else np.zeros(len(nearest.u), np.bool_)
+        if not alone.any():
+            # Footprints that see the average are no larger than trained on.
+            return self._method.predict(fabric, self._domain.within(fabric, nearest), seed)
+        result = np.empty((len(alone), 4), np.float32)
+        assert self._outside is not None
+        result[alone] = self._outside(fabric, nearest.take(alone))
+        if not alone.all():
+            inside = self._domain.within(fabric, nearest.take(~alone))
+            result[~alone] = self._method.predict(fabric, inside, seed)
+        return result
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

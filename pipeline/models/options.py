@@ -75,6 +75,11 @@ class Options(BaseModel):
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
+    without_training: ClassVar[frozenset[str]] = frozenset()
+    """Kinds of queries that it evaluates though no training has them, of `behind`, `stretch` and `curvature`."""
+    answers_outside: ClassVar[bool] = False
+    """True if it evaluates queries outside its domain too, in another way than those within."""
+
     parameter: ClassVar[str] = ""
     """Name of the field with the settings k, which trade speed for accuracy; empty if there is none."""
 

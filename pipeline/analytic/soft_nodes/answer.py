@@ -24,7 +24,16 @@ from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
 from pipeline.analytic.soft_nodes.footprint_nodes import LINE_ROWS, MOST_ACROSS, fill_block, gap_area, place_nodes
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK, BLOCK_NODES, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
-from pipeline.analytic.soft_nodes.shade import ROWS, SUMS, directions, shade_fixed, shade_footprint, shade_gaps
+from pipeline.analytic.soft_nodes.shade import (
+    ROWS,
+    SUMS,
+    directions,
+    shade_fixed,
+    shade_fixed_behind,
+    shade_footprint,
+    shade_footprint_behind,
+    shade_gaps,
+)
 from pipeline.analytic.soft_nodes.waves import HIGHEST
 from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
 from pipeline.compiled.arrays import Float32
@@ -53,7 +62,7 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
 def query_sums(table: Table, queries: Queries) -> tuple[Float32, Float32]:
-    """Return what `sum_queries` returns for N queries about flat cloth, light and viewer in front."""
+    """Return what `sum_queries` returns for N queries about flat cloth, the viewer in front."""
     columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo)
     return sum_queries(table, *(np.ascontiguousarray(column, np.float32) for column in columns))
 
@@ -69,7 +78,7 @@ def sum_queries(
     wi: Float32,
     wo: Float32,
 ) -> tuple[Float32, Float32]:
-    """Return the sums of N queries, light and viewer in front.
+    """Return the sums of N queries, the viewer in front; the light is behind only if the table knows it.
 
     Parameters
     ----------
@@ -83,7 +92,7 @@ def sum_queries(
     Returns
     -------
     float32 (N, K, SUMS), float32 (N,)
-        The sums of each kind of yarn (`Table.kinds`), and the area seen through gaps.
+        The sums of each kind of yarn (`Table.kinds`), five where the light is behind, and the area seen through gaps.
     """
     count = len(u)
     of_warp, of_weft = table.kinds[0], table.kinds[1]
@@ -94,7 +103,8 @@ def sum_queries(
     mean, sharpness, thickness = table.mean, table.sharpness, np.float32(table.thickness)
     piece_starts, pieces, bounds = table.piece_starts, table.pieces, table.bounds
     per_azimuth, per_grid = size * size, AZIMUTHS * size * size
-    grid = table.grid.reshape(table.grid.size)
+    grid, behind_grid = table.grid.reshape(table.grid.size), table.behind_grid.reshape(table.behind_grid.size)
+    behind_mean, behind_sharpness = table.behind_mean, table.behind_sharpness
 
     # Scratch: weights of fixed nodes, and nodes placed in the footprint, of all kinds.
     weight = np.zeros((starts[kinds + 1], BLOCK_NODES), np.float32)
@@ -159,6 +169,15 @@ def sum_queries(
                 family = 0 if kind < of_warp else 1
                 a, b = starts[kind], starts[kind + 1]
                 d = directions(ix, iy, iz, ox, oy, oz, family)
+                if iz < _0:
+                    through = shade_fixed_behind(
+                        nodes[a:b], shares[a:b], behind_mean[low_i, a:b], behind_mean[high_i, a:b],
+                        behind_sharpness[near_i, a:b], turn_i, mean[low_o, a:b], mean[high_o, a:b],
+                        sharpness[near_o, a:b], turn_o, d, yarn[family, ALPHA], thickness, yarn[family, BLEND],
+                    )  # fmt: skip
+                    for q in range(len(through)):
+                        result[n, kind, q] = through[q]
+                    continue
                 found = shade_fixed(
                     nodes[a:b], shares[a:b], mean[low_i, a:b], mean[high_i, a:b], sharpness[near_i, a:b], turn_i,
                     mean[low_o, a:b], mean[high_o, a:b], sharpness[near_o, a:b], turn_o, d, yarn[family, ALPHA],
@@ -206,6 +225,15 @@ def sum_queries(
             family = 0 if kind < of_warp else 1
             blocks = fill_block(own_nodes[kind], flat_cells[kind], stops[kind])
             d = directions(ix, iy, iz, ox, oy, oz, family)
+            if iz < _0:
+                through = shade_footprint_behind(
+                    own_nodes[kind, :blocks], cells[kind, :blocks], grid, behind_grid, np.uint32(low_i * per_azimuth),
+                    np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
+                    np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
+                )  # fmt: skip
+                for q in range(len(through)):
+                    result[n, kind, q] = through[q]
+                continue
             found = shade_footprint(
                 own_nodes[kind, :blocks], cells[kind, :blocks], grid, np.uint32(low_i * per_azimuth),
                 np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),

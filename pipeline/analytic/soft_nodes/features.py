@@ -35,10 +35,13 @@ from pipeline.analytic.soft_nodes.shade import (
     BARE_SPECULAR,
     DIFFUSE,
     DIFFUSE_DOUBT,
+    FADED,
+    LEAST_SEEN,
     OPEN_DIFFUSE,
     OPEN_SPECULAR,
     SPECULAR,
     SPECULAR_DOUBT,
+    TINY,
 )
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel
@@ -61,9 +64,6 @@ EXCHANGED_SIGN: Final = np.array([-1.0 if k in (28, 29) else 1.0 for k in range(
 """Factor of each feature under that exchange: a mirror reverses the twists."""
 
 _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
-_LEAST = np.float32(1e-8)  # of the bare area, that a denominator is at least
-_FADED = np.float32(1e-4)  # of the bare area: of patches of which less is seen, most are hidden, and answer 0
-_TINY = np.float32(1e-18)
 _STEEPEST = np.float32(3.0)  # slope of a half vector
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
@@ -85,8 +85,8 @@ def _assemble(
     """Turn sums into features (N, FEATURES), components (N, 4), and components without shadows (N, 4)."""
     for n in range(len(found)):
         bare = found[n, 0, BARE_AREA] + found[n, 1, BARE_AREA] + gaps[n]
-        area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], _LEAST * bare) + _TINY
-        inverse, faded = _1 / area, area / (area + _FADED * bare)
+        area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], LEAST_SEEN * bare) + TINY
+        inverse, faded = _1 / area, area / (area + FADED * bare)
         ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
         hx, hy, sense = ix + ox, iy + oy, _1
         if hx < _0:
@@ -101,10 +101,10 @@ def _assemble(
             components[n, f], components[n, 2 + f] = faded * specular, faded * diffuse
             bounds[n, f] = faded * own[OPEN_SPECULAR] * inverse
             bounds[n, 2 + f] = faded * own[OPEN_DIFFUSE] * inverse * _INVERSE_PI
-            per_diffuse, per_specular = _1 / (own[BARE_DIFFUSE] + _TINY), _1 / (own[BARE_SPECULAR] + _TINY)
+            per_diffuse, per_specular = _1 / (own[BARE_DIFFUSE] + TINY), _1 / (own[BARE_SPECULAR] + TINY)
             k = 8 * f
             row[k] = own[AREA] * inverse
-            row[k + 1] = own[AREA] / (own[BARE_AREA] + _TINY)
+            row[k + 1] = own[AREA] / (own[BARE_AREA] + TINY)
             row[k + 2] = own[DIFFUSE] * per_diffuse
             row[k + 3] = own[SPECULAR] * per_specular
             row[k + 4] = own[DIFFUSE_DOUBT] * per_diffuse * _2
@@ -114,9 +114,9 @@ def _assemble(
         row[16], row[17], row[18], row[19], row[20], row[21] = ix, iy, iz, ox, oy, oz
         row[22], row[23] = min(hx * slope, _STEEPEST), min(hy * slope, _STEEPEST)
         row[24] = ix * ox + iy * oy + iz * oz
-        row[25] = area / (bare + _TINY)
+        row[25] = area / (bare + TINY)
         row[26] = size[n] / (size[n] + _SMALL)
-        root = np.sqrt(area / (bare + _TINY))
+        root = np.sqrt(area / (bare + TINY))
         row[27] = root / (root + _HIDDEN)
         row[28], row[29] = sense * twists[0], sense * twists[1]
         for k in range(FEATURES - OF_QUERY):

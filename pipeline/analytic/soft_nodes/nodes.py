@@ -22,10 +22,10 @@ from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
 from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import tabulate_waves
-from pipeline.compiled.arrays import Float32, Float64, Index
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
-from pipeline.truth.geometry.horizon import horizon_sines
+from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
 from pipeline.truth.geometry.symmetry import longest_period, orbits
 from pipeline.truth.options import TruthOptions
@@ -93,6 +93,9 @@ class Table(NamedTuple):
         Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination.
     grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
         Horizons; cells are even in v across a yarn.
+    behind_mean, behind_sharpness, behind_grid
+        The same of the back of the cloth at the same places, its tangent planes included: above them the back sees
+        light from behind. Of no nodes and no grids if the table was built without.
     """
 
     repeat: Index
@@ -119,6 +122,9 @@ class Table(NamedTuple):
     pieces: Index
     bounds: Float32
     grid: npt.NDArray[np.uint8]
+    behind_mean: Float32
+    behind_sharpness: Float32
+    behind_grid: npt.NDArray[np.uint8]
 
     @property
     def nbytes(self) -> int:
@@ -126,10 +132,10 @@ class Table(NamedTuple):
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 
-def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
+def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> Table:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
-    With `by_thread` every end and pick of the repeat has nodes of its own.
+    With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind.
     """
     model = cloth_side(fabric, TruthOptions())
     front = model.front
@@ -149,7 +155,12 @@ def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
             located.append(((end, pick), piece, blocks[key]))
         piece_starts.append(len(located))
     size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
-    grid = _horizon_grids(front, model.back, samples, size)
+    x, y, gap = _grid_places(samples, size)
+    grid = _grids(horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS), size)
+    behind_grid = grid[:0]
+    if behind:
+        slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
+        behind_grid = _grids(slopes / np.sqrt(1.0 + slopes * slopes), size)
 
     # The nodes of every group, each kind in whole blocks.
     groups = gather(located, by_thread)
@@ -166,13 +177,15 @@ def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
         stop += -stop % BLOCK_NODES
     starts.append(stop // BLOCK_NODES)
     nodes = np.tile(LEVEL[:, None], stop)
-    evenly, mean = np.zeros(stop), np.zeros((AZIMUTHS, stop))
-    variance = np.ones((AZIMUTHS, stop))
+    evenly, (mean, variance) = np.zeros(stop), _no_horizons(stop)
+    behind_mean, behind_variance = _no_horizons(stop if behind else 0)
     for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
         indices = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
         evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
         mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
+        if behind:
+            behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
     used = list({id(one): one for pair in rules for one in pair}.values())
     number = {id(one): index for index, one in enumerate(used)}
     waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
@@ -196,7 +209,7 @@ def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
         nodes=np.ascontiguousarray(in_blocks(nodes).transpose(1, 0, 2)),
         evenly=in_blocks(evenly),
         mean=in_blocks(mean),
-        sharpness=in_blocks(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2))),
+        sharpness=in_blocks(_sharpness(variance)),
         groups=np.array(
             [
                 (start, group.lines, number[id(along)], number[id(across)], group.piece.family)
@@ -215,7 +228,20 @@ def tabulate(fabric: Fabric, by_thread: bool = False) -> Table:
         pieces=np.array([(piece.family, block) for _, piece, block in located], np.int64),
         bounds=np.array([_bounds(piece) for _, piece, _ in located], np.float32),
         grid=grid,
+        behind_mean=in_blocks(behind_mean),
+        behind_sharpness=in_blocks(_sharpness(behind_variance)),
+        behind_grid=behind_grid,
     )
+
+
+def _no_horizons(nodes: int) -> tuple[Float64, Float64]:
+    """Return mean and variance of the horizons of nodes that nothing hides, to be filled."""
+    return np.zeros((AZIMUTHS, nodes)), np.ones((AZIMUTHS, nodes))
+
+
+def _sharpness(variance: Float64) -> Float64:
+    """Return 1 over the width of the ramp of a horizon."""
+    return np.asarray(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2)))
 
 
 def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
@@ -247,19 +273,20 @@ def _float_lengths(front: HeightField) -> Float32:
     return np.array(found, np.float32)
 
 
-def _horizon_grids(
-    front: HeightField, back: HeightField, samples: list[tuple[int, int, Piece]], size: int
-) -> npt.NDArray[np.uint8]:
-    """Return the horizons of pieces, given with pick and end, in the middles of the cells of their grids."""
+def _grid_places(samples: list[tuple[int, int, Piece]], size: int) -> tuple[Float64, Float64, Mask]:
+    """Return the middles of the cells of all grids of pieces, given with pick and end, and which lie in gaps."""
     xs, ys, gaps = [], [], []
     for pick, end, piece in samples:
         x, y = (grid_middles(*extent, size, radius) for extent, radius in zip(piece.box, piece.radii, strict=True))
         xs.append(np.tile(end + x, size))
         ys.append(np.repeat(pick + y, size))
         gaps.append(np.full(size * size, piece.family == GAP))
-    x, y, gap = (np.concatenate(parts) for parts in (xs, ys, gaps))
-    sines = from_even(horizon_sines(front, back, x, y, gap, 2 * AZIMUTHS))
-    grids = sines.reshape(AZIMUTHS, len(samples), size, size).transpose(1, 0, 2, 3)
+    return np.concatenate(xs), np.concatenate(ys), np.concatenate(gaps)
+
+
+def _grids(sines: Float64, size: int) -> npt.NDArray[np.uint8]:
+    """Return grids from the sines of horizons at azimuths even in the angle."""
+    grids = from_even(sines).reshape(AZIMUTHS, -1, size, size).transpose(1, 0, 2, 3)
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
 
 

@@ -4,9 +4,14 @@ The formulas are those of pipeline.truth.scattering.point; surface, flakes and l
 flakes_float32 and slab_float32. Two things differ: a horizon is a ramp (soft_horizons), and a highlight has four places
 in a node's box.
 
+Light from behind is transmitted, and what the back of the cloth hides is soft too; light and viewer are on different
+sides, so that what hides one has nothing to do with what hides the other.
+
 Each family has ten sums, as shares of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and lit;
 BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, the part of the bare
 ones within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen, and lit without shadows: an upper bound of energy (features).
+With the light behind there are five: the first four, and THROUGH, the area times the share of light that crosses the
+yarn unscattered.
 """
 
 from __future__ import annotations
@@ -24,13 +29,24 @@ from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
-from pipeline.truth.scattering.slab_float32 import reflection
+from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 SUMS: Final = 10
 """Sums of a family."""
 
 AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(8)
 OPEN_DIFFUSE, OPEN_SPECULAR = 8, 9
+THROUGH: Final = 4
+"""Place of the fifth sum with the light behind."""
+
+LEAST_SEEN: Final = np.float32(1e-8)
+"""Least seen area by which sums are divided, as a share of the bare area."""
+
+FADED: Final = np.float32(1e-4)
+"""Seen share of the bare area at which components have faded to a half: most such patches are hidden, and answer 0."""
+
+TINY: Final = np.float32(1e-18)
+"""Keeps a quotient of sums finite."""
 
 ROWS: Final = 8
 """Rows of a block of nodes placed in a footprint."""
@@ -45,7 +61,10 @@ Ten = tuple[
     np.float32,
 ]  # fmt: skip
 
+Five = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
+
 _0, _1 = np.float32(0.0), np.float32(1.0)
+_SHORTEST = np.float32(1e-6)  # least squared length of a half vector
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _LEVELS = np.float32(LEVELS)
@@ -83,7 +102,7 @@ def directions(
     ix: np.float32, iy: np.float32, iz: np.float32, ox: np.float32, oy: np.float32, oz: np.float32, family: int
 ) -> Directions:
     """Prepare a query's directions for a family."""
-    size = _1 / ((ix + ox) ** 2 + (iy + oy) ** 2 + (iz + oz) ** 2)
+    size = _1 / max((ix + ox) ** 2 + (iy + oy) ** 2 + (iz + oz) ** 2, _SHORTEST)
     alike, right, opposite = azimuths_apart(ix, iy, ox, oy)
     if family == WEFT:
         ix, iy, ox, oy = iy, -ix, oy, -ox
@@ -132,6 +151,44 @@ def _node(
         flakes, _1, sigma(along_i, square), sigma(along_o, square), cos_i, cos_o, thickness
     )  # fmt: skip
     return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
+
+
+@inlined_fast_kernel
+def _node_behind(
+    d: Directions,
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    inverse: np.float32,
+    tx: np.float32,
+    ty: np.float32,
+    tz: np.float32,
+    along: np.float32,
+    across: np.float32,
+    seen: np.float32,
+    lit: np.float32,
+    weight: np.float32,
+    square: np.float32,
+    scale: np.float32,
+    thickness: np.float32,
+    blend: np.float32,
+) -> Five:
+    """Return a node's shares of the five sums with the light behind; arguments as for `_node`."""
+    cos_o = max(d.ox * nx + d.oy * ny + d.oz * nz, _0)
+    cos_i = max(-(d.ix * nx + d.iy * ny + d.iz * nz), _0)
+    wide = weight * inverse
+    area = wide * cos_o
+    diffuse = area * ((blend * cos_i - (_1 - blend) * d.iz) if cos_i > _0 else _0)
+    along_i, along_o = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
+    h, e, f = along_i + along_o, along + across, along - across
+    q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
+    q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
+    q01, q23 = q0 * q1, q2 * q3
+    flakes = scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
+    sigma_o = sigma(along_o, square)
+    specular = wide * transmission(flakes, _1, sigma(along_i, square), sigma_o, cos_i, cos_o, thickness)
+    both = seen * lit
+    return area * seen, diffuse * both, specular * both, area, area * seen * unscattered(sigma_o, cos_o, thickness)
 
 
 @fast_kernel
@@ -183,6 +240,47 @@ def shade_fixed(
             oc += open_c
             os += open_s
     return a, c, s, a0, c0, s0, dc, ds, oc, os
+
+
+@fast_kernel
+def shade_fixed_behind(
+    nodes: Float32,
+    weight: Float32,
+    low_i: Float32,
+    high_i: Float32,
+    sharpness_i: Float32,
+    turn_i: np.float32,
+    low_o: Float32,
+    high_o: Float32,
+    sharpness_o: Float32,
+    turn_o: np.float32,
+    d: Directions,
+    alpha: np.float32,
+    thickness: np.float32,
+    blend: np.float32,
+) -> Five:
+    """Return the sums over fixed nodes with the light behind; `low_i`, `high_i` and `sharpness_i` are of the back."""
+    square = alpha * alpha
+    scale = _FLAKES * alpha * square
+    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
+    a, c, s, a0, through = _0, _0, _0, _0, _0
+    for b in range(len(weight)):
+        for k in range(BLOCK_NODES):
+            over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
+            lit = ramp(above(-d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k]))
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+            along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
+            across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
+            node_a, node_c, node_s, bare_a, node_t = _node_behind(
+                d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
+                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, scale, thickness, blend,
+            )  # fmt: skip
+            a += node_a
+            c += node_c
+            s += node_s
+            a0 += bare_a
+            through += node_t
+    return a, c, s, a0, through
 
 
 @fast_kernel
@@ -244,6 +342,58 @@ def shade_footprint(
             oc += open_c
             os += open_s
     return a, c, s, a0, c0, s0, dc, ds, oc, os
+
+
+@fast_kernel
+def shade_footprint_behind(
+    nodes: Float32,
+    cells: npt.NDArray[np.uint32],
+    grid: npt.NDArray[np.uint8],
+    behind: npt.NDArray[np.uint8],
+    low_i: np.uint32,
+    high_i: np.uint32,
+    turn_i: np.float32,
+    low_o: np.uint32,
+    high_o: np.uint32,
+    turn_o: np.float32,
+    sharpness: np.float32,
+    d: Directions,
+    yarn: Float32,
+    thickness: np.float32,
+) -> Five:
+    """Return the sums over nodes placed in a footprint with the light behind; `behind` are the grids of the back."""
+    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
+    alpha, blend = yarn[ALPHA], yarn[BLEND]
+    square = alpha * alpha
+    scale = _FLAKES * alpha * square
+    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
+    level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
+    a, c, s, a0, through = _0, _0, _0, _0, _0
+    for b in range(len(cells)):
+        for k in range(BLOCK_NODES):
+            at = cells[b, k]
+            lit = ramp(above(level_i, np.float32(behind[at + low_i]), np.float32(behind[at + high_i]), turn_i, sharp))
+            over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
+            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+
+            angles, inner = bend(
+                nodes[b, SIN, k], nodes[b, COS, k], radius, nodes[b, ALONG, k], nodes[b, TURN, k], nodes[b, LIMIT, k]
+            )
+            nx, ny, nz = normal(angles, fibre.beta)
+            t = tangent(angles, fibre)
+            by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
+            along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
+            across = nodes[b, HALF_V, k] * _GAUSS * by_v
+            node_a, node_c, node_s, bare_a, node_t = _node_behind(
+                d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[b, WEIGHT, k],
+                square, scale, thickness, blend,
+            )  # fmt: skip
+            a += node_a
+            c += node_c
+            s += node_s
+            a0 += bare_a
+            through += node_t
+    return a, c, s, a0, through
 
 
 @fast_kernel

@@ -41,6 +41,7 @@ from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
 from pipeline.models.plain import refuse_other
 from pipeline.models.selvage.options import SelvageOptions
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -151,14 +152,15 @@ class Selvage:
         Range of its training; any query of the soft nodes if left out.
     """
 
-    without_training: ClassVar[frozenset[str]] = frozenset({"stretch"})
-    """Kinds of queries that need no training: the soft nodes weigh an ellipse."""
+    without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
+    """Kinds of queries that need no training: the soft nodes know them."""
 
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
+        self._nodes = SoftNodes(self.name)
         # Transposed weights; the normalisation folds into the first layer.
         layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
         first, *others = layers
@@ -178,9 +180,26 @@ class Selvage:
         self._cloths.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for queries outside its training."""
-        self._refuse(queries)
-        return self._corrected(fabric, queries)
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know.
+
+        Light from behind is answered by the soft nodes alone.
+        """
+        behind = queries.wi[:, 2] < 0.0
+        self._refuse(queries, behind=True)
+        if not behind.any():
+            return self._corrected(fabric, queries)
+        result = np.empty((len(behind), 4), np.float32)
+        result[behind] = self._nodes.predict(fabric, queries.take(behind))
+        result[~behind] = self._corrected(fabric, queries.take(~behind))
+        return result
+
+    def outside_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
+        return self._nodes.predict(fabric, queries)
+
+    def transparency(self, fabric: Fabric, looks: Queries) -> npt.NDArray[np.float32]:
+        """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
+        return self._nodes.transparency(fabric, looks)
 
     def per_query(self, fabric: Fabric) -> PerQuery:
         """Return the network; the soft nodes are summed before it, and the bias of the fabric is its constant."""
@@ -206,10 +225,9 @@ class Selvage:
         answer = _LARGEST * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
-    def _refuse(self, queries: Queries) -> None:
-        if self.domain is not None:
-            self.domain.refuse(queries._replace(sigma_minor=queries.sigma), self.name)
-        refuse_other(queries, self.name, stretch=True)
+    def _refuse(self, queries: Queries, behind: bool = False) -> None:
+        """Refuse queries of kinds that it does not know; `behind` lets light come from behind."""
+        refuse_other(queries, self.name, stretch=True, behind=behind)
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the soft nodes and the network."""

@@ -13,6 +13,8 @@ class SelvageOptions(Options):
     """Soft nodes corrected by a residual perceptron: one network for many fabrics and scales; own design."""
 
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
+    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind"})
+    answers_outside: ClassVar[bool] = True
 
     model: Literal["selvage"] = "selvage"
     """Name of its folder in `pipeline.models`."""

@@ -2,7 +2,8 @@
 
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
 (pipeline.analytic.soft_nodes); a query becomes one sum over them and costs about a microsecond. The error is a few per
-cent of the answer for a wide footprint, and more for a narrow one on a patch that is almost hidden.
+cent of the answer for a wide footprint, and more for a narrow one on a patch that is almost hidden. Light from behind
+and transparency need the horizons of the back too: they are tabulated when first asked for.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.soft_nodes.behind import read_behind
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.method import CHUNK
@@ -35,6 +37,7 @@ class SoftNodes:
     def __init__(self, name: str = "soft_nodes") -> None:
         self.name, self.setting = name, ""
         self._tables = PerFabric(tabulate)
+        self._behind = PerFabric(lambda fabric: tabulate(fabric, behind=True))
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -46,16 +49,37 @@ class SoftNodes:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know."""
-        refuse_other(queries, self.name, stretch=True)
-        table = self._tables.of(fabric)
-        result = np.empty((len(queries.u), 4), np.float32)
+        refuse_other(queries, self.name, stretch=True, behind=True)
+        behind = queries.wi[:, 2] < 0.0
+        if not behind.any():
+            return self._front(fabric, queries)
+        result = np.empty((len(behind), 4), np.float32)
+        result[behind] = self.behind(fabric, queries.take(behind))[:, :4]
+        result[~behind] = self._front(fabric, queries.take(~behind))
+        return result
+
+    def behind(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""
+        table, result = self._behind.of(fabric), np.empty((len(queries.u), 5), np.float32)
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            result[rows] = read_behind(table, queries.take(rows))
+        return result
+
+    def transparency(self, fabric: Fabric, looks: Queries) -> npt.NDArray[np.float32]:
+        """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
+        return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
+
+    def _front(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer N queries with the light in front."""
+        table, result = self._tables.of(fabric), np.empty((len(queries.u), 4), np.float32)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)
             result[rows] = read_queries(table, queries.take(rows)).components
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of the table."""
+        """Return the bytes of the table; with light from behind it is twice as large."""
         return self._tables.of(fabric).nbytes
 
 

@@ -22,5 +22,5 @@ class SoftNodesOptions(Options):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Footprints of any shape."""
-        return frozenset({"stretch"})
+        """Footprints of any shape, and light from behind."""
+        return frozenset({"stretch", "behind"})

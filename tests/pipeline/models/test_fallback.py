@@ -88,15 +88,34 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     assert wrong.sum() < 0.1 * size.sum()
 
 
+class Narrow(Seen):
+    """A trained method with a domain."""
+
+    domain = Domain.of({}, [load_fabric("denim")])
+
+
 def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
-    (selvage,) = load_model(pretrained_folder("selvage"))
-    fallback = Fallback(selvage, ())
     denim = load_fabric("denim")
     rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
-    queries = draw_queries(QueryOptions(sigma=(0.5, 1.0)), denim.weave.repeat, 3, 0, 20)
+    fallback, queries = Fallback(Narrow(), ()), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(denim, queries).any() and fallback.out_of_domain(rough, queries).all()
     found = fallback.predict(rough, queries)
     np.testing.assert_array_equal(found, fallback_answers(rough, queries, 0))
+
+
+def test_a_method_may_answer_outside_its_domain_itself():
+    """`selvage` does, by its soft nodes; the network answers within the domain, and nothing is left to the fallback."""
+    (selvage,) = load_model(pretrained_folder("selvage"))
+    fallback, denim = Fallback(selvage, selvage.without_training), load_fabric("denim")
+    rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
+    queries = draw_queries(QueryOptions(sigma=(1e-3, 1.0), behind=0.3), denim.weave.repeat, 3, 0, 200)
+    assert not fallback.out_of_domain(rough, queries).any()
+    np.testing.assert_array_equal(fallback.predict(rough, queries), SoftNodes().predict(rough, queries))
+    alone = selvage.domain.out_of_domain(denim, queries) | (queries.wi[:, 2] < 0)
+    assert 0.3 < alone.mean() < 0.9
+    found = fallback.predict(denim, queries)
+    np.testing.assert_array_equal(found[alone], SoftNodes().predict(denim, queries.take(alone)))
+    np.testing.assert_array_equal(found[~alone], selvage.predict(denim, queries.take(~alone)))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT, 0.03), (3.0 * FLAT, 0.1)])

@@ -79,7 +79,7 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
     about = exr.attributes
     assert about["fabrics"] == "1 polyester_lining, 2 basket, 3 silk_charmeuse, 4 denim"
     assert (about["scene"], about["method"], about["samples"]) == ("dinner_table", "selvage", 1)
-    assert 0 < about["fallback_share"] < 1 and about["versions"].startswith("truth ")
+    assert about["fallback_share"] == 0 and about["versions"].startswith("truth ")
 
 
 def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_path):

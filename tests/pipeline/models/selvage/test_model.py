@@ -140,7 +140,6 @@ def test_it_refuses_what_it_was_not_taught(fabrics):
     method = Selvage(SelvageNetwork(SMALL), domain)
     asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 8)
     for changed in (
-        asked._replace(wi=-asked.wi),
         asked._replace(wo=-asked.wo),
         asked._replace(curvature=np.full(8, 0.1, np.float32)),
     ):
@@ -149,6 +148,16 @@ def test_it_refuses_what_it_was_not_taught(fabrics):
         # Without a domain it still knows no more than the sums do.
         with pytest.raises(BadInput, match="selvage"):
             Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
+
+
+def test_light_from_behind_is_answered_by_the_soft_nodes(fabrics):
+    fabric, method = fabrics[0], Selvage(SelvageNetwork(SMALL), Domain.of({}, fabrics))
+    asked = draw_queries(QueryOptions(behind=0.5), fabric.weave.repeat, 1, 0, 64)
+    behind = asked.wi[:, 2] < 0
+    found = method.predict(fabric, asked)
+    np.testing.assert_array_equal(found[behind], SoftNodes().predict(fabric, asked.take(behind)))
+    np.testing.assert_array_equal(found[~behind], method.predict(fabric, asked.take(~behind)))
+    np.testing.assert_array_equal(method.transparency(fabric, asked), SoftNodes().transparency(fabric, asked))
 
 
 def test_a_network_told_to_shine_is_bounded(fabrics):

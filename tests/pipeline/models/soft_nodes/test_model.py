@@ -23,18 +23,20 @@ def test_it_is_the_sums_in_chunks():
     assert method.bytes_stored(fabric) == table.nbytes
 
 
-@pytest.mark.parametrize(
-    ("options", "column"),
-    [
-        ({"behind": 1.0}, "wi"),
-        ({"curvature": (0.1, 0.2)}, "curvature"),
-    ],
-)
-def test_what_the_sums_do_not_know_is_refused(options, column):
+def test_curved_cloth_is_refused():
     fabric = load_fabric("polyester_lining")
-    asked = draw_queries(QueryOptions(**options), fabric.weave.repeat, 2, 0, 20)
-    with pytest.raises(BadInput, match=f"20 rows; first row 0: {column}"):
+    asked = draw_queries(QueryOptions(curvature=(0.1, 0.2)), fabric.weave.repeat, 2, 0, 20)
+    with pytest.raises(BadInput, match="20 rows; first row 0: curvature"):
         SoftNodes().predict(fabric, asked)
+
+
+def test_lights_on_both_sides_are_answered_row_by_row():
+    fabric, method = load_fabric("voile"), SoftNodes()
+    asked = draw_queries(QueryOptions(behind=0.5), fabric.weave.repeat, 2, 0, 300)
+    behind = asked.wi[:, 2] < 0
+    found = method.predict(fabric, asked)
+    np.testing.assert_array_equal(found[~behind], method.predict(fabric, asked.take(~behind)))
+    np.testing.assert_array_equal(found[behind], method.behind(fabric, asked.take(behind))[:, :4])
 
 
 def test_viewers_behind_are_refused():
