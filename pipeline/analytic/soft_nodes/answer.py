@@ -27,6 +27,8 @@ from pipeline.analytic.soft_nodes.nodes import BLOCK, BLOCK_NODES, FAMILY, X_HIG
 from pipeline.analytic.soft_nodes.shade import (
     ROWS,
     SUMS,
+    GridHorizons,
+    Horizons,
     directions,
     shade_fixed,
     shade_fixed_behind,
@@ -170,11 +172,13 @@ def sum_queries(
                 a, b = starts[kind], starts[kind + 1]
                 d = directions(ix, iy, iz, ox, oy, oz, family)
                 if iz < _0:
+                    light = Horizons(
+                        behind_mean[low_i, a:b], behind_mean[high_i, a:b], behind_sharpness[near_i, a:b], turn_i
+                    )
+                    viewer = Horizons(mean[low_o, a:b], mean[high_o, a:b], sharpness[near_o, a:b], turn_o)
                     through = shade_fixed_behind(
-                        nodes[a:b], shares[a:b], behind_mean[low_i, a:b], behind_mean[high_i, a:b],
-                        behind_sharpness[near_i, a:b], turn_i, mean[low_o, a:b], mean[high_o, a:b],
-                        sharpness[near_o, a:b], turn_o, d, yarn[family, ALPHA], thickness, yarn[family, BLEND],
-                    )  # fmt: skip
+                        nodes[a:b], shares[a:b], light, viewer, d, yarn[family, ALPHA], thickness, yarn[family, BLEND]
+                    )
                     for q in range(len(through)):
                         result[n, kind, q] = through[q]
                     continue
@@ -226,10 +230,13 @@ def sum_queries(
             blocks = fill_block(own_nodes[kind], flat_cells[kind], stops[kind])
             d = directions(ix, iy, iz, ox, oy, oz, family)
             if iz < _0:
+                from_behind = GridHorizons(
+                    behind_grid, np.uint32(low_i * per_azimuth), np.uint32(high_i * per_azimuth), turn_i
+                )
+                from_front = GridHorizons(grid, np.uint32(low_o * per_azimuth), np.uint32(high_o * per_azimuth), turn_o)
                 through = shade_footprint_behind(
-                    own_nodes[kind, :blocks], cells[kind, :blocks], grid, behind_grid, np.uint32(low_i * per_azimuth),
-                    np.uint32(high_i * per_azimuth), turn_i, np.uint32(low_o * per_azimuth),
-                    np.uint32(high_o * per_azimuth), turn_o, sharp, d, yarn[family], thickness,
+                    own_nodes[kind, :blocks], cells[kind, :blocks], from_behind, from_front, sharp, d, yarn[family],
+                    thickness,
                 )  # fmt: skip
                 for q in range(len(through)):
                     result[n, kind, q] = through[q]

@@ -97,6 +97,45 @@ class Directions(NamedTuple):
     opposite: np.float32
 
 
+class Frame(NamedTuple):
+    """Surface at a node: unit normal, 1 / n_z and unit tangent."""
+
+    nx: np.float32
+    ny: np.float32
+    nz: np.float32
+    inverse: np.float32
+    tx: np.float32
+    ty: np.float32
+    tz: np.float32
+
+
+class Layer(NamedTuple):
+    """Optics of a family: squared roughness, scale of its flakes, optical thickness and blend."""
+
+    square: np.float32
+    scale: np.float32
+    thickness: np.float32
+    blend: np.float32
+
+
+class Horizons(NamedTuple):
+    """Mean horizons of blocks of fixed nodes at the azimuths around a direction, and where between them it lies."""
+
+    low: Float32
+    high: Float32
+    sharpness: Float32
+    turn: np.float32
+
+
+class GridHorizons(NamedTuple):
+    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction."""
+
+    grid: npt.NDArray[np.uint8]
+    low: np.uint32
+    high: np.uint32
+    turn: np.float32
+
+
 @fast_kernel
 def directions(
     ix: np.float32, iy: np.float32, iz: np.float32, ox: np.float32, oy: np.float32, oz: np.float32, family: int
@@ -156,39 +195,30 @@ def _node(
 @inlined_fast_kernel
 def _node_behind(
     d: Directions,
-    nx: np.float32,
-    ny: np.float32,
-    nz: np.float32,
-    inverse: np.float32,
-    tx: np.float32,
-    ty: np.float32,
-    tz: np.float32,
+    at: Frame,
     along: np.float32,
     across: np.float32,
     seen: np.float32,
     lit: np.float32,
     weight: np.float32,
-    square: np.float32,
-    scale: np.float32,
-    thickness: np.float32,
-    blend: np.float32,
+    layer: Layer,
 ) -> Five:
-    """Return a node's shares of the five sums with the light behind; arguments as for `_node`."""
-    cos_o = max(d.ox * nx + d.oy * ny + d.oz * nz, _0)
-    cos_i = max(-(d.ix * nx + d.iy * ny + d.iz * nz), _0)
-    wide = weight * inverse
+    """Return a node's shares of the five sums with the light behind; `along`, `across` as for `_node`."""
+    cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _0)
+    cos_i = max(-(d.ix * at.nx + d.iy * at.ny + d.iz * at.nz), _0)
+    wide = weight * at.inverse
     area = wide * cos_o
-    diffuse = area * ((blend * cos_i - (_1 - blend) * d.iz) if cos_i > _0 else _0)
-    along_i, along_o = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
+    diffuse = area * ((layer.blend * cos_i - (_1 - layer.blend) * d.iz) if cos_i > _0 else _0)
+    along_i, along_o = d.ix * at.tx + d.iy * at.ty + d.iz * at.tz, d.ox * at.tx + d.oy * at.ty + d.oz * at.tz
     h, e, f = along_i + along_o, along + across, along - across
-    q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
-    q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
+    q0, q1 = spread(h - e, d.size, layer.square), spread(h - f, d.size, layer.square)
+    q2, q3 = spread(h + f, d.size, layer.square), spread(h + e, d.size, layer.square)
     q01, q23 = q0 * q1, q2 * q3
-    flakes = scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
-    sigma_o = sigma(along_o, square)
-    specular = wide * transmission(flakes, _1, sigma(along_i, square), sigma_o, cos_i, cos_o, thickness)
-    both = seen * lit
-    return area * seen, diffuse * both, specular * both, area, area * seen * unscattered(sigma_o, cos_o, thickness)
+    flakes = layer.scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
+    sigma_o = sigma(along_o, layer.square)
+    specular = wide * transmission(flakes, _1, sigma(along_i, layer.square), sigma_o, cos_i, cos_o, layer.thickness)
+    both, clear = seen * lit, unscattered(sigma_o, cos_o, layer.thickness)
+    return area * seen, diffuse * both, specular * both, area, area * seen * clear
 
 
 @fast_kernel
@@ -246,40 +276,34 @@ def shade_fixed(
 def shade_fixed_behind(
     nodes: Float32,
     weight: Float32,
-    low_i: Float32,
-    high_i: Float32,
-    sharpness_i: Float32,
-    turn_i: np.float32,
-    low_o: Float32,
-    high_o: Float32,
-    sharpness_o: Float32,
-    turn_o: np.float32,
+    light: Horizons,
+    viewer: Horizons,
     d: Directions,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
 ) -> Five:
-    """Return the sums over fixed nodes with the light behind; `low_i`, `high_i` and `sharpness_i` are of the back."""
-    square = alpha * alpha
-    scale = _FLAKES * alpha * square
+    """Return the sums over fixed nodes with the light behind; `light` has the horizons of the back."""
+    layer = Layer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
-            lit = ramp(above(-d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k]))
+            over_o = above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k])
+            lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
             along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
-            node_a, node_c, node_s, bare_a, node_t = _node_behind(
-                d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
-                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, scale, thickness, blend,
+            at = Frame(
+                nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
+                nodes[b, 6, k],
             )  # fmt: skip
-            a += node_a
-            c += node_c
-            s += node_s
-            a0 += bare_a
-            through += node_t
+            found = _node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
+            a += found[0]
+            c += found[1]
+            s += found[2]
+            a0 += found[3]
+            through += found[4]
     return a, c, s, a0, through
 
 
@@ -348,32 +372,26 @@ def shade_footprint(
 def shade_footprint_behind(
     nodes: Float32,
     cells: npt.NDArray[np.uint32],
-    grid: npt.NDArray[np.uint8],
-    behind: npt.NDArray[np.uint8],
-    low_i: np.uint32,
-    high_i: np.uint32,
-    turn_i: np.float32,
-    low_o: np.uint32,
-    high_o: np.uint32,
-    turn_o: np.float32,
+    light: GridHorizons,
+    viewer: GridHorizons,
     sharpness: np.float32,
     d: Directions,
     yarn: Float32,
     thickness: np.float32,
 ) -> Five:
-    """Return the sums over nodes placed in a footprint with the light behind; `behind` are the grids of the back."""
+    """Return the sums over nodes placed in a footprint with the light behind; `light` has the grids of the back."""
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    alpha, blend = yarn[ALPHA], yarn[BLEND]
-    square = alpha * alpha
-    scale = _FLAKES * alpha * square
+    alpha = yarn[ALPHA]
+    layer = Layer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for b in range(len(cells)):
         for k in range(BLOCK_NODES):
-            at = cells[b, k]
-            lit = ramp(above(level_i, np.float32(behind[at + low_i]), np.float32(behind[at + high_i]), turn_i, sharp))
-            over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
+            low_i, high_i = light.grid[cells[b, k] + light.low], light.grid[cells[b, k] + light.high]
+            low_o, high_o = viewer.grid[cells[b, k] + viewer.low], viewer.grid[cells[b, k] + viewer.high]
+            lit = ramp(above(level_i, np.float32(low_i), np.float32(high_i), light.turn, sharp))
+            over_o = above(level_o, np.float32(low_o), np.float32(high_o), viewer.turn, sharp)
             seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
 
             angles, inner = bend(
@@ -384,15 +402,13 @@ def shade_footprint_behind(
             by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
             along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
             across = nodes[b, HALF_V, k] * _GAUSS * by_v
-            node_a, node_c, node_s, bare_a, node_t = _node_behind(
-                d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[b, WEIGHT, k],
-                square, scale, thickness, blend,
-            )  # fmt: skip
-            a += node_a
-            c += node_c
-            s += node_s
-            a0 += bare_a
-            through += node_t
+            at = Frame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
+            found = _node_behind(d, at, along, across, seen, lit, nodes[b, WEIGHT, k], layer)
+            a += found[0]
+            c += found[1]
+            s += found[2]
+            a0 += found[3]
+            through += found[4]
     return a, c, s, a0, through
 
 

@@ -3,7 +3,7 @@
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
 (pipeline.analytic.soft_nodes); a query becomes one sum over them and costs about a microsecond. The error is a few per
 cent of the answer for a wide footprint, and more for a narrow one on a patch that is almost hidden. Light from behind
-and transparency need the horizons of the back too: they are tabulated when first asked for.
+and transparency need the horizons of the back too: they are tabulated at the first such query.
 """
 
 from __future__ import annotations
