@@ -20,15 +20,15 @@ MODELS: Final[dict[str, int]] = {
     "point_sampled": 2,
     "prefiltered": 2,
     "selvage": 3,
-    "soft_nodes": 3,
+    "soft_nodes": 4,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 5
-"""Answers to queries outside a method's domain (`pipeline.models.fallback`)."""
+FALLBACK: Final = 6
+"""Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 1
 """The shipped scenes, and the queries of any scene."""

@@ -4,11 +4,13 @@ deviations                           weights
 both >= `Table.uniform`              the cloth evenly
 both >= `Table.waves_from`           waves
 the narrower one < `NARROW`,
+    `STRETCHED` times the other      nodes placed on lines along the footprint, at most `MOST`
     the wider one < `LONG`           nodes placed in the footprint
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
 
 Deviations are compared along a footprint's own axes. For a rotated footprint densities are a mixture
-(pipeline.truth.footprint.mixture), waves are exact, and nodes are placed in a footprint along the yarns of equal area.
+(pipeline.truth.footprint.mixture), waves and lines are exact, and other nodes are placed in a footprint along the
+yarns of equal area.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 from pipeline.analytic.axis_densities import NARROW, axis_densities
 from pipeline.analytic.soft_horizons import sharpness_of_points
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
+from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes, place_ellipse, sharpness_of
 from pipeline.analytic.soft_nodes.footprint_nodes import LINE_ROWS, MOST_ACROSS, fill_block, gap_area, place_nodes
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK, BLOCK_NODES, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
@@ -48,6 +51,9 @@ LONG: Final = 0.75
 """Largest deviation along the wider axis for which nodes are placed in a footprint that is narrow along the other axis.
 This bounds the number of nodes."""
 
+STRETCHED: Final = 1.5
+"""Least ratio of the axes of a narrow footprint that places nodes along its own axes."""
+
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
 
@@ -59,6 +65,7 @@ place."""
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
 _MOST_NODES = 3 * _MOST_CELLS * MOST_ACROSS**2
 _POINTS = COARSE_LINE.points
+_ROUND = Ellipse(1.0, 0.0, 1.0, 1.0, 1.0, 1)
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
@@ -116,7 +123,7 @@ def sum_queries(
     density_y = np.zeros((picks, len(table.places), COLUMNS), np.float32)
     touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
     columns, rows = np.zeros(ends, np.uint32), np.zeros(picks, np.uint32)
-    most = (_MOST_NODES + BLOCK_NODES - 1) // BLOCK_NODES
+    most = (max(_MOST_NODES, MOST) + BLOCK_NODES - 1) // BLOCK_NODES
     own_nodes = np.zeros((kinds, most, ROWS, BLOCK_NODES), np.float32)
     cells = np.zeros((kinds, most, BLOCK_NODES), np.uint32)
     flat_cells = cells.reshape(kinds, most * BLOCK_NODES)
@@ -136,7 +143,11 @@ def sum_queries(
         if rho != _0:
             narrowest, blur = np.float32(narrow_axis(dx, dy, rho)), np.sqrt(np.sqrt(_1 - rho * rho))
             near_x, near_y = blur * dx, blur * dy
-        if min(near_x, near_y) >= NARROW or max(near_x, near_y) >= LONG:
+        thin, shape = narrowest < NARROW and (rho != _0 or max(dx, dy) >= LONG), _ROUND
+        if thin:
+            shape = ellipse(dx, dy, rho)
+            thin = shape.major > STRETCHED * shape.minor and most_nodes(shape) <= MOST
+        if not thin and (min(near_x, near_y) >= NARROW or max(near_x, near_y) >= LONG):
             shares = weight
             if narrowest >= table.uniform:
                 shares = evenly
@@ -196,11 +207,17 @@ def sum_queries(
                 )
             continue
 
-        # Place nodes in every piece touched; a rotated footprint counts as one along the axes of the same area.
-        dx, dy = near_x, near_y
+        from_front = GridHorizons(grid, np.uint32(low_o * per_azimuth), np.uint32(high_o * per_azimuth), turn_o)
         stops[:] = 0
-        sharp = sharpness_of_points(max(dx, dy))
-        left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
+        dx, dy = near_x, near_y
+        if thin:
+            sharp = sharpness_of(shape)
+            gaps[n] = place_ellipse(table, shape, x, y, from_front, oz, own_nodes, flat_cells, stops)
+            left, right, lower, upper = x, x - 2.0, y, y - 2.0
+        else:
+            # Place nodes in every piece touched; a rotated footprint counts as one along the axes of the same area.
+            sharp = sharpness_of_points(max(dx, dy))
+            left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
         for row in range(math.floor(lower), math.floor(upper) + 1):
             for column in range(math.floor(left), math.floor(right) + 1):
                 cell = (row % picks) * ends + column % ends
@@ -233,7 +250,6 @@ def sum_queries(
                 from_behind = GridHorizons(
                     behind_grid, np.uint32(low_i * per_azimuth), np.uint32(high_i * per_azimuth), turn_i
                 )
-                from_front = GridHorizons(grid, np.uint32(low_o * per_azimuth), np.uint32(high_o * per_azimuth), turn_o)
                 through = shade_footprint_behind(
                     own_nodes[kind, :blocks], cells[kind, :blocks], from_behind, from_front, sharp, d, yarn[family],
                     thickness,
