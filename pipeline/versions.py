@@ -27,7 +27,7 @@ MODELS: Final[dict[str, int]] = {
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 6
+FALLBACK: Final = 7
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 1

@@ -141,9 +141,7 @@ class Fabric(BaseModel):
 
         Reflection keeps x and y, brings the other yarn on top, and turns a right-handed twist into a left-handed one.
         """
-        draft = Matrix(rows=tuple(Draft(~self.weave.warp_over).rows()))
-        warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (self.warp, self.weft))
-        return self.model_copy(update={"draft": draft, "warp": warp, "weft": weft})
+        return _turned(self)
 
     def to_toml(self) -> str:
         """Return a file that `load_fabric` reads back as an equal fabric."""
@@ -190,3 +188,10 @@ def load_fabric(name_or_path: str | Path) -> Fabric:
 @lru_cache(maxsize=1024)
 def _woven(family: Weave) -> Draft:
     return family.build()
+
+
+@lru_cache(maxsize=64)
+def _turned(fabric: Fabric) -> Fabric:
+    draft = Matrix(rows=tuple(Draft(~fabric.weave.warp_over).rows()))
+    warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (fabric.warp, fabric.weft))
+    return fabric.model_copy(update={"draft": draft, "warp": warp, "weft": weft})

@@ -17,8 +17,8 @@ class _DomainOnly:
 
     name = setting = ""
 
-    def __init__(self, domain: Domain | None) -> None:
-        self.domain = domain
+    def __init__(self, domain: Domain | None, turns: bool) -> None:
+        self.domain, self.turns = domain, turns
 
 
 def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterable[tuple[Fabric, Queries]]) -> float:
@@ -45,7 +45,7 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
         optics = [fabric.optics() for fabric in recipe.seen + recipe.unseen]
         known = [fabric for fabric in fabrics if fabric.optics() in optics]
     options = model.options
-    method: Any = _DomainOnly(None if options.answers_outside else _domain(model, recipe))
+    method: Any = _DomainOnly(None if options.answers_outside else _domain(model, recipe), options.turns)
     fallback = Fallback(method, options.kinds | options.without_training, recipe.bench.scenes.footprint)
     fallback_rows = [
         fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)

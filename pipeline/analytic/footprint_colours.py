@@ -65,8 +65,13 @@ def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
     queries : Queries
         Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
     """
-    front = (queries.wi[:, 2] > 0.0) & (queries.wo[:, 2] > 0.0)
-    result = np.empty((len(front), 4, 3))
+    result, back = np.empty((len(queries.u), 4, 3)), queries.wo[:, 2] < 0.0
+    if back.any():
+        result[back] = footprint_colours(fabric.back(), queries.take(back).turned())
+        if not back.all():
+            result[~back] = footprint_colours(fabric, queries.take(~back))
+        return result
+    front = queries.wi[:, 2] > 0.0
     if front.any():
         result[front] = _by_sums(fabric, queries.take(front))
     if not front.all():

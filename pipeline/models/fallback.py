@@ -4,8 +4,8 @@ A query is first brought into the nearest form that the method knows: an ellipse
 area (or of its major axis, which blurs and never aliases), and curvature is left out. Light from behind, yarns unlike
 those of the training (open cloth after solid cloth alone), and footprints and directions beyond its ranges have no such
 form: they are out of the method's domain (`pipeline.models.domain`), and the fallback answers them. The share of such
-queries is part of every result. A method with a function `outside_domain` answers them itself; what remains for the
-fallback is a viewer behind the cloth.
+queries is part of every result. A method with a function `outside_domain` answers them itself. A method that `turns`
+answers a viewer behind the cloth as one in front of the cloth's back.
 
 The fallback is a node table of the ground truth with other nodes (`NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. Queries
@@ -98,6 +98,7 @@ class Fallback:
         # A method may know a kind and not be trained on it: a scene's own recipe leaves out kinds that never occur
         # there.
         self._kinds = frozenset(kinds)
+        self._turns = bool(getattr(method, "turns", False))
         if self._domain:
             self._kinds &= self._domain.kinds | getattr(method, "without_training", frozenset())
 
@@ -127,7 +128,7 @@ class Fallback:
             return fallback_rows(fabric, looks, seed)[:, 4]
         result, behind = np.empty(len(looks.u), np.float32), looks.wo[:, 2] < 0.0
         if behind.any():
-            result[behind] = fallback_rows(fabric, looks.take(behind), seed)[:, 4]
+            result[behind] = own(fabric.back(), self._nearest(looks.take(behind)).turned())
         if not behind.all():
             result[~behind] = own(fabric, self._nearest(looks.take(~behind)))
         return result
@@ -142,8 +143,11 @@ class Fallback:
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which queries about a fabric are left to the fallback, (N,)."""
-        # Seen from behind, cloth is another cloth: no method but the truth turns it over.
-        behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
+        # Seen from behind, cloth is another cloth.
+        if self._turns:
+            behind = np.zeros(len(queries.u), np.bool_)
+        else:
+            behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
         if self._domain is None or self._outside is not None:
             return behind
         return behind | self._domain.out_of_domain(fabric, self._nearest(queries))
@@ -158,6 +162,13 @@ class Fallback:
 
     def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries by the method, in the nearest form that it knows."""
+        behind = queries.wo[:, 2] < 0.0
+        if behind.any():
+            result = np.empty((len(behind), 4), np.float32)
+            result[behind] = self._answers(fabric.back(), queries.take(behind).turned(), seed)
+            if not behind.all():
+                result[~behind] = self._answers(fabric, queries.take(~behind), seed)
+            return result
         nearest = self._nearest(queries)
         if self._domain is None:
             return self._method.predict(fabric, nearest, seed)

@@ -80,6 +80,9 @@ class Options(BaseModel):
     answers_outside: ClassVar[bool] = False
     """True if it evaluates queries outside its domain too, in another way than those within."""
 
+    turns: ClassVar[bool] = False
+    """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
+
     parameter: ClassVar[str] = ""
     """Name of the field with the settings k, which trade speed for accuracy; empty if there is none."""
 

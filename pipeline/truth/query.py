@@ -83,6 +83,11 @@ class Queries(NamedTuple):
         """True for queries with light or viewer behind the cloth, (N,)."""
         return np.asarray((self.wi[:, 2] < 0.0) | (self.wo[:, 2] < 0.0))
 
+    def turned(self) -> Queries:
+        """Return the queries as the back of the cloth has them: reflected in the fabric plane, places kept."""
+        flip = np.array([1.0, 1.0, -1.0], np.float32)
+        return self._replace(wi=self.wi * flip, wo=self.wo * flip)
+
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
         """Return the queries at `index`."""
         return Queries(*(column[index] for column in self))

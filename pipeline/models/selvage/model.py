@@ -154,6 +154,7 @@ class Selvage:
 
     without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
     """Kinds of queries that need no training: the soft nodes know them."""
+    turns: ClassVar[bool] = SelvageOptions.turns
 
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain

@@ -9,7 +9,7 @@ and transparency need the horizons of the back too: they are tabulated at the fi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,8 @@ class SoftNodes:
     name : str
         Name of the method.
     """
+
+    turns: ClassVar[bool] = SoftNodesOptions.turns
 
     def __init__(self, name: str = "soft_nodes") -> None:
         self.name, self.setting = name, ""

@@ -11,6 +11,7 @@ class SoftNodesOptions(Options):
     """Soft nodes, as in `selvage`, without a network; nothing is trained."""
 
     learns: ClassVar[bool] = False
+    turns: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
 
     model: Literal["soft_nodes"] = "soft_nodes"

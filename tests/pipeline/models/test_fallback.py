@@ -88,6 +88,25 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     assert wrong.sum() < 0.1 * size.sum()
 
 
+@pytest.mark.parametrize("name", ["denim", "voile"])
+def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
+    """Soft nodes and `selvage` turn the cloth; the truth of the back is the reference."""
+    fabric, (selvage,) = load_fabric(name), load_model(pretrained_folder("selvage"))
+    queries = draw_queries(QueryOptions(behind=0.4, sigma=(0.3, 2.0), max_angle=60.0), (4, 4), 5, 0, 200)
+    turned = queries.turned()
+    assert (turned.wo[:, 2] < 0).all()
+    truth = estimate(fabric, turned, TruthOptions(relative_error=0.01), 1)
+    for method in (SoftNodes(), selvage):
+        fallback = Fallback(method, {"stretch", "behind"})
+        assert not fallback.out_of_domain(fabric, turned).any()
+        found = fallback.predict(fabric, turned)
+        np.testing.assert_array_equal(found, fallback.predict(fabric.back(), queries))
+        wrong = (found - truth.mean) @ [0.3, 0.3, 0.5, 0.5]
+        assert np.sqrt(np.mean(wrong**2)) < 0.06 * np.mean(truth.mean @ [0.3, 0.3, 0.5, 0.5])
+        clear = fallback.transparency(fabric, turned)
+        assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
+
+
 class Narrow(Seen):
     """A trained method with a domain."""
 
