@@ -3,6 +3,9 @@
 Points are independent random ones or the R2 sequence with one random shift a query [Roberts2018R2]. An axis of the
 footprint narrower than `EVENLY` repeats is drawn from the Gaussian; wider, it is taken evenly over the repeat, whose
 density is then constant to 0.2 %. The random numbers are 23 bits of an integer hash of 32: enough to place points.
+
+A point is seen and lit, or not. With `soft` horizons both are ramps (pipeline.analytic.soft_horizons), as wide as the
+share of the footprint that a point stands for: biased, and with less variance.
 """
 
 from __future__ import annotations
@@ -36,6 +39,10 @@ from weaves.fabric import Fabric
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _STEP = np.float32(1e9)  # points are seen or not
+_POINT = np.float32(0.02)  # width of the ramp of a point that stands for nothing around it
+_BOX = np.float32(3.5)  # side of a point's share of the footprint: times the root of its axes' product over k
+_WIDEST = np.float32(0.5)  # yarn spacings: beyond, what a point stands for is another part of the yarn
+_RAMP = np.float32(0.8)  # width of the ramp, over the side
 _MASK = np.uint64(0xFFFFFFFF)
 _R2_FIRST, _R2_SECOND = np.uint32(3242174889), np.uint32(2447445414)  # 2^32 over the plastic number and its square
 _WEYL = np.uint32(0x9E3779B9)
@@ -53,9 +60,12 @@ class HorizonSampler:
         The cloth.
     grid, azimuths : int
         Nodes of the map a piece of yarn and side, and directions.
+    soft : bool
+        Whether horizons are ramps.
     """
 
-    def __init__(self, fabric: Fabric, grid: int = 16, azimuths: int = 32) -> None:
+    def __init__(self, fabric: Fabric, grid: int = 16, azimuths: int = 32, soft: bool = False) -> None:
+        self._soft = soft
         model = cloth_side(fabric, TruthOptions())
         self.map = horizon_map(model.front, model.back, grid, azimuths)
 
@@ -64,7 +74,7 @@ class HorizonSampler:
         u, v, wi, wo = (
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
         )
-        return _sample(self.map, u, v, *deviations(queries), wi, wo, count, r2, np.uint64(seed))
+        return _sample(self.map, u, v, *deviations(queries), wi, wo, count, r2, self._soft, np.uint64(seed))
 
     def bytes_stored(self) -> int:
         """Return the bytes of the map."""
@@ -83,6 +93,7 @@ def _sample(
     wo: Float32,
     count: int,
     r2: bool,
+    soft: bool,
     seed: np.uint64,
 ) -> Float32:
     rows = len(u)
@@ -111,6 +122,9 @@ def _sample(
             else:
                 _place_rotated(here_x, here_y, x, y, dx, dy, rho, np.float32(ends), np.float32(picks), seeds, r2)
             query_rows(wi[row], wo[row], azimuths, nodes, values, shared, row - begin)
+            if soft:
+                side = min(_BOX * np.sqrt(dx * dy * np.sqrt(_1 - rho * rho) / np.float32(count)), _WIDEST)
+                points[STEEPNESS, first : first + count] = _1 / (_POINT + _RAMP * side)
         fill_points(points, places, values, shared, end - begin, count)
         total = (end - begin) * count
         locate(table, total, points, places)

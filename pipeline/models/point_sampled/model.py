@@ -116,5 +116,6 @@ def restore(
     """Return one method for each number of points."""
     if options.visibility == "exact":
         return [PointSampled(count, options.footprint, options.name, options.sequence) for count in options.counts]
-    samplers = PerFabric(lambda fabric: HorizonSampler(fabric, options.horizon_nodes, options.azimuths))
+    soft = options.visibility == "soft_horizon"
+    samplers = PerFabric(lambda fabric: HorizonSampler(fabric, options.horizon_nodes, options.azimuths, soft))
     return [HorizonSampled(count, options.name, options.sequence, samplers) for count in options.counts]

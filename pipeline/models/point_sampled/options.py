@@ -29,8 +29,9 @@ class PointSampledOptions(Options):
     """Kernel the points are drawn from; must be the kernel of the truth."""
     sequence: Literal["random", "r2"] = "random"
     """Independent points, or the R2 sequence with one random shift a query."""
-    visibility: Literal["exact", "horizon"] = "exact"
-    """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision."""
+    visibility: Literal["exact", "horizon", "soft_horizon"] = "exact"
+    """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
+    or as ramps."""
     horizon_nodes: int = Field(default=32, ge=4, le=128)
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""
     azimuths: int = Field(default=64, ge=8, le=512)
@@ -38,8 +39,8 @@ class PointSampledOptions(Options):
 
     @model_validator(mode="after")
     def _horizons_of_gaussians(self) -> PointSampledOptions:
-        if self.visibility == "horizon" and self.footprint != "gaussian":
-            raise ValueError("visibility = 'horizon' needs footprint = 'gaussian'")
+        if self.visibility != "exact" and self.footprint != "gaussian":
+            raise ValueError(f"visibility = {self.visibility!r} needs footprint = 'gaussian'")
         return self
 
     @property
