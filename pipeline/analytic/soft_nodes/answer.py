@@ -213,33 +213,32 @@ def sum_queries(
         if thin:
             sharp = sharpness_of(shape)
             gaps[n] = place_ellipse(table, shape, x, y, from_front, oz, own_nodes, flat_cells, stops)
-            left, right, lower, upper = x, x - 2.0, y, y - 2.0
         else:
             # Place nodes in every piece touched; a rotated footprint counts as one along the axes of the same area.
             sharp = sharpness_of_points(max(dx, dy))
             left, right, lower, upper = x - REACH * dx, x + REACH * dx, y - REACH * dy, y + REACH * dy
-        for row in range(math.floor(lower), math.floor(upper) + 1):
-            for column in range(math.floor(left), math.floor(right) + 1):
-                cell = (row % picks) * ends + column % ends
-                for p in range(piece_starts[cell], piece_starts[cell + 1]):
-                    x_low, x_high = max(left - column, bounds[p, X_LOW]), min(right - column, bounds[p, X_HIGH])
-                    y_low, y_high = max(lower - row, bounds[p, Y_LOW]), min(upper - row, bounds[p, Y_HIGH])
-                    if x_high - x_low < _LEAST * dx or y_high - y_low < _LEAST * dy:
-                        continue
-                    family, first = pieces[p, FAMILY], pieces[p, BLOCK] * per_grid
-                    if family == GAP:
-                        gaps[n] += gap_area(
-                            bounds[p], grid, first, size, low_o * per_azimuth, high_o * per_azimuth, turn_o, sharp, oz,
-                            np.float32(x - column), np.float32(y - row), dx, dy, np.float32(x_low),
-                            np.float32(x_high), np.float32(y_low), np.float32(y_high),
-                        )  # fmt: skip
-                    else:
-                        kind = column % of_warp if family == 0 else of_warp + row % of_weft
-                        stops[kind] = place_nodes(
-                            bounds[p], first, size, yarn[family, RADIUS], family, np.float32(x - column),
-                            np.float32(y - row), dx, dy, np.float32(x_low), np.float32(x_high), np.float32(y_low),
-                            np.float32(y_high), own_nodes[kind], flat_cells[kind], stops[kind], line,
-                        )  # fmt: skip
+            for row in range(math.floor(lower), math.floor(upper) + 1):
+                for column in range(math.floor(left), math.floor(right) + 1):
+                    cell = (row % picks) * ends + column % ends
+                    for p in range(piece_starts[cell], piece_starts[cell + 1]):
+                        x_low, x_high = max(left - column, bounds[p, X_LOW]), min(right - column, bounds[p, X_HIGH])
+                        y_low, y_high = max(lower - row, bounds[p, Y_LOW]), min(upper - row, bounds[p, Y_HIGH])
+                        if x_high - x_low < _LEAST * dx or y_high - y_low < _LEAST * dy:
+                            continue
+                        family, first = pieces[p, FAMILY], pieces[p, BLOCK] * per_grid
+                        if family == GAP:
+                            gaps[n] += gap_area(
+                                bounds[p], grid, first, size, low_o * per_azimuth, high_o * per_azimuth, turn_o, sharp,
+                                oz, np.float32(x - column), np.float32(y - row), dx, dy, np.float32(x_low),
+                                np.float32(x_high), np.float32(y_low), np.float32(y_high),
+                            )  # fmt: skip
+                        else:
+                            kind = column % of_warp if family == 0 else of_warp + row % of_weft
+                            stops[kind] = place_nodes(
+                                bounds[p], first, size, yarn[family, RADIUS], family, np.float32(x - column),
+                                np.float32(y - row), dx, dy, np.float32(x_low), np.float32(x_high), np.float32(y_low),
+                                np.float32(y_high), own_nodes[kind], flat_cells[kind], stops[kind], line,
+                            )  # fmt: skip
         for kind in range(kinds):
             if stops[kind] == 0:
                 continue

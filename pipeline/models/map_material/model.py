@@ -1,8 +1,8 @@
 """A material of texture maps: what a program that knows no yarns shows of a fabric.
 
 The maps are those of `twillight export --maps` (pipeline.materials), for unit colours: red is the warp's, green the
-weft's, so that one evaluation gives the four components. The lobes and how they are read is in
-pipeline.materials.lookup. The method ignores that yarns hide one another, and that the mean of a product is not the
+weft's, so that one evaluation gives the four components. pipeline.materials.lookup reads and
+evaluates them. The method ignores that yarns hide one another, and that the mean of a product is not the
 product of the means.
 """
 
