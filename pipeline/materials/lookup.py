@@ -19,8 +19,8 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
+from pipeline.analytic.taps import taps
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.materials.layout import Layout
@@ -120,7 +120,7 @@ def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64
         sheen=sheen.astype(np.float32),
         specular=np.float32(specular),
         white=_white_sheen(),
-        taps=_taps(),
+        taps=taps(TAPS),
     )
 
 
@@ -136,15 +136,6 @@ def _white_sheen() -> Float32:
     for cosine in (np.arange(_VIEWS) + 0.5) / _VIEWS:
         found.append(math.pi * charlie(wi, np.array([math.sqrt(1.0 - cosine**2), 0.0, cosine]), SHEEN_ROUGHNESS).mean())
     return np.array(found, np.float32)
-
-
-def _taps() -> Float64:
-    """Return quantiles of the normal distribution, scaled to variance 1; one reading is in the middle."""
-    table = np.zeros((TAPS + 1, TAPS))
-    for count in range(2, TAPS + 1):
-        places = ndtri((np.arange(count) + 0.5) / count)
-        table[count, :count] = places / np.sqrt((places**2).mean())
-    return table
 
 
 @allocating_kernel

@@ -32,6 +32,7 @@ MARKERS: Final[Mapping[str, Marker]] = {
     "map_material": (8, 1, 0),
     "gauss_nodes": "^",
     "soft_nodes": ">",
+    "summed_area": (5, 0, 0),
 }
 """Marks of methods in plots, no two alike: no method is known by its colour alone."""
 
@@ -104,6 +105,7 @@ LIGHT: Final = Scheme(
         "map_material": "#b3263f",
         "gauss_nodes": "#8e44ad",
         "soft_nodes": "#d24fa2",
+        "summed_area": "#2e8b3c",
     },
     marks=MARKERS,
     others=("#7a5cf0", "#148f4a", "#a3352b", "#0e7c9b", "#b97400", "#9c4f86"),
@@ -132,6 +134,7 @@ DARK: Final = Scheme(
         "map_material": "#ff8fa3",
         "gauss_nodes": "#d29bf0",
         "soft_nodes": "#f9a8d8",
+        "summed_area": "#7fe08c",
     },
     marks=MARKERS,
     others=("#b3a1ff", "#5fd58f", "#f08a80", "#5cc6e0", "#f0b54a", "#dba0c8"),

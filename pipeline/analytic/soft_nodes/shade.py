@@ -149,7 +149,7 @@ def directions(
 
 
 @inlined_fast_kernel
-def _node(
+def shade_node(
     d: Directions,
     nx: np.float32,
     ny: np.float32,
@@ -203,7 +203,7 @@ def _node_behind(
     weight: np.float32,
     layer: Layer,
 ) -> Five:
-    """Return a node's shares of the five sums with the light behind; `along`, `across` as for `_node`."""
+    """Return a node's shares of the five sums with the light behind; `along`, `across` as for `shade_node`."""
     cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _0)
     cos_i = max(-(d.ix * at.nx + d.iy * at.ny + d.iz * at.nz), _0)
     wide = weight * at.inverse
@@ -254,7 +254,7 @@ def shade_fixed(
             lit = ramp(over_i)
             along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
-            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
                 d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
                 nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, scale, thickness, blend,
             )  # fmt: skip
@@ -350,7 +350,7 @@ def shade_footprint(
             by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
             along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
             across = nodes[b, HALF_V, k] * _GAUSS * by_v
-            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = _node(
+            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
                 d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[b, WEIGHT, k],
                 square, scale, thickness, blend,
             )  # fmt: skip

@@ -1,0 +1,183 @@
+"""The point model once a cluster, in the loop that reads four texels of a table; without branches."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_horizons import ramp
+from pipeline.analytic.soft_nodes.shade import Directions, Eight, shade_node
+from pipeline.analytic.summed_area.clusters import LANES
+from pipeline.analytic.summed_area.tables import AREA, LEVELS, MEAN, SPREAD, SPREAD_U, SPREAD_V, SPREADS, U, V
+from pipeline.analytic.torus_frame import Angles, Fibre, normal, tangent, turning
+from pipeline.compiled.arrays import Float32
+from pipeline.compiled.decorators import inlined_fast_kernel
+from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, SIN_TWIST
+
+CORNERS: Final = 4
+"""Texels around a centre."""
+
+Slots = npt.NDArray[np.uint32]
+Nine = tuple[
+    np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32
+]  # fmt: skip
+Four = tuple[np.float32, np.float32, np.float32, np.float32]
+
+_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_TINY = np.float32(1e-18)
+_FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a cluster; 1 / (4 pi) of the density
+_ONE_LEVEL = _1 / LEVELS
+# Width of a ramp: a share of that of an even distribution, sqrt 12 standard deviations, and a least one.
+_WIDTH = np.float32(0.8 * math.sqrt(12.0)) / SPREADS
+_SHARPEST = np.float32(0.02)
+# A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
+_TAIL = np.float32(0.001)
+_S3, _S5, _S7 = (np.float32(c) for c in (-1 / 6, 1 / 120, -1 / 5040))
+_C2, _C4, _C6, _C8 = (np.float32(c) for c in (-1 / 2, 1 / 24, -1 / 720, 1 / 40320))
+
+
+class Azimuth(NamedTuple):
+    """The azimuths around a direction, the nearer one, and where between them it lies."""
+
+    low: int
+    high: int
+    near: int
+    turn: np.float32
+
+
+class Optics(NamedTuple):
+    """A family of yarns: twist and relief, squared roughness, scale of its flakes, optical thickness, blend."""
+
+    fibre: Fibre
+    square: np.float32
+    scale: np.float32
+    thickness: np.float32
+    blend: np.float32
+
+
+@inlined_fast_kernel
+def optics(yarn: Float32, thickness: np.float32) -> Optics:
+    """Return the optics of a family, given its row of `HeightField.yarn`."""
+    alpha = yarn[ALPHA]
+    fibre = Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
+    return Optics(fibre, alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
+
+
+@inlined_fast_kernel
+def corner(
+    surface: Float32, horizon: npt.NDArray[np.uint8], slot: int, k: int, weight: np.float32, i: Azimuth, o: Azimuth
+) -> Nine:
+    """Return a cluster's share from one texel: area, and times it v, u, spreads, horizons and spreads of both."""
+    area = weight * surface[slot, AREA, k]
+    low, high = np.float32(horizon[slot, i.low, MEAN, k]), np.float32(horizon[slot, i.high, MEAN, k])
+    of_light = low + i.turn * (high - low)
+    low, high = np.float32(horizon[slot, o.low, MEAN, k]), np.float32(horizon[slot, o.high, MEAN, k])
+    of_viewer = low + o.turn * (high - low)
+    return (
+        area,
+        area * surface[slot, V, k],
+        area * surface[slot, U, k],
+        area * surface[slot, SPREAD_V, k],
+        area * surface[slot, SPREAD_U, k],
+        area * of_light,
+        area * np.float32(horizon[slot, i.near, SPREAD, k]),
+        area * of_viewer,
+        area * np.float32(horizon[slot, o.near, SPREAD, k]),
+    )
+
+
+@inlined_fast_kernel
+def over_horizon(z: np.float32, low: np.float32, width: np.float32, inverse: np.float32) -> np.float32:
+    """Return by how many widths of the ramp a direction clears a horizon, given the sums and 1 over their area."""
+    return (z - low * inverse * _ONE_LEVEL) / (width * inverse * _WIDTH + _SHARPEST)
+
+
+@inlined_fast_kernel
+def _evaluate(
+    area: np.float32,
+    v: np.float32,
+    u: np.float32,
+    spread_v: np.float32,
+    spread_u: np.float32,
+    low_i: np.float32,
+    width_i: np.float32,
+    low_o: np.float32,
+    width_o: np.float32,
+    d: Directions,
+    own: Optics,
+) -> Eight:
+    """Return a cluster's sums as `shade_node` does, from its sums over the texels."""
+    inverse = _1 / max(area, _TINY)
+    v, u = v * inverse, u * inverse
+    over_i, over_o = over_horizon(d.iz, low_i, width_i, inverse), over_horizon(d.oz, low_o, width_o, inverse)
+    seen, lit = ramp(over_o) + _TAIL / (_1 + over_o * over_o), ramp(over_i)
+    # Sine to 2e-4 and cosine to 3e-5 on [-pi/2, pi/2].
+    v2, u2 = v * v, u * u
+    a = Angles(
+        v * (_1 + v2 * (_S3 + v2 * (_S5 + v2 * _S7))),
+        max(_1 + v2 * (_C2 + v2 * (_C4 + v2 * (_C6 + v2 * _C8))), _TINY),
+        u * (_1 + u2 * (_S3 + u2 * (_S5 + u2 * _S7))),
+        max(_1 + u2 * (_C2 + u2 * (_C4 + u2 * (_C6 + u2 * _C8))), _TINY),
+    )
+    nx, ny, nz = normal(a, own.fibre.beta)
+    t = tangent(a, own.fibre)
+    by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, a, own.fibre)
+    # The area is that of the surface: no division by n_z.
+    return shade_node(
+        d, nx, ny, nz, _1, t.x, t.y, t.z, spread_u * inverse * by_u, spread_v * inverse * by_v, seen, lit, area,
+        own.square, own.scale, own.thickness, own.blend,
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
+def _cluster(
+    surface: Float32,
+    horizon: npt.NDArray[np.uint8],
+    slots: tuple[int, int, int, int],
+    k: int,
+    weights: Four,
+    i: Azimuth,
+    o: Azimuth,
+    d: Directions,
+    own: Optics,
+) -> Eight:
+    """Return the sums of cluster k of a block."""
+    p = corner(surface, horizon, slots[0], k, weights[0], i, o)
+    q = corner(surface, horizon, slots[1], k, weights[1], i, o)
+    r = corner(surface, horizon, slots[2], k, weights[2], i, o)
+    s = corner(surface, horizon, slots[3], k, weights[3], i, o)
+    return _evaluate(
+        p[0] + q[0] + r[0] + s[0], p[1] + q[1] + r[1] + s[1], p[2] + q[2] + r[2] + s[2], p[3] + q[3] + r[3] + s[3],
+        p[4] + q[4] + r[4] + s[4], p[5] + q[5] + r[5] + s[5], p[6] + q[6] + r[6] + s[6], p[7] + q[7] + r[7] + s[7],
+        p[8] + q[8] + r[8] + s[8], d, own,
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
+def sum_clusters(
+    surface: Float32,
+    horizon: npt.NDArray[np.uint8],
+    slots: Slots,
+    count: int,
+    weights: Four,
+    i: Azimuth,
+    o: Azimuth,
+    d: Directions,
+    yarn: Float32,
+    thickness: np.float32,
+) -> Four:
+    """Return seen area, diffuse, specular and bare area of the first `count` blocks of `slots`, (blocks, CORNERS)."""
+    own = optics(yarn, thickness)
+    area, diffuse, specular, bare = _0, _0, _0, _0
+    for b in range(count):
+        s0, s1, s2, s3 = slots[b, 0], slots[b, 1], slots[b, 2], slots[b, 3]
+        for k in range(LANES):
+            found = _cluster(surface, horizon, (s0, s1, s2, s3), k, weights, i, o, d, own)
+            area += found[0]
+            diffuse += found[1]
+            specular += found[2]
+            bare += found[3]
+    return area, diffuse, specular, bare
