@@ -294,7 +294,7 @@ LARGER = {
     "pipeline.analytic.soft_nodes.answer.sum_queries",
     "pipeline.analytic.soft_nodes.footprint_nodes.gap_area",
     "pipeline.analytic.soft_nodes.footprint_nodes.place_nodes",
-    "pipeline.analytic.soft_nodes.shade._node",
+    "pipeline.analytic.soft_nodes.shade.shade_node",
     "pipeline.analytic.soft_nodes.shade.shade_fixed",
     "pipeline.analytic.soft_nodes.shade.shade_footprint",
     "pipeline.analytic.soft_nodes.weights.wave_weights",
