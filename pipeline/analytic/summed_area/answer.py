@@ -1,8 +1,9 @@
 """The components of queries: four reads of each cluster's tables, and one evaluation of the point model.
 
-A footprint has the nearest level, read bilinearly. A long one is the mean of up to `TAPS` round ones along its longer
-axis. Components are sums over clusters, divided by the seen area, as those of points are; patches of which hardly
-anything is seen fade to 0, as in the truth.
+A footprint has the nearest level, read bilinearly; one smaller than those of the first level, a sixteenth of a yarn or
+more (tables), is answered as that. A long one is the mean of up to `TAPS` round ones along its longer axis. Components
+are sums over clusters, divided by the seen area, as those of points are; patches of which hardly anything is seen fade
+to 0, as in the truth.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ nothing about theirs. The idea: parts of the repeat that have alike normals and 
 much of a cluster a viewer sees within a footprint; the point model is evaluated once a cluster. Ours are the choice of
 clusters (k-means of inclinations and horizons), Gaussian windows in place of boxes, and horizons as ramps, which give
 the area that both viewer and light reach (pipeline.analytic.summed_area). Corrections by sampled points, which belong
-to that idea, did not help: reports/LOG.md.
+to that idea, did not help: reports/LOG.md. Footprints smaller than the finest tables are answered as those are: a
+sixteenth of a yarn spacing, an eighth for cloth of many different cells.
 """
 
 from __future__ import annotations
