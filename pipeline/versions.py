@@ -19,8 +19,8 @@ MODELS: Final[dict[str, int]] = {
     "gauss_nodes": 2,
     "point_sampled": 2,
     "prefiltered": 2,
-    "selvage": 3,
-    "soft_nodes": 4,
+    "selvage": 4,
+    "soft_nodes": 5,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 

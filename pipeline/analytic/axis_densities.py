@@ -25,7 +25,6 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 def axis_densities(
     places: Float32,
     weights: Float32,
-    columns: int,
     centre: np.float32,
     deviation: np.float32,
     reach: np.float32,
@@ -37,11 +36,11 @@ def axis_densities(
 
     Parameters
     ----------
-    places, weights : float32 (rules, columns)
-        Rules within a cell; `columns` is a constant where it can be, for the vector units.
+    places, weights : float32 (n,)
+        Rules within a cell, one after another: a single loop for the vector units.
     centre, deviation, reach : float32
         The footprint, in cells; where it is cut off, in deviations.
-    density : float32 (cells, rules, columns)
+    density : float32 (cells, n)
         Written, for touched cells only.
     touched, found : bool (cells,), uint32 (cells,)
         Written: which cells are touched, and their list.
@@ -64,11 +63,10 @@ def axis_densities(
             touched[cell] = True
             found[count] = cell
             count += 1
-            here[:, :] = _0
+            here[:] = _0
         middle = centre - np.float32(column)
-        for r in range(len(here)):
-            for k in range(columns):
-                d = (places[r, k] - middle) * inverse
-                here[r, k] += weights[r, k] * remaining(_HALF * d * d)
+        for k in range(len(here)):
+            d = (places[k] - middle) * inverse
+            here[k] += weights[k] * remaining(_HALF * d * d)
         cell = cell + 1 if cell + 1 < cells else 0
     return count

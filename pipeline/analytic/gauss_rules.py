@@ -36,7 +36,8 @@ def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
     s, weight = np.polynomial.legendre.leggauss(count)
     shares = np.concatenate([[0.0], np.cumsum(weight) / 2.0])
     if radius:
-        v = 0.5 * math.pi * s
+        first, last = (math.asin(min(max((end - 0.5) / radius, -1.0), 1.0)) for end in (low, high))
+        v = 0.5 * (first + last) + 0.5 * (last - first) * s
         places, weights = 0.5 + radius * np.sin(v), weight * np.cos(v)
     else:
         places, weights = 0.5 * (low + high) + 0.5 * (high - low) * s, weight

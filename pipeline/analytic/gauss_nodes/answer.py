@@ -200,7 +200,10 @@ def _densities(
         touched[:] = True
         even_densities(weights, s, out)
     else:
-        axis_densities(positions, weights, positions.shape[1], centre, s, np.float32(REACH), out, touched, cells)
+        axis_densities(
+            positions.reshape(positions.size), weights.reshape(weights.size), centre, s, np.float32(REACH),
+            out.reshape((len(out), positions.size)), touched, cells,
+        )  # fmt: skip
 
 
 @fast_kernel

@@ -17,7 +17,6 @@ from pipeline.analytic.soft_horizons import above, ramp, sharpness_of_points
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
-    BLOCK_NODES,
     BOUND,
     CURVE,
     FAMILY,
@@ -151,8 +150,8 @@ def _in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np
 
 @kernel
 def _write_node(
-    block: Float32,
-    slot: int,
+    nodes: Float32,
+    k: int,
     piece: Float32,
     family: int,
     radius: np.float32,
@@ -169,9 +168,9 @@ def _write_node(
         side, place, half_side, half_place = y, -(x - _HALF + piece[SHIFT]), box_y, box_x
     sine = min(max((side - _HALF) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
-    block[SIN, slot], block[COS, slot], block[ALONG, slot] = sine, cosine, place
-    block[HALF_V, slot], block[HALF_ALONG, slot] = min(half_side / (radius * cosine), _HALF), half_place
-    block[WEIGHT, slot], block[TURN, slot], block[LIMIT, slot] = weight, piece[CURVE], piece[BOUND]
+    nodes[SIN, k], nodes[COS, k], nodes[ALONG, k] = sine, cosine, place
+    nodes[HALF_V, k], nodes[HALF_ALONG, k] = min(half_side / (radius * cosine), _HALF), half_place
+    nodes[WEIGHT, k], nodes[TURN, k], nodes[LIMIT, k] = weight, piece[CURVE], piece[BOUND]
 
 
 @kernel
@@ -200,7 +199,7 @@ def place_ellipse(
         Horizons towards the viewer.
     oz : float32
         Rise of the viewer's direction.
-    nodes, cells : float32 (K, blocks, ROWS, BLOCK_NODES), uint32 (K, blocks * BLOCK_NODES)
+    nodes, cells : float32 (K, ROWS, most), uint32 (K, most)
         Written, by kinds of yarn.
     stops : int64 (K,)
         Written: number of nodes of each kind.
@@ -247,8 +246,7 @@ def place_ellipse(
                 k = stops[kind]
                 box_x = np.float32(0.5 * (length * abs(dx) + shape.apart * abs(dy)))
                 box_y = np.float32(0.5 * (length * abs(dy) + shape.apart * abs(dx)))
-                block, slot = nodes[kind, k // BLOCK_NODES], k % BLOCK_NODES
-                _write_node(block, slot, box, family, radius, in_x, in_y, box_x, box_y, weight)
+                _write_node(nodes[kind], k, box, family, radius, in_x, in_y, box_x, box_y, weight)
                 cells[kind, k] = place
                 stops[kind] = k + 1
     return gaps

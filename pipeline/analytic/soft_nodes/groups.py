@@ -8,15 +8,14 @@ nodes of all groups are few enough.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from pipeline.analytic.soft_nodes.detail import Detail
 from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER
 from pipeline.truth.geometry.pieces import Piece
-
-MOST_NODES: Final = {TOP: 256, UNDER: 128}
-"""Nodes of all groups on top, and of all beneath, above which groups are merged."""
 
 COLUMNS: Final = 8
 """Nodes across a yarn: half the width of the vector units."""
@@ -41,19 +40,24 @@ class PieceGroup(NamedTuple):
         Numbers of their horizons, one for each cell.
     thread : int
         The end or pick that they belong to; 0 if groups hold pieces of all threads.
+    dense : float
+        Nodes along it, as a multiple of those at level 2.
     """
 
     piece: Piece
     cells: list[Cell]
     blocks: list[int]
     thread: int = 0
+    dense: float = 1.0
 
     @property
     def lines(self) -> int:
         """Nodes along it."""
         if self.piece.side == UNDER:
-            return max(1, math.ceil(_STRIP * (self.piece.along[1] - self.piece.along[0])))
-        return next((count for length, count in _ALONG if 2.0 * self.piece.half < length), _LONG)
+            count = math.ceil(_STRIP * (self.piece.along[1] - self.piece.along[0]))
+        else:
+            count = next((count for length, count in _ALONG if 2.0 * self.piece.half < length), _LONG)
+        return max(1, round(self.dense * count))
 
     @property
     def nodes(self) -> int:
@@ -61,27 +65,36 @@ class PieceGroup(NamedTuple):
         return COLUMNS * self.lines
 
 
-def gather(pieces: Sequence[tuple[Cell, Piece, int]], by_thread: bool = False) -> list[PieceGroup]:
+def gather(pieces: Sequence[tuple[Cell, Piece, int]], detail: Detail, by_thread: bool = False) -> list[PieceGroup]:
     """Return the groups of pieces, given with their cell (end, pick) and the name of their horizons.
 
     Warps come first, then wefts and gaps; with `by_thread` those of each thread follow each other.
     """
     alike: dict[tuple[float | int, ...], PieceGroup] = {}
-    for cell, piece, block in pieces:
-        thread = cell[piece.family] if by_thread and piece.family != GAP else 0
-        numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
-        key = (piece.family, piece.side, thread, *(round(n, 6) for n in numbers))
-        group = alike.setdefault(key, PieceGroup(piece, [], [], thread))
-        group.cells.append(cell)
-        group.blocks.append(block)
+    for cell, whole, block in pieces:
+        thread = cell[whole.family] if by_thread and whole.family != GAP else 0
+        for piece in _parts(whole, detail.halves):
+            numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
+            key = (piece.family, piece.side, thread, *(round(n, 6) for n in numbers))
+            group = alike.setdefault(key, PieceGroup(piece, [], [], thread, detail.along))
+            group.cells.append(cell)
+            group.blocks.append(block)
     groups: list[PieceGroup] = []
-    for side, most in MOST_NODES.items():
+    for side, most in ((TOP, detail.most), (UNDER, detail.most // 2)):
         # Pieces of different threads are not merged, so each thread has its own number of nodes.
         for thread in sorted({group.thread for group in alike.values()}):
             groups += _merged(
                 [group for group in alike.values() if group.piece.side == side and group.thread == thread], most
             )
     return sorted(groups, key=lambda group: (group.piece.family, group.thread))
+
+
+def _parts(piece: Piece, count: int) -> list[Piece]:
+    """Return a piece of yarn cut into parts that are equal in the angle across; a gap is not cut."""
+    if piece.family == GAP or count == 1:
+        return [piece]
+    borders = [0.5 + piece.radius * math.sin(math.pi * (part / count - 0.5)) for part in range(count + 1)]
+    return [piece._replace(across=extent) for extent in itertools.pairwise(borders)]
 
 
 def _merged(groups: list[PieceGroup], most: int) -> list[PieceGroup]:
@@ -128,4 +141,4 @@ def _together(first: PieceGroup, second: PieceGroup) -> PieceGroup:
     middle = mean(one.offset * one.curve, other.offset * other.curve)
     # The length only tells where the arc of a yarn beneath ends.
     piece = one._replace(offset=middle / curve if curve else 0.0, curve=curve, half=max(one.half, other.half))
-    return PieceGroup(piece, cells, first.blocks + second.blocks, first.thread)
+    return PieceGroup(piece, cells, first.blocks + second.blocks, first.thread, first.dense)

@@ -18,10 +18,11 @@ import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
 from pipeline.analytic.soft_horizons import over_boxes
+from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
 from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
-from pipeline.analytic.soft_nodes.waves import tabulate_waves
+from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
@@ -37,13 +38,13 @@ BLOCK_NODES: Final = 16
 LEVELS: Final = 255.0
 """Largest value of a grid, for a horizon straight above."""
 
-_GRIDS = (24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 _GRID_BYTES = 1 << 20
+_GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 _EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
 _SHARPEST = 0.02  # least spread of a horizon
 
 # Columns of `Table.groups`.
-START, LINES, RULE_ALONG, RULE_ACROSS, GROUP_FAMILY = range(5)
+START, LINES, RULE_X, RULE_Y, GROUP_FAMILY = range(5)
 # Columns of `Table.pieces` and of `Table.bounds`.
 FAMILY, BLOCK = range(2)
 X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
@@ -76,14 +77,16 @@ class Table(NamedTuple):
     mean, sharpness : float32 (AZIMUTHS, B, BLOCK_NODES)
         Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
     groups : uint32 (K, 5)
-        First node, lines of nodes, rules along and across, family.
+        First node, lines of nodes, rules along x and y, family.
+    lines_per_cell : float
+        Mean number of lines of nodes in a cell.
     group_starts, cell_groups : uint32
         The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]].
-    places, weights : float32 (R, COLUMNS)
-        Rules; shorter ones are filled with weights of 0.
+    places_x, weights_x, places_y, weights_y : float32 (R COLUMNS,)
+        Rules one after another, along both axes; shorter ones are filled with weights of 0.
     waves : int64 (H, 2)
     wave_size : float32 (H,)
-    wave_nodes : float32 (H, B, 2, BLOCK_NODES)
+    wave_nodes : float32 (B, H / TOGETHER, 2 TOGETHER, BLOCK_NODES)
         See `waves`.
     piece_starts : int64
         The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
@@ -96,6 +99,10 @@ class Table(NamedTuple):
     behind_mean, behind_sharpness, behind_grid
         The same of the back of the cloth at the same places, its tangent planes included: above them the back sees
         light from behind. Of no nodes and no grids if the table was built without.
+    legendre : int
+        Most nodes along each axis of a piece that a narrow footprint covers in part.
+    narrow : float32
+        Deviation below which a footprint places its nodes.
     """
 
     repeat: Index
@@ -111,10 +118,13 @@ class Table(NamedTuple):
     mean: Float32
     sharpness: Float32
     groups: npt.NDArray[np.uint32]
+    lines_per_cell: float
     group_starts: npt.NDArray[np.uint32]
     cell_groups: npt.NDArray[np.uint32]
-    places: Float32
-    weights: Float32
+    places_x: Float32
+    weights_x: Float32
+    places_y: Float32
+    weights_y: Float32
     waves: Index
     wave_size: Float32
     wave_nodes: Float32
@@ -125,6 +135,8 @@ class Table(NamedTuple):
     behind_mean: Float32
     behind_sharpness: Float32
     behind_grid: npt.NDArray[np.uint8]
+    legendre: int
+    narrow: np.float32
 
     @property
     def nbytes(self) -> int:
@@ -132,11 +144,13 @@ class Table(NamedTuple):
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 
-def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> Table:
+def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL) -> Table:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind.
+    `level` is one of DETAILS.
     """
+    detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
     front = model.front
     picks, ends = front.top.shape
@@ -163,7 +177,7 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> T
         behind_grid = _grids(slopes / np.sqrt(1.0 + slopes * slopes), size)
 
     # The nodes of every group, each kind in whole blocks.
-    groups = gather(located, by_thread)
+    groups = gather(located, detail, by_thread)
     rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
     kinds = (ends, picks) if by_thread else (1, 1)
@@ -186,8 +200,13 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> T
         mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
-    used = list({id(one): one for pair in rules for one in pair}.values())
-    number = {id(one): index for index, one in enumerate(used)}
+    # Rules by axis: those across a weft run along y.
+    by_axis = [
+        (along, across) if group.piece.family == WEFT else (across, along)
+        for group, (across, along) in zip(groups, rules, strict=True)
+    ]
+    used = [list({id(pair[axis]): pair[axis] for pair in by_axis}.values()) for axis in range(2)]
+    number = [{id(one): index for index, one in enumerate(of_axis)} for of_axis in used]
     waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
@@ -212,18 +231,21 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> T
         sharpness=in_blocks(_sharpness(variance)),
         groups=np.array(
             [
-                (start, group.lines, number[id(along)], number[id(across)], group.piece.family)
-                for group, (across, along), start in zip(groups, rules, first_nodes, strict=True)
+                (start, group.lines, number[0][id(x)], number[1][id(y)], group.piece.family)
+                for group, (x, y), start in zip(groups, by_axis, first_nodes, strict=True)
             ],
             np.uint32,
         ),
+        lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
-        places=_filled([one.places for one in used], edge=True),
-        weights=_filled([one.weights for one in used], edge=False),
+        places_x=_filled([one.places for one in used[0]], edge=True).ravel(),
+        weights_x=_filled([one.weights for one in used[0]], edge=False).ravel(),
+        places_y=_filled([one.places for one in used[1]], edge=True).ravel(),
+        weights_y=_filled([one.weights for one in used[1]], edge=False).ravel(),
         waves=waves.periods,
         wave_size=waves.size,
-        wave_nodes=np.ascontiguousarray(waves.nodes.reshape(len(waves.size), 2, -1, BLOCK_NODES).transpose(0, 2, 1, 3)),
+        wave_nodes=_together(waves.nodes),
         piece_starts=np.array(piece_starts, np.int64),
         pieces=np.array([(piece.family, block) for _, piece, block in located], np.int64),
         bounds=np.array([_bounds(piece) for _, piece, _ in located], np.float32),
@@ -231,7 +253,15 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False) -> T
         behind_mean=in_blocks(behind_mean),
         behind_sharpness=in_blocks(_sharpness(behind_variance)),
         behind_grid=behind_grid,
+        legendre=detail.legendre,
+        narrow=np.float32(detail.narrow),
     )
+
+
+def _together(waves: Float32) -> Float32:
+    """Return waves (H, 2, nodes) by blocks of nodes, TOGETHER of them side by side."""
+    blocks = waves.reshape(len(waves) // TOGETHER, 2 * TOGETHER, -1, BLOCK_NODES)
+    return np.ascontiguousarray(blocks.transpose(2, 0, 1, 3))
 
 
 def _no_horizons(nodes: int) -> tuple[Float64, Float64]:

@@ -68,6 +68,7 @@ _SHORTEST = np.float32(1e-6)  # least squared length of a half vector
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _LEVELS = np.float32(LEVELS)
+_NEGLIGIBLE = np.float32(1e-4)
 # A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
 _TAIL = np.float32(0.0005)
 
@@ -247,6 +248,11 @@ def shade_fixed(
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
+        total = _0
+        for k in range(BLOCK_NODES):
+            total += weight[b, k]
+        if total < _NEGLIGIBLE:
+            continue
         for k in range(BLOCK_NODES):
             over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
             over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
@@ -334,37 +340,34 @@ def shade_footprint(
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
-    for b in range(len(cells)):
-        for k in range(BLOCK_NODES):
-            at = cells[b, k]
-            over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
-            over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
-            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
-            lit = ramp(over_i)
+    for k in range(len(cells)):
+        at = cells[k]
+        over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
+        over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
+        seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+        lit = ramp(over_i)
 
-            angles, inner = bend(
-                nodes[b, SIN, k], nodes[b, COS, k], radius, nodes[b, ALONG, k], nodes[b, TURN, k], nodes[b, LIMIT, k]
-            )
-            nx, ny, nz = normal(angles, fibre.beta)
-            t = tangent(angles, fibre)
-            by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
-            along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
-            across = nodes[b, HALF_V, k] * _GAUSS * by_v
-            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
-                d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[b, WEIGHT, k],
-                square, scale, thickness, blend,
-            )  # fmt: skip
-            doubt = lit * (_1 - lit) + seen * (_1 - seen)
-            a += node_a
-            c += node_c
-            s += node_s
-            a0 += bare_a
-            c0 += bare_c
-            s0 += bare_s
-            dc += bare_c * doubt
-            ds += bare_s * doubt
-            oc += open_c
-            os += open_s
+        angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
+        nx, ny, nz = normal(angles, fibre.beta)
+        t = tangent(angles, fibre)
+        by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
+        along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
+        across = nodes[HALF_V, k] * _GAUSS * by_v
+        node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
+            d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[WEIGHT, k],
+            square, scale, thickness, blend,
+        )  # fmt: skip
+        doubt = lit * (_1 - lit) + seen * (_1 - seen)
+        a += node_a
+        c += node_c
+        s += node_s
+        a0 += bare_a
+        c0 += bare_c
+        s0 += bare_s
+        dc += bare_c * doubt
+        ds += bare_s * doubt
+        oc += open_c
+        os += open_s
     return a, c, s, a0, c0, s0, dc, ds, oc, os
 
 
@@ -386,29 +389,26 @@ def shade_footprint_behind(
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, through = _0, _0, _0, _0, _0
-    for b in range(len(cells)):
-        for k in range(BLOCK_NODES):
-            low_i, high_i = light.grid[cells[b, k] + light.low], light.grid[cells[b, k] + light.high]
-            low_o, high_o = viewer.grid[cells[b, k] + viewer.low], viewer.grid[cells[b, k] + viewer.high]
-            lit = ramp(above(level_i, np.float32(low_i), np.float32(high_i), light.turn, sharp))
-            over_o = above(level_o, np.float32(low_o), np.float32(high_o), viewer.turn, sharp)
-            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
+    for k in range(len(cells)):
+        low_i, high_i = light.grid[cells[k] + light.low], light.grid[cells[k] + light.high]
+        low_o, high_o = viewer.grid[cells[k] + viewer.low], viewer.grid[cells[k] + viewer.high]
+        lit = ramp(above(level_i, np.float32(low_i), np.float32(high_i), light.turn, sharp))
+        over_o = above(level_o, np.float32(low_o), np.float32(high_o), viewer.turn, sharp)
+        seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
 
-            angles, inner = bend(
-                nodes[b, SIN, k], nodes[b, COS, k], radius, nodes[b, ALONG, k], nodes[b, TURN, k], nodes[b, LIMIT, k]
-            )
-            nx, ny, nz = normal(angles, fibre.beta)
-            t = tangent(angles, fibre)
-            by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
-            along = nodes[b, HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
-            across = nodes[b, HALF_V, k] * _GAUSS * by_v
-            at = Frame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
-            found = _node_behind(d, at, along, across, seen, lit, nodes[b, WEIGHT, k], layer)
-            a += found[0]
-            c += found[1]
-            s += found[2]
-            a0 += found[3]
-            through += found[4]
+        angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
+        nx, ny, nz = normal(angles, fibre.beta)
+        t = tangent(angles, fibre)
+        by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
+        along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
+        across = nodes[HALF_V, k] * _GAUSS * by_v
+        at = Frame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
+        found = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
+        a += found[0]
+        c += found[1]
+        s += found[2]
+        a0 += found[3]
+        through += found[4]
     return a, c, s, a0, through
 
 

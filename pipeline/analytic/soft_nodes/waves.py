@@ -19,11 +19,14 @@ from pipeline.analytic.soft_nodes.groups import PieceGroup
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.geometry.heightfield import WEFT
 
-MOST_WAVES: Final = 24
+MOST_WAVES: Final = 48
 """Most waves kept: they cost about as much time as the densities of all cells."""
 
 HIGHEST: Final = 10
 """Largest number of periods in a repeat, along x and along y."""
+
+TOGETHER: Final = 4
+"""Waves that are summed together: their number is a multiple of it."""
 
 _FAINT = 0.01  # damping below which a wave is left out
 _ABSENT = 1e-6  # amplitude of a wave that cancels over the cells of every group
@@ -102,6 +105,10 @@ def tabulate_waves(
         periods.append((m, n))
         sizes.append(size**2)
         values.append((2.0 * wave.real, 2.0 * wave.imag))
+    while len(periods) % TOGETHER:
+        periods.append((0, 0))
+        sizes.append(0.0 if not sizes else sizes[-1])
+        values.append((np.zeros(nodes), np.zeros(nodes)))
     return Waves(
         np.array(periods, np.int64).reshape(-1, 2),
         np.array(sizes, np.float32),

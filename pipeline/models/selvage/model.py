@@ -76,7 +76,7 @@ class SelvageNetwork(nn.Module):
         self.scale: Tensor
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
-        self._tables = [tabulate(fabric) for fabric in fabrics]
+        self._tables = [tabulate(fabric, level=options.level) for fabric in fabrics]
         if fabrics:
             self._measure(fabrics)
 
@@ -161,7 +161,7 @@ class Selvage:
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
-        self._nodes = SoftNodes(self.name)
+        self._nodes = SoftNodes(network.options.level, self.name)
         # Transposed weights; the normalisation folds into the first layer.
         layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
         first, *others = layers
@@ -253,7 +253,7 @@ class Selvage:
 
     def _tabulate(self, fabric: Fabric) -> tuple[Table, Tensor]:
         """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
-        table, (weight, bias) = tabulate(fabric), self._first
+        table, (weight, bias) = tabulate(fabric, level=self._network.options.level), self._first
         return table, bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
 
 

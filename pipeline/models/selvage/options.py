@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from pipeline.models.options import Name, Options, Weight
+from pipeline.models.soft_nodes.options import Level
 
 
 class SelvageOptions(Options):
@@ -25,6 +26,8 @@ class SelvageOptions(Options):
     """Width of the hidden layers."""
     layers: int = Field(default=2, ge=1, le=8)
     """Hidden layers."""
+    level: Level = 2
+    """Level of detail of its soft nodes."""
     exchange: bool = True
     """Exchange warp and weft in a random half of the training steps."""
     measured_rows: int = Field(default=1024, ge=16, le=2**20)

@@ -16,7 +16,8 @@ LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
     ("name", "found"),
     [
         ("selvage", ("selvage", "")),
-        ("soft_nodes", ("soft_nodes", "")),
+        ("soft_nodes", ("soft_nodes", "k = 8")),
+        ("soft_nodes:1", ("soft_nodes", "k = 1")),
         ("prefiltered", ("prefiltered", "")),
         ("point_sampled", ("point_sampled", "k = 64")),
         ("point_sampled:3", ("point_sampled", "k = 3")),
@@ -53,7 +54,8 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
     [
         ("selvege", "did you mean 'selvage'"),
         ("woven", "must be trained first"),
-        ("soft_nodes:4", "soft_nodes has no settings"),
+        ("soft_nodes:3", "1, 2, 4 or 8"),
+        ("prefiltered:4", "prefiltered has no settings"),
         ("gauss_nodes:99", "less than or equal to 16"),
         ("gauss_nodes:x", "a number k after the colon"),
         ("", "the folder of a trained model or a name"),

@@ -22,7 +22,7 @@ COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 @pytest.mark.parametrize(
     ("options", "bound"),
     [
-        (SoftNodesOptions(), 0.04),
+        (SoftNodesOptions(levels=[2]), 0.04),
         (GaussNodesOptions(nodes=[8]), 0.04),
         (SummedAreaOptions(clusters=[64]), 0.05),
         (PointSampledOptions(counts=[4096], sequence="r2", visibility="horizon"), 0.03),

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.groups import MOST_NODES, gather
+from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
+from pipeline.analytic.soft_nodes.groups import gather
 from pipeline.truth.geometry.heightfield import TOP, height_field
 from pipeline.truth.geometry.pieces import cell_pieces
 from weaves.draft import Matrix
@@ -24,20 +25,25 @@ def placed(fabric):
 
 @pytest.mark.parametrize(("name", "groups"), [("polyester_lining", 2), ("cotton_twill", 4), ("satin_8", 8)])
 def test_regular_weaves_have_few_groups(name, groups):
-    assert len(gather(placed(load_fabric(name)))) == groups
+    assert len(gather(placed(load_fabric(name)), DETAILS[USUAL])) == groups
 
 
+@pytest.mark.parametrize("level", DETAILS)
 @pytest.mark.parametrize("side", [8, 16])
-def test_many_different_floats_are_merged_and_no_cell_is_lost(side):
-    pieces = placed(irregular(side))
-    groups = gather(pieces)
-    assert sum(group.nodes for group in groups if group.piece.side == TOP) <= MOST_NODES[TOP]
-    assert sorted(cell for group in groups for cell in group.cells) == sorted(cell for cell, _, _ in pieces)
+def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
+    pieces, detail = placed(irregular(side)), DETAILS[level]
+    groups = gather(pieces, detail)
+    nodes = [group.nodes for group in groups if group.piece.side == TOP]
+    # Pieces that differ across are not merged: one group of each is left.
+    assert sum(nodes) <= max(detail.most, 2 * detail.halves * max(nodes))
+    cells = sorted(cell for cell, _, _ in pieces for _ in range(detail.halves))
+    assert sorted(cell for group in groups for cell in group.cells) == cells
 
     # What is merged keeps the mean inclination of its cells.
     for family in (0, 1):
         own = [piece for _, piece, _ in pieces if piece.family == family]
         expected = np.mean([piece.offset * piece.curve for piece in own])
         merged = [group for group in groups if group.piece.family == family]
-        found = sum(len(group.cells) * group.piece.offset * group.piece.curve for group in merged) / len(own)
+        found = sum(len(group.cells) * group.piece.offset * group.piece.curve for group in merged)
+        found /= detail.halves * len(own)
         assert found == pytest.approx(expected, abs=1e-9)

@@ -17,8 +17,8 @@ def irregular(side, width):
 @pytest.mark.parametrize(
     ("fabric", "most"),
     [
-        (load_fabric("polyester_lining"), 1e5),
-        (load_fabric("satin_8"), 3e5),
+        (load_fabric("polyester_lining"), 2e5),
+        (load_fabric("satin_8"), 8e5),
         (irregular(8, 1.0), 1.3e6),
         (irregular(8, 0.8), 1.3e6),
     ],

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import sum_queries
-from pipeline.analytic.soft_nodes.footprint_nodes import LINE_ROWS, fill_block, place_nodes
+from pipeline.analytic.soft_nodes.footprint_nodes import Footprint, Part, fill_block, place_nodes
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, CURVE, X_HIGH, X_LOW, Y_HIGH, Y_LOW, tabulate
+from pipeline.analytic.soft_nodes.scratch import scratch_for
 from pipeline.analytic.soft_nodes.shade import (
     ALONG,
     BARE_AREA,
@@ -15,13 +16,13 @@ from pipeline.analytic.soft_nodes.shade import (
     BARE_SPECULAR,
     HALF_ALONG,
     HALF_V,
-    ROWS,
     SIN,
     SUMS,
     WEIGHT,
     directions,
     shade_footprint,
 )
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
 from pipeline.truth.scattering import microflake, slab
 from weaves.fabric import load_fabric
@@ -81,8 +82,15 @@ def test_fixed_nodes(table, pair):
         np.testing.assert_allclose(found[0, family, [BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR]], sums, rtol=RTOL)
 
 
+@allocating_kernel
+def _place(table, scratch, piece, footprint, part, kind):
+    """Call what is compiled into its callers alone."""
+    place_nodes(table, scratch, piece, 0, footprint, part, kind)
+
+
+@pytest.mark.parametrize("deviations", [(0.3, 0.35), (0.04, 0.35), (0.05, 0.04)], ids=["part", "across", "whole"])
 @pytest.mark.parametrize("pair", DIRECTIONS)
-def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair):
+def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviations):
     """A footprint over the middle of the piece of each family's first cell; the grid of horizons is not read."""
     wi, wo = (unit(*w) for w in pair)
     ends = fabric.weave.repeat[0]
@@ -91,26 +99,25 @@ def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair):
         cell = int(np.searchsorted(table.piece_starts, piece, side="right")) - 1
         bounds, yarn = table.bounds[piece], table.yarn[family]
         assert bounds[CURVE] > 0
-        nodes, cells = np.zeros((4, ROWS, BLOCK_NODES), np.float32), np.zeros(4 * BLOCK_NODES, np.uint32)
+        scratch = scratch_for(table, 4 * BLOCK_NODES)
+        nodes, cells = scratch.nodes[family], scratch.cells[family]
         corners = [bounds[column] for column in (X_LOW, X_HIGH, Y_LOW, Y_HIGH)]
         # Away from the edges of the yarn, where a point's own rounding turns the normal.
-        low_x, high_x, low_y, high_y = (np.float32(0.5 + 0.9 * (x - 0.5)) for x in corners)
-        footprint = (np.float32(x) for x in (0.55, 0.4, 0.3, 0.35))
-        stop = place_nodes(
-            bounds, 0, 1, yarn[RADIUS], family, *footprint, low_x, high_x, low_y, high_y, nodes, cells, 0,
-            np.zeros((LINE_ROWS, 8), np.float32),
-        )  # fmt: skip
-        blocks = fill_block(nodes, cells, stop)
-        nodes[:, HALF_V], nodes[:, HALF_ALONG] = 0.0, 0.0
+        part = Part(*(np.float32(0.5 + 0.9 * (x - 0.5)) for x in corners))
+        footprint = Footprint(*(np.float32(x) for x in (0.55, 0.4, *deviations)))
+        _place(table, scratch, piece, footprint, part, family)
+        stop = scratch.stops[family]
+        count = fill_block(nodes, cells, stop)
+        nodes[HALF_V], nodes[HALF_ALONG] = 0.0, 0.0
         none = (np.uint32(0), np.uint32(0), np.float32(0.0))
         given = directions(*wi, *wo, family)
         found = shade_footprint(
-            nodes[:blocks], cells.reshape(4, -1)[:blocks], np.zeros(1, np.uint8), *none, *none, np.float32(1.0), given,
+            nodes, np.zeros(count, np.uint32), np.zeros(1, np.uint8), *none, *none, np.float32(1.0), given,
             yarn, table.thickness,
         )  # fmt: skip
         assert len(found) == SUMS
 
-        rows = nodes[:blocks].transpose(1, 0, 2).reshape(ROWS, -1)[:, :stop].astype(np.float64)
+        rows = nodes[:, :stop].astype(np.float64)
         across = 0.5 + float(yarn[RADIUS]) * rows[SIN]
         along = 0.5 + (rows[ALONG] if family == WARP else -rows[ALONG]) - float(bounds[4])
         x, y = (across, along) if family == WARP else (along, across)

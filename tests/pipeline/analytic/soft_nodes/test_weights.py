@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.axis_densities import axis_densities
+from pipeline.analytic.soft_nodes.footprint_nodes import REACH
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, tabulate
-from pipeline.analytic.soft_nodes.waves import HIGHEST
-from pipeline.analytic.soft_nodes.weights import REACH, TURN_ROWS, product_weights, wave_weights
+from pipeline.analytic.soft_nodes.scratch import scratch_for
+from pipeline.analytic.soft_nodes.weights import product_weights, wave_weights, waves_kept
 from pipeline.truth.footprint.mixture import narrow_axis
 from weaves.fabric import load_fabric
 
@@ -29,11 +30,15 @@ def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
 def _add_product(table, x, y, deviation_x, deviation_y, share, weight):
     ends, picks = table.repeat
     found = []
-    for centre, deviation, cells in ((x, deviation_x, ends), (y, deviation_y, picks)):
-        density = np.zeros((cells, len(table.places), COLUMNS), np.float32)
+    of_axes = (
+        (x, deviation_x, ends, table.places_x, table.weights_x),
+        (y, deviation_y, picks, table.places_y, table.weights_y),
+    )
+    for centre, deviation, cells, places, weights in of_axes:
+        density = np.zeros((cells, len(places)), np.float32)
         touched, listed = np.zeros(cells, np.bool_), np.zeros(cells, np.uint32)
         count = axis_densities(
-            table.places, table.weights, COLUMNS, np.float32(centre), np.float32(deviation), np.float32(REACH), density,
+            places, weights, np.float32(centre), np.float32(deviation), np.float32(REACH), density,
             touched, listed,
         )  # fmt: skip
         found.append((density, listed[:count]))
@@ -44,11 +49,13 @@ def _add_product(table, x, y, deviation_x, deviation_y, share, weight):
 
 
 def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
-    weight, turns = np.zeros_like(table.evenly), np.zeros((TURN_ROWS, HIGHEST + 1), np.float32)
+    scratch = scratch_for(table, 1)
     narrowest = narrow_axis(deviation_x, deviation_y, correlation)
-    numbers = (np.float32(n) for n in (x, y, deviation_x, deviation_y, correlation, narrowest, *table.repeat))
-    wave_weights(table.waves, table.wave_size, table.wave_nodes, table.evenly, *numbers, turns, weight)
-    return weight
+    numbers = (np.float32(n) for n in (x, y, deviation_x, deviation_y, correlation))
+    count, period = waves_kept(table.wave_size, np.float32(narrowest)), (np.float32(n) for n in table.repeat)
+    waves = table.waves, table.wave_nodes, table.evenly
+    wave_weights(*waves, *numbers, count, *period, scratch.turns, scratch.phases, scratch.weight)
+    return scratch.weight.copy()
 
 
 @pytest.mark.parametrize("name", ["denim", "satin_8", "herringbone"])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.method import Method
@@ -12,15 +13,17 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-def test_it_is_the_sums_in_chunks():
+def test_each_level_is_its_sums_in_chunks():
     fabric = load_fabric("polyester_lining")
-    (method,) = load_methods(SoftNodesOptions())
-    assert isinstance(method, Method)
-    assert method.covers(fabric)
     asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 5000)
-    table = tabulate(fabric)
-    np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
-    assert method.bytes_stored(fabric) == table.nbytes
+    methods = load_methods(SoftNodesOptions())
+    assert [method.setting for method in methods] == [f"k = {level}" for level in DETAILS]
+    for method, level in zip(methods, DETAILS, strict=True):
+        assert isinstance(method, Method)
+        assert method.covers(fabric)
+        table = tabulate(fabric, level=level)
+        np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
+        assert method.bytes_stored(fabric) == table.nbytes
 
 
 def test_curved_cloth_is_refused():

@@ -1,0 +1,180 @@
+"""Sums of a narrow footprint over nodes that it places itself.
+
+A patch that is almost hidden shows the tail of its footprint: there nodes are placed a second time, finer and farther
+out. What is seen of less than `HIDDEN_SHARE` counts as hidden, as it does in the truth.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pipeline.analytic.axis_densities import NARROW
+from pipeline.analytic.soft_horizons import sharpness_of_points
+from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
+from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, place_ellipse, sharpness_of
+from pipeline.analytic.soft_nodes.footprint_nodes import (
+    MOST_ACROSS,
+    REACH,
+    Footprint,
+    Part,
+    fill_block,
+    gap_area,
+    place_nodes,
+)
+from pipeline.analytic.soft_nodes.look import Look
+from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
+from pipeline.analytic.soft_nodes.scratch import Scratch
+from pipeline.analytic.soft_nodes.shade import (
+    AREA,
+    BARE_AREA,
+    DIFFUSE,
+    OPEN_DIFFUSE,
+    OPEN_SPECULAR,
+    SPECULAR,
+    SUMS,
+    GridHorizons,
+    directions,
+    shade_footprint,
+    shade_footprint_behind,
+)
+from pipeline.compiled.arrays import Float32
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.query import HIDDEN_SHARE
+
+LONG: Final = 0.75
+"""Largest deviation along the wider axis for which nodes are placed in a footprint that is narrow along the other axis.
+This bounds the number of nodes."""
+
+# Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
+_MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
+MOST_PLACED: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
+"""Most nodes that a footprint places."""
+
+_HIDDEN = np.float32(0.05)  # share of the bare area seen, below which nodes are placed again:
+_PARTS = 2  # in so many parts of the footprint along each axis,
+_FAR = 4.3  # to so many deviations
+_LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
+_0 = np.float32(0.0)
+
+
+@kernel
+def _place_round(
+    table: Table, scratch: Scratch, look: Look, dx: np.float32, dy: np.float32, reach: float, parts: int
+) -> np.float32:  # fmt: skip
+    """Place nodes in every piece that a footprint along the axes touches; return the area seen through gaps.
+
+    The footprint ends at `reach` deviations and is cut into `parts` along each axis, which have nodes of their own.
+    """
+    ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
+    of_warp, of_weft, per_azimuth = table.kinds[0], table.kinds[1], size * size
+    viewer = GridHorizons(
+        scratch.grid, np.uint32(look.low_o * per_azimuth), np.uint32(look.high_o * per_azimuth), look.turn_o
+    )
+    sharp, gaps, room = sharpness_of_points(max(dx, dy) / np.float32(parts)), _0, scratch.cells.shape[1] - 64
+    wide, high, least = 2.0 * reach * dx / parts, 2.0 * reach * dy / parts, _LEAST / parts
+    scratch.stops[:] = 0
+    for cut in range(parts * parts):
+        left, lower = look.x - reach * dx + (cut % parts) * wide, look.y - reach * dy + (cut // parts) * high
+        right, upper = left + wide, lower + high
+        for row in range(math.floor(lower), math.floor(upper) + 1):
+            for column in range(math.floor(left), math.floor(right) + 1):
+                cell = (row % picks) * ends + column % ends
+                at = Footprint(np.float32(look.x - column), np.float32(look.y - row), dx, dy)
+                for p in range(table.piece_starts[cell], table.piece_starts[cell + 1]):
+                    bounds = table.bounds[p]
+                    x_low, x_high = max(left - column, bounds[X_LOW]), min(right - column, bounds[X_HIGH])
+                    y_low, y_high = max(lower - row, bounds[Y_LOW]), min(upper - row, bounds[Y_HIGH])
+                    if x_high - x_low < least * dx or y_high - y_low < least * dy:
+                        continue
+                    family, first = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * AZIMUTHS * per_azimuth
+                    part = Part(np.float32(x_low), np.float32(x_high), np.float32(y_low), np.float32(y_high))
+                    if family == GAP:
+                        gaps += gap_area(bounds, first, size, viewer, sharp, look.oz, at, part, table.legendre)
+                        continue
+                    kind = column % of_warp if family == 0 else of_warp + row % of_weft
+                    if scratch.stops[kind] < room:
+                        place_nodes(table, scratch, p, first, at, part, kind)
+    return gaps
+
+
+@inlined_kernel
+def _shade(table: Table, scratch: Scratch, look: Look, sharp: np.float32, result: Float32) -> None:
+    """Write the sums over the nodes that are placed, (K, SUMS)."""
+    of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
+    per_azimuth = table.grid.shape[2] * table.grid.shape[3]
+    low_i, high_i = np.uint32(look.low_i * per_azimuth), np.uint32(look.high_i * per_azimuth)
+    low_o, high_o = np.uint32(look.low_o * per_azimuth), np.uint32(look.high_o * per_azimuth)
+    for kind in range(kinds):
+        if scratch.stops[kind] == 0:
+            continue
+        family = 0 if kind < of_warp else 1
+        count = fill_block(scratch.nodes[kind], scratch.cells[kind], scratch.stops[kind])
+        d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
+        nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
+        if look.iz < _0:
+            through = shade_footprint_behind(
+                nodes, cells, GridHorizons(scratch.behind_grid, low_i, high_i, look.turn_i),
+                GridHorizons(scratch.grid, low_o, high_o, look.turn_o), sharp, d, table.yarn[family], thickness,
+            )  # fmt: skip
+            for q in range(len(through)):
+                result[kind, q] = through[q]
+            continue
+        found = shade_footprint(
+            nodes, cells, scratch.grid, low_i, high_i, look.turn_i, low_o, high_o, look.turn_o, sharp, d,
+            table.yarn[family], thickness,
+        )  # fmt: skip
+        for q in range(SUMS):
+            result[kind, q] = found[q]
+
+
+@inlined_kernel
+def sum_ellipse(table: Table, scratch: Scratch, look: Look, shape: Ellipse, result: Float32) -> np.float32:
+    """Write the sums of a thin ellipse (K, SUMS), and return the area seen through gaps."""
+    per_azimuth = table.grid.shape[2] * table.grid.shape[3]
+    viewer = GridHorizons(
+        scratch.grid, np.uint32(look.low_o * per_azimuth), np.uint32(look.high_o * per_azimuth), look.turn_o
+    )
+    scratch.stops[:] = 0
+    gaps = place_ellipse(table, shape, look.x, look.y, viewer, look.oz, scratch.nodes, scratch.cells, scratch.stops)
+    _shade(table, scratch, look, sharpness_of(shape), result)
+    return gaps
+
+
+@inlined_kernel
+def sum_round(
+    table: Table, scratch: Scratch, look: Look, dx: np.float32, dy: np.float32, result: Float32
+) -> np.float32:  # fmt: skip
+    """Write the sums of a footprint along the axes (K, SUMS), and return the area seen through gaps.
+
+    Parameters
+    ----------
+    table, scratch : Table, Scratch
+        The cloth, and memory for its queries.
+    look : Look
+        The query.
+    dx, dy : float32
+        Deviations; for a rotated footprint those of one along the axes of the same area.
+    result : float32 (K, SUMS)
+        Written.
+    """
+    kinds, parts, gaps = table.kinds[0] + table.kinds[1], 1, _0
+    while True:
+        gaps = _place_round(table, scratch, look, dx, dy, REACH if parts == 1 else _FAR, parts)
+        result[:, :] = _0
+        _shade(table, scratch, look, sharpness_of_points(max(dx, dy) / np.float32(parts)), result)
+        seen, bare = gaps, gaps
+        for kind in range(kinds):
+            seen += result[kind, AREA]
+            bare += result[kind, BARE_AREA]
+        if parts > 1 or seen >= _HIDDEN * bare:
+            break
+        parts = _PARTS
+    if parts > 1 and seen < np.float32(HIDDEN_SHARE) * look.oz:
+        for kind in range(kinds):
+            for q in (DIFFUSE, SPECULAR, OPEN_DIFFUSE, OPEN_SPECULAR):
+                result[kind, q] = _0
+    return gaps
