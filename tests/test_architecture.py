@@ -291,13 +291,9 @@ def test_the_search_for_missing_names_can_fail(text, wrong):
 MOST_PARAMETERS, MOST_LINES = 12, 100
 
 LARGER = {
-    "pipeline.analytic.soft_nodes.answer.sum_queries",
-    "pipeline.analytic.soft_nodes.footprint_nodes.gap_area",
-    "pipeline.analytic.soft_nodes.footprint_nodes.place_nodes",
     "pipeline.analytic.soft_nodes.shade.shade_node",
     "pipeline.analytic.soft_nodes.shade.shade_fixed",
     "pipeline.analytic.soft_nodes.shade.shade_footprint",
-    "pipeline.analytic.soft_nodes.weights.wave_weights",
 }
 """Kernels that still exceed the limit; whether bundled arguments cost them speed is open (reports/LOG.md)."""
 

@@ -98,9 +98,8 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
         shares = table.evenly
     elif look.narrowest >= table.waves_from and _waves_pay(table, look, widest):
         wave_weights(
-            table.waves, table.wave_nodes, table.evenly, np.float32(look.x), np.float32(look.y), look.dx, look.dy,
-            look.rho, waves_kept(table.wave_size, look.narrowest), np.float32(table.repeat[0]),
-            np.float32(table.repeat[1]), scratch.turns, scratch.phases, scratch.weight,
+            table.waves, table.wave_nodes, table.evenly, look, waves_kept(table.wave_size, look.narrowest),
+            table.repeat, scratch.turns, scratch.phases, scratch.weight,
         )  # fmt: skip
     else:
         _mix_densities(table, scratch, look, widest)

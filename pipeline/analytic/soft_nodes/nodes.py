@@ -155,19 +155,8 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
     front = model.front
     picks, ends = front.top.shape
 
-    # The pieces of all cells; those that a translation of the cloth carries into one another share a grid.
-    first_of = {cell: orbit[0] for orbit in orbits(front) for cell in orbit}
-    blocks: dict[tuple[tuple[int, int], int], int] = {}
-    samples: list[tuple[int, int, Piece]] = []
-    located, piece_starts = [], [0]
-    for pick, end in np.ndindex(picks, ends):
-        for index, piece in enumerate(cell_pieces(front, pick, end)):
-            key = (first_of[pick, end], index)
-            if key not in blocks:
-                blocks[key] = len(blocks)
-                samples.append((*key[0], piece))
-            located.append(((end, pick), piece, blocks[key]))
-        piece_starts.append(len(located))
+    located = _locate(front)
+    samples = located.samples
     size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
     x, y, gap = _grid_places(samples, size)
     grid = _grids(horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS), size)
@@ -177,7 +166,7 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         behind_grid = _grids(slopes / np.sqrt(1.0 + slopes * slopes), size)
 
     # The nodes of every group, each kind in whole blocks.
-    groups = gather(located, detail, by_thread)
+    groups = gather(located.pieces, detail, by_thread)
     rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
     kinds = (ends, picks) if by_thread else (1, 1)
@@ -200,13 +189,7 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
-    # Rules by axis: those across a weft run along y.
-    by_axis = [
-        (along, across) if group.piece.family == WEFT else (across, along)
-        for group, (across, along) in zip(groups, rules, strict=True)
-    ]
-    used = [list({id(pair[axis]): pair[axis] for pair in by_axis}.values()) for axis in range(2)]
-    number = [{id(one): index for index, one in enumerate(of_axis)} for of_axis in used]
+    axes = _by_axis(groups, rules)
     waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
@@ -229,26 +212,20 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         evenly=in_blocks(evenly),
         mean=in_blocks(mean),
         sharpness=in_blocks(_sharpness(variance)),
-        groups=np.array(
-            [
-                (start, group.lines, number[0][id(x)], number[1][id(y)], group.piece.family)
-                for group, (x, y), start in zip(groups, by_axis, first_nodes, strict=True)
-            ],
-            np.uint32,
-        ),
+        groups=_group_rows(groups, first_nodes, axes),
         lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
-        places_x=_filled([one.places for one in used[0]], edge=True).ravel(),
-        weights_x=_filled([one.weights for one in used[0]], edge=False).ravel(),
-        places_y=_filled([one.places for one in used[1]], edge=True).ravel(),
-        weights_y=_filled([one.weights for one in used[1]], edge=False).ravel(),
+        places_x=_filled([rule.places for rule in axes[0].rules], edge=True).ravel(),
+        weights_x=_filled([rule.weights for rule in axes[0].rules], edge=False).ravel(),
+        places_y=_filled([rule.places for rule in axes[1].rules], edge=True).ravel(),
+        weights_y=_filled([rule.weights for rule in axes[1].rules], edge=False).ravel(),
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
-        piece_starts=np.array(piece_starts, np.int64),
-        pieces=np.array([(piece.family, block) for _, piece, block in located], np.int64),
-        bounds=np.array([_bounds(piece) for _, piece, _ in located], np.float32),
+        piece_starts=np.array(located.starts, np.int64),
+        pieces=np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
+        bounds=np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
         grid=grid,
         behind_mean=in_blocks(behind_mean),
         behind_sharpness=in_blocks(_sharpness(behind_variance)),
@@ -256,6 +233,59 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
     )
+
+
+class _Located(NamedTuple):
+    """The pieces of all cells, with their cell and their grid; where those of each cell begin; one piece a grid."""
+
+    pieces: list[tuple[tuple[int, int], Piece, int]]
+    starts: list[int]
+    samples: list[tuple[int, int, Piece]]
+
+
+def _locate(front: HeightField) -> _Located:
+    """Return all pieces; those that a translation of the cloth carries into one another share a grid."""
+    first_of = {cell: orbit[0] for orbit in orbits(front) for cell in orbit}
+    blocks: dict[tuple[tuple[int, int], int], int] = {}
+    found = _Located([], [0], [])
+    for pick, end in np.ndindex(*front.top.shape):
+        for index, piece in enumerate(cell_pieces(front, pick, end)):
+            key = (first_of[pick, end], index)
+            if key not in blocks:
+                blocks[key] = len(blocks)
+                found.samples.append((*key[0], piece))
+            found.pieces.append(((end, pick), piece, blocks[key]))
+        found.starts.append(len(found.pieces))
+    return found
+
+
+class _AxisRules(NamedTuple):
+    """Different rules along an axis, and which of them each group has."""
+
+    rules: list[Rule]
+    of_groups: list[int]
+
+
+def _by_axis(groups: list[PieceGroup], rules: list[tuple[Rule, Rule]]) -> tuple[_AxisRules, _AxisRules]:
+    """Return the rules along x and y, given those across and along: across a weft is along y."""
+    pairs = [
+        (along, across) if group.piece.family == WEFT else (across, along)
+        for group, (across, along) in zip(groups, rules, strict=True)
+    ]
+    found = []
+    for own in zip(*pairs, strict=True):
+        different = list({id(rule): rule for rule in own}.values())
+        number = {id(rule): index for index, rule in enumerate(different)}
+        found.append(_AxisRules(different, [number[id(rule)] for rule in own]))
+    return found[0], found[1]
+
+
+def _group_rows(
+    groups: list[PieceGroup], first_nodes: list[int], axes: tuple[_AxisRules, _AxisRules]
+) -> npt.NDArray[np.uint32]:
+    """Return `Table.groups`."""
+    rows = zip(groups, first_nodes, axes[0].of_groups, axes[1].of_groups, strict=True)
+    return np.array([(first, group.lines, x, y, group.piece.family) for group, first, x, y in rows], np.uint32)
 
 
 def _together(waves: Float32) -> Float32:

@@ -11,10 +11,12 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
 from pipeline.analytic.soft_nodes.shade import ROWS
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER
-from pipeline.analytic.soft_nodes.weights import TURN_ROWS
 from pipeline.compiled.arrays import Float32, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE
+
+TURN_ROWS: Final = 4
+"""Rows of `Scratch.turns`: cosines and sines of whole turns of x, then of y."""
 
 LINE_ROWS: Final = 9
 """Rows of `Scratch.line`."""

@@ -7,21 +7,18 @@ group. A rotated one is a mixture of these (pipeline.truth.footprint.mixture); w
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, GROUP_FAMILY, LINES, RULE_X, RULE_Y, START
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER, faintest
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.geometry.heightfield import WEFT
-
-TURN_ROWS: Final = 4
-"""Rows of the scratch of `wave_weights`: cosines and sines of whole turns of x, then of y."""
 
 _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _TURN = np.float32(2.0 * math.pi)
@@ -43,19 +40,19 @@ def wave_weights(
     waves: Index,
     nodes: Float32,
     evenly: Float32,
-    x: np.float32,
-    y: np.float32,
-    deviation_x: np.float32,
-    deviation_y: np.float32,
-    correlation: np.float32,
+    look: Look,
     count: int,
-    ends: np.float32,
-    picks: np.float32,
+    repeat: Index,
     turns: Float32,
     phases: Float32,
     weight: Float32,
 ) -> None:
-    """Write the weights of all nodes as a sum of the first waves; `turns` and `phases` are scratch."""
+    """Write the weights of all nodes as a sum of the first `count` waves, a multiple of TOGETHER.
+
+    `turns` and `phases` are scratch.
+    """
+    ends, picks = np.float32(repeat[0]), np.float32(repeat[1])
+    x, y = np.float32(look.x), np.float32(look.y)
     for axis in range(2):
         angle = _TURN * (x / ends if axis == 0 else y / picks)
         cosine, sine = np.cos(angle), np.sin(angle)
@@ -65,8 +62,8 @@ def wave_weights(
             turns[2 * axis, m + 1], turns[2 * axis + 1, m + 1] = p * cosine - q * sine, p * sine + q * cosine
     for h in range(count):
         m, n = waves[h, 0], waves[h, 1]
-        of_x, of_y = np.float32(m) / ends * deviation_x, np.float32(n) / picks * deviation_y
-        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y + _2 * correlation * of_x * of_y))
+        of_x, of_y = np.float32(m) / ends * look.dx, np.float32(n) / picks * look.dy
+        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y + _2 * look.rho * of_x * of_y))
         cos_x, sin_x, cos_y, sin_y = turns[0, m], turns[1, m], turns[2, abs(n)], turns[3, abs(n)]
         sin_y = -sin_y if n < 0 else sin_y
         own_phase, at = phases[h // TOGETHER], 2 * (h % TOGETHER)

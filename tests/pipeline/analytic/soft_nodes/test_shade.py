@@ -22,7 +22,6 @@ from pipeline.analytic.soft_nodes.shade import (
     directions,
     shade_footprint,
 )
-from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
 from pipeline.truth.scattering import microflake, slab
 from weaves.fabric import load_fabric
@@ -82,12 +81,6 @@ def test_fixed_nodes(table, pair):
         np.testing.assert_allclose(found[0, family, [BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR]], sums, rtol=RTOL)
 
 
-@allocating_kernel
-def _place(table, scratch, piece, footprint, part, kind):
-    """Call what is compiled into its callers alone."""
-    place_nodes(table, scratch, piece, 0, footprint, part, kind)
-
-
 @pytest.mark.parametrize("deviations", [(0.3, 0.35), (0.04, 0.35), (0.05, 0.04)], ids=["part", "across", "whole"])
 @pytest.mark.parametrize("pair", DIRECTIONS)
 def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviations):
@@ -105,7 +98,7 @@ def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviat
         # Away from the edges of the yarn, where a point's own rounding turns the normal.
         part = Part(*(np.float32(0.5 + 0.9 * (x - 0.5)) for x in corners))
         footprint = Footprint(*(np.float32(x) for x in (0.55, 0.4, *deviations)))
-        _place(table, scratch, piece, footprint, part, family)
+        place_nodes(table, scratch, piece, 0, footprint, part, family)
         stop = scratch.stops[family]
         count = fill_block(nodes, cells, stop)
         nodes[HALF_V], nodes[HALF_ALONG] = 0.0, 0.0

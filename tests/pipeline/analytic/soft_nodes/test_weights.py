@@ -5,8 +5,8 @@ import pytest
 
 from pipeline.analytic.axis_densities import axis_densities
 from pipeline.analytic.soft_nodes.footprint_nodes import REACH
-from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, tabulate
+from pipeline.analytic.soft_nodes.look import Look
+from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.scratch import scratch_for
 from pipeline.analytic.soft_nodes.weights import product_weights, wave_weights, waves_kept
 from pipeline.truth.footprint.mixture import narrow_axis
@@ -15,47 +15,41 @@ from weaves.fabric import load_fabric
 
 def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
     """Return the weights by products; those of an ellipse at an angle from 401 points of its line."""
-    weight = np.zeros((table.starts[-1] * BLOCK_NODES // COLUMNS, COLUMNS), np.float32)
+    scratch = scratch_for(table, 1)
     blur, line = np.sqrt(1.0 - abs(correlation)), np.sqrt(abs(correlation))
     places = np.linspace(-4.0, 4.0, 401) if correlation else np.zeros(1)
     shares = np.exp(-0.5 * places**2) / np.exp(-0.5 * places**2).sum()
     deviation_x, deviation_y, shift_x, shift_y = (
         blur * deviation_x, blur * deviation_y, line * deviation_x, np.sign(correlation) * line * deviation_y,
     )  # fmt: skip
+    of_x = table.places_x, table.weights_x, scratch.density_x, scratch.touched_x, scratch.columns
+    of_y = table.places_y, table.weights_y, scratch.density_y, scratch.touched_y, scratch.rows
     for place, share in zip(places, shares, strict=True):
-        _add_product(table, x + place * shift_x, y + place * shift_y, deviation_x, deviation_y, share, weight)
-    return weight.reshape(-1, BLOCK_NODES) / (2.0 * np.pi * deviation_x * deviation_y)
-
-
-def _add_product(table, x, y, deviation_x, deviation_y, share, weight):
-    ends, picks = table.repeat
-    found = []
-    of_axes = (
-        (x, deviation_x, ends, table.places_x, table.weights_x),
-        (y, deviation_y, picks, table.places_y, table.weights_y),
-    )
-    for centre, deviation, cells, places, weights in of_axes:
-        density = np.zeros((cells, len(places)), np.float32)
-        touched, listed = np.zeros(cells, np.bool_), np.zeros(cells, np.uint32)
-        count = axis_densities(
-            places, weights, np.float32(centre), np.float32(deviation), np.float32(REACH), density,
-            touched, listed,
+        columns, rows = (
+            axis_densities(*rules, np.float32(centre), np.float32(deviation), np.float32(REACH), *written)
+            for (*rules, density, touched, found), centre, deviation in (
+                (of_x, x + place * shift_x, deviation_x),
+                (of_y, y + place * shift_y, deviation_y),
+            )
+            for written in [(density, touched, found)]
+        )
+        product_weights(
+            table.group_starts, table.cell_groups, table.groups, scratch.density_x, scratch.density_y,
+            scratch.columns[:columns], scratch.rows[:rows], table.repeat[0], np.float32(share), scratch.lines,
         )  # fmt: skip
-        found.append((density, listed[:count]))
-    (of_x, columns), (of_y, rows) = found
-    product_weights(
-        table.group_starts, table.cell_groups, table.groups, of_x, of_y, columns, rows, ends, np.float32(share), weight
-    )
+    return scratch.weight / (2.0 * np.pi * deviation_x * deviation_y)
 
 
 def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
     scratch = scratch_for(table, 1)
-    narrowest = narrow_axis(deviation_x, deviation_y, correlation)
-    numbers = (np.float32(n) for n in (x, y, deviation_x, deviation_y, correlation))
-    count, period = waves_kept(table.wave_size, np.float32(narrowest)), (np.float32(n) for n in table.repeat)
+    narrowest = np.float32(narrow_axis(deviation_x, deviation_y, correlation))
+    footprint = (np.float32(n) for n in (deviation_x, deviation_y, correlation))
+    above, turn = (np.float32(n) for n in (0, 0, 1, 0, 0, 1)), np.float32(0)
+    look = Look(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn)
     waves = table.waves, table.wave_nodes, table.evenly
-    wave_weights(*waves, *numbers, count, *period, scratch.turns, scratch.phases, scratch.weight)
-    return scratch.weight.copy()
+    count = waves_kept(table.wave_size, narrowest)
+    wave_weights(*waves, look, count, table.repeat, scratch.turns, scratch.phases, scratch.weight)
+    return scratch.weight
 
 
 @pytest.mark.parametrize("name", ["denim", "satin_8", "herringbone"])
