@@ -2,7 +2,8 @@
 
 A rival is a method with a parameter: its settings are a curve of error against time, taken at the very time of the
 method by straight lines in both logarithms between settings, of which only those count that no faster one beats. Before
-its fastest setting a rival has no answer; beyond its slowest it keeps that setting's error.
+its fastest setting a rival has no answer; beyond its slowest it keeps that setting's error. Every setting of `FRONT` is
+compared with its rivals too: what it promises is a lower error at every time.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from reports.measure.by_size import EDGES, MEASURES, SIZES, WHOLE
 from reports.over_seeds import mean_over_seeds
 from reports.record import Record
 from reports.tables.summary import rows
+
+FRONT: Final = "soft_nodes"
+"""The method with a parameter whose own settings are compared."""
 
 COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
 
@@ -40,7 +44,7 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
 
 
 def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
-    """Return every method without settings beside every method with them, at the time of the former.
+    """Return every method without settings, and each of `FRONT`, beside every method with them, at its time.
 
     Parameters
     ----------
@@ -58,13 +62,13 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
     for (method, size), part in sizes.groupby(["method", "size"], sort=False):
         if len(part) > 1:
             curves[str(method), str(size)] = part
-        else:
+        if len(part) == 1 or method == FRONT:
             single.append(part)
     lines = []
     for measure, row in itertools.product(MEASURES, rows(pd.concat(single)) if single else ()):
         own = getattr(row, measure)
         for (rival, size), part in curves.items():
-            if size == row.size:
+            if size == row.size and rival != row.method:
                 points = part[["ns", measure]].to_numpy(dtype=np.float64)
                 other = error_at([(float(t), float(e)) for t, e in points], row.ns)
                 ratio = other / own if own > 0 else math.nan

@@ -32,7 +32,7 @@ ROWS: Final[Mapping[tuple[str, str], str]] = {
     ("neumip", ""): "`neumip`: one neural texture for each fabric \\*",
     ("woven", ""): "`woven`: one network for all fabrics",
     ("woven", BOUNDED): "`woven` under the energy bound",
-    ("soft_nodes", ""): "`soft_nodes`: a sum over few nodes, nothing is trained",
+    ("soft_nodes", "k = 2"): "`soft_nodes`: a sum over few nodes, nothing is trained",
     ("selvage", ""): "`selvage`: soft nodes corrected by a small network",
 }
 """Methods and settings that the table shows, each in words."""

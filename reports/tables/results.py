@@ -128,8 +128,9 @@ def _at_equal_time(records: Sequence[Record]) -> Iterator[str]:
         return
     yield "## At equal time"
     yield (
-        "A method with one setting beside a method with a parameter, at the time of the former, by the size of the "
-        "footprint in yarn spacings: error of the method · error of the rival over it. Below 1× the rival's is smaller."
+        "A method with one setting, and each setting of soft nodes, beside a method with a parameter, at the time of "
+        "the former, by the size of the footprint in yarn spacings: error of the method · error of the rival over it. "
+        "Below 1× the rival's is smaller."
     )
     yield "\n".join(f"- {sentence}" for sentence in equal_time_sentences(table))
     for measure, found in method_rows.equal_time_rows(table).items():

@@ -18,7 +18,7 @@ class SoftNodesOptions(Options):
     learns: ClassVar[bool] = False
     turns: ClassVar[bool] = True
     parameter: ClassVar[str] = "levels"
-    seconds: ClassVar[tuple[float, float]] = (0.0, 1.2e-6)
+    seconds: ClassVar[tuple[float, float]] = (0.0, 2.5e-7)
 
     model: Literal["soft_nodes"] = "soft_nodes"
     """Name of its folder in `pipeline.models`."""

@@ -27,10 +27,14 @@ def test_from_what_is_lost_in_noise_on_nothing_is_left_to_beat():
     assert error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
 
 
-def records():
+TIMES = {("ours", ""): 200.0, ("points", "k = 1"): 100.0, ("points", "k = 4"): 400.0}
+ERRORS = {("ours", ""): (0.1, 0.1), ("points", "k = 1"): (0.1, 0.8), ("points", "k = 4"): (0.025, 0.2)}
+FRONT_TIMES = {("soft_nodes", "k = 1"): 100.0, ("soft_nodes", "k = 2"): 200.0}
+FRONT_ERRORS = {("soft_nodes", "k = 1"): (0.2, 0.2), ("soft_nodes", "k = 2"): (0.1, 0.1)}
+
+
+def records(times=TIMES, errors=ERRORS):
     """One method, and a rival with two settings that is better at small footprints and worse at large ones."""
-    times = {("ours", ""): 200.0, ("points", "k = 1"): 100.0, ("points", "k = 4"): 400.0}
-    errors = {("ours", ""): (0.1, 0.1), ("points", "k = 1"): (0.1, 0.8), ("points", "k = 4"): (0.025, 0.2)}
     for (method, setting), ns in times.items():
         subject = Record(method=method, setting=setting)
         yield subject.of("size_time", ns, 10, curve=((0.0, ns), (1.0, ns)))
@@ -45,6 +49,16 @@ def test_a_method_is_compared_with_every_setting_at_its_own_time():
     ratio = table[table["measure"] == "specular"].set_index("size")["ratio"]
     assert ratio["below .1"] == pytest.approx(0.5)
     assert ratio["1 to 3"] == pytest.approx(4.0)
+
+
+def test_each_setting_of_the_front_is_compared_with_all_but_itself():
+    table = equal_time_table(size_table(list(records(TIMES | FRONT_TIMES, ERRORS | FRONT_ERRORS))))
+    assert set(zip(table["method"], table["rival"], strict=True)) == {
+        ("ours", "points"), ("ours", "soft_nodes"), ("soft_nodes", "points"),
+    }  # fmt: skip
+    own = table[(table["method"] == "soft_nodes") & (table["measure"] == "specular")].set_index(["setting", "size"])
+    assert own["ratio"]["k = 1", "1 to 3"] == pytest.approx(4.0)
+    assert own["ratio"]["k = 2", "below .1"] == pytest.approx(0.5)
 
 
 def test_no_records_give_an_empty_table():
