@@ -36,7 +36,7 @@ SCENES: Final = 1
 BENCH: Final = 4
 """Measurements of methods and of the truth; also written into every Record."""
 
-SCENE_BENCH: Final = 3
+SCENE_BENCH: Final = 4
 """Measurements in scenes and the files they write (`reports.measure.scene`)."""
 
 EXTREMES: Final = 1

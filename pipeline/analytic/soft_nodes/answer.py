@@ -2,10 +2,11 @@
 
 deviations                           weights
 both >= `Table.uniform`              the cloth evenly
-both >= `Table.waves_from`           waves
+both >= `Table.waves_from`           waves, where they take less time than densities
 the narrower one < `NARROW`,
     `STRETCHED` times the other      nodes placed on lines along the footprint, at most `MOST`
-    the wider one < `LONG`           nodes placed in the footprint
+the narrower one < `Table.narrow`,
+    the wider one < `LONG`           nodes placed in the footprint, a second time where it is almost hidden
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
 
 Deviations are compared along a footprint's own axes. For a rotated footprint densities are a mixture

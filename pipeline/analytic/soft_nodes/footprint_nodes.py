@@ -1,4 +1,6 @@
-"""Nodes that a narrow footprint places itself, in every piece that it touches: Gauss's rule over the part it covers.
+"""Nodes that a narrow footprint places itself, in every piece that it touches.
+
+Gauss-Legendre's rule over the part that it covers; Gauss-Hermite's, with fewer nodes, where a piece covers all of it.
 
 Weights are shares of the footprint, up to the 1 % that it is cut off at and the error of the rule; the sums of a query
 are divided by one another, so that neither need be exact.

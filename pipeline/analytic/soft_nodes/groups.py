@@ -1,9 +1,9 @@
 """Groups of similar pieces: the pieces of a repeat that share nodes.
 
 Pieces of one shape that lie alike on floats of one length form a group, of one thread alone where sums are wanted by
-thread. A draft of many different floats has too many
-groups: then the two most alike are merged, again and again (Ward's distance between their inclinations), until the
-nodes of all groups are few enough.
+thread. A yarn may be cut into parts across, each a piece of its own (`Detail.halves`). A draft of many different floats
+has too many groups: then the two most alike are merged, again and again (Ward's distance between their inclinations),
+until the nodes of all groups are few enough.
 """
 
 from __future__ import annotations

@@ -81,4 +81,4 @@ def test_the_headline_names_the_bounded_form_where_it_was_measured():
         }
     )
     assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
-    assert Bounded(SoftNodes()).setting == BOUNDED
+    assert Bounded(SoftNodes()).setting == f"k = 2 {BOUNDED}"
