@@ -39,7 +39,7 @@ CONSTANTS = {
     "_RAMP": ("soft_horizons.py", r"_RAMP, _RAMP_SLOPE = \(\s*np\.float32\(([\d.]+)\)"),
     "_RAMP_SLOPE": ("soft_horizons.py", r"_RAMP, _RAMP_SLOPE = \(\s*np\.float32\([\d.]+\),\s*np\.float32\(([\d.]+)\)"),
     "_TAIL": ("soft_nodes/shade.py", r"_TAIL = np\.float32\(([\d.]+)\)"),
-    "RESOLVED": ("soft_nodes/fixed.py", r"RESOLVED: Final = ([\d.]+)"),
+    "RESOLVED": ("soft_nodes/wide.py", r"RESOLVED: Final = ([\d.]+)"),
     "_EVEN": ("soft_nodes/nodes.py", r"_EVEN = ([\d.]+)"),
 }
 """File of each constant below `pipeline.analytic`, and its number as a group of an expression."""

@@ -24,12 +24,12 @@ import numpy as np
 from pipeline.analytic.axis_densities import NARROW
 from pipeline.analytic.soft_nodes.diamond import around
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
-from pipeline.analytic.soft_nodes.fixed import sum_fixed
 from pipeline.analytic.soft_nodes.look import Look
+from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round
 from pipeline.analytic.soft_nodes.nodes import Table
-from pipeline.analytic.soft_nodes.placed import LONG, MOST_PLACED, sum_ellipse, sum_round
 from pipeline.analytic.soft_nodes.scratch import Scratch, scratch_for
 from pipeline.analytic.soft_nodes.shade import SUMS
+from pipeline.analytic.soft_nodes.wide import sum_fixed
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import deviations, narrow_axis
@@ -82,7 +82,7 @@ def sum_queries(
     kinds = table.kinds[0] + table.kinds[1]
     result, gaps = np.zeros((len(u), kinds, SUMS), np.float32), np.zeros(len(u), np.float32)
     footprints = (u, v, deviation_x, deviation_y, correlation)
-    _sum_rows(table, scratch_for(table, MOST_PLACED), footprints, wi, wo, result, gaps)
+    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), footprints, wi, wo, result, gaps)
     return result, gaps
 
 

@@ -1,4 +1,4 @@
-"""What the sums of one query need in memory, made once for all queries of a call."""
+"""Scratch memory of the sums of one query, made once for all queries of a call."""
 
 from __future__ import annotations
 

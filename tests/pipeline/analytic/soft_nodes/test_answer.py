@@ -1,11 +1,13 @@
 """The sums against the truth: without shadows to the error of their rules, with soft shadows to some per cent."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums, sum_queries
+from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
@@ -73,6 +75,23 @@ def test_with_shadows_they_are_some_per_cent_off(case):
         clear = features[:, 25] > 0.02
         assert clear.mean() > 0.9
         assert relative_error(found[clear], truth[clear]) < bound
+
+
+def test_each_level_errs_less_on_wide_footprints():
+    """By a tenth at least; measured 2.8, 2.0, 1.1 and .9 %."""
+    fabric = load_fabric("silk_charmeuse")
+    queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 12, 0, 160)
+    truth = estimate(fabric, queries, TruthOptions(relative_error=2e-3), 1).mean
+    errors = [relative_error(read_queries(tabulate(fabric, level=k), queries)[1], truth) for k in DETAILS]
+    assert all(finer < 0.9 * coarser for coarser, finer in itertools.pairwise(errors)), errors
+
+
+def test_what_is_seen_of_patches_almost_hidden():
+    """Narrow footprints of grazing views on basket: nodes placed once, to 2.6 deviations, err 10 %."""
+    fabric = load_fabric("basket")
+    queries = draw_queries(QueryOptions(sigma=(0.05, 0.25)), fabric.weave.repeat, 7, 0, 400)
+    truth = estimate(fabric, queries, TruthOptions(relative_error=5e-3), 1).mean
+    assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.07
 
 
 def test_footprints_along_the_axes():

@@ -51,7 +51,7 @@ This bounds the number of nodes."""
 
 # Cells touched by a footprint of deviations LONG and NARROW, their pieces, and the nodes of these.
 _MOST_CELLS = (2 + math.floor(2 * REACH * LONG)) * (2 + math.floor(2 * REACH * NARROW))
-MOST_PLACED: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
+MOST_OF_FOOTPRINT: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
 """Most nodes that a footprint places."""
 
 _HIDDEN = np.float32(0.05)  # share of the bare area seen, below which nodes are placed again:
