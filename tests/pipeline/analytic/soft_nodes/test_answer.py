@@ -87,11 +87,15 @@ def test_each_level_errs_less_on_wide_footprints():
 
 
 def test_what_is_seen_of_patches_almost_hidden():
-    """Narrow footprints of grazing views on basket: nodes placed once, to 2.6 deviations, err 10 %."""
-    fabric = load_fabric("basket")
-    queries = draw_queries(QueryOptions(sigma=(0.05, 0.25)), fabric.weave.repeat, 7, 0, 400)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=5e-3), 1).mean
-    assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.07
+    """Of which .2 to 5 % is seen, on satin: nodes placed once, to 2.6 deviations, are off by 5.6 % of the mean."""
+    fabric = load_fabric("satin_8")
+    queries = draw_queries(QueryOptions(sigma=(0.05, 0.25)), fabric.weave.repeat, 7, 0, 6000)
+    reading = read_queries(tabulate(fabric), queries)
+    seen = reading.features[:, 25]
+    few = np.flatnonzero((seen > 0.002) & (seen < 0.05))
+    assert few.size > 100
+    truth = estimate(fabric, queries.take(few), TruthOptions(relative_error=0.01), 1).mean @ COLOUR
+    assert np.abs(reading.components[few] @ COLOUR - truth).mean() < 0.045 * truth.mean()
 
 
 def test_footprints_along_the_axes():
