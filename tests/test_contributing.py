@@ -110,12 +110,15 @@ def followed(section, folder):
 def changed(text, diff, name):
     """Apply lines of a diff: `+` takes the place of the `-` before it, or follows the line before it.
 
-    A part of a line may stand for it.
+    A part of a line may stand for it, if it is not a whole line.
     """
     for old, new in re.findall(r"^([- ].*)\n((?:\+.*\n?)+)", diff, re.M):
-        assert text.count(old[1:]) == 1, f"{name}: {old[1:]!r} is there {text.count(old[1:])} times"
+        whole = re.compile(f"^{re.escape(old[1:])}$", re.M)
+        place = whole if whole.search(text) else re.compile(re.escape(old[1:]))
+        assert len(place.findall(text)) == 1, f"{name}: {old[1:]!r} is there {len(place.findall(text))} times"
         lines = [] if old.startswith("-") else [old[1:]]
-        text = text.replace(old[1:], "\n".join([*lines, *(line[1:] for line in new.splitlines())]), 1)
+        added = "\n".join([*lines, *(line[1:] for line in new.splitlines())])
+        text = place.sub(lambda _, added=added: added, text)
     return text
 
 
