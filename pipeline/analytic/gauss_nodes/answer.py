@@ -9,6 +9,8 @@ that it covers.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -36,7 +38,7 @@ from pipeline.analytic.horizon_points.rows import (
 from pipeline.analytic.horizon_points.shading import fill_points, gather, plain_sum, query_rows, shade, shade_all
 from pipeline.analytic.soft_horizons import SoftHorizons, above, azimuths_apart, ramp, seen_and_lit, sharpness_of_points
 from pipeline.compiled.arrays import Float32, Mask
-from pipeline.compiled.decorators import allocating_kernel, fast_kernel
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import COARSE_LINE, deviations, line_points
 from pipeline.truth.footprint.place import EVENLY
@@ -47,6 +49,8 @@ from weaves.fabric import Fabric
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _POINTS = COARSE_LINE.points
+
+Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
 
 
 class GaussNodesTable:
@@ -84,21 +88,74 @@ class GaussNodesTable:
         u, v, wi, wo = (
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
         )
-        footprints, finest = deviations(queries), np.float32(min(NARROW, 1.0 / self.across))
-        return _answer(self.map, self.nodes, u, v, footprints, wi, wo, self.along, finest, self.shadows, self.soft)
+        footprints, finest = (u, v, *deviations(queries)), np.float32(min(NARROW, 1.0 / self.across))
+        return _answer(self.map, self.nodes, footprints, wi, wo, self.along, finest, self.shadows, self.soft)
 
     def bytes_stored(self) -> int:
         """Return the bytes of map and nodes."""
         return self.map.bytes_stored() + sum(array.nbytes for array in self.nodes)
 
 
+class _Scratch(NamedTuple):
+    """Memory that each query overwrites; `flat_x` and `flat_y` are that of `of_x` and `of_y`, rule after rule.
+
+    `positions` and `weights` are those of the fixed nodes, flat too.
+    """
+
+    wide: Float32
+    weight: Float32
+    values: Float32
+    shared: npt.NDArray[np.int32]
+    narrow: Float32
+    places: npt.NDArray[np.int32]
+    of_x: Float32
+    of_y: Float32
+    flat_x: Float32
+    flat_y: Float32
+    touched_x: Mask
+    touched_y: Mask
+    cells: npt.NDArray[np.uint32]
+    line: Float32
+    line_places: Float32
+    line_shares: Float32
+    positions: Float32
+    weights: Float32
+
+
+@allocating_kernel
+def _scratch_for(table: HorizonMap, fixed: GaussNodes) -> _Scratch:
+    """Return what the queries of a call need."""
+    ends, picks = table.repeat[0], table.repeat[1]
+    kinds, most = fixed.positions.shape
+    room = BANDS * fixed.own_positions.shape[1] ** 2
+    of_x, of_y = np.zeros((ends, kinds, most), np.float32), np.zeros((picks, kinds, most), np.float32)
+    return _Scratch(
+        fixed.points.copy(),
+        np.zeros(len(fixed.evenly), np.float32),
+        np.zeros((9, 1), np.float32),
+        np.zeros((4, 1), np.int32),
+        np.zeros((ROWS, room), np.float32),
+        np.zeros((INTEGERS, room), np.int32),
+        of_x,
+        of_y,
+        of_x.reshape((ends, kinds * most)),
+        of_y.reshape((picks, kinds * most)),
+        np.zeros(ends, np.bool_),
+        np.zeros(picks, np.bool_),
+        np.zeros(max(ends, picks), np.uint32),
+        np.zeros((4, most), np.float32),
+        np.zeros(_POINTS, np.float32),
+        np.zeros(_POINTS, np.float32),
+        fixed.positions.reshape(kinds * most),
+        fixed.weights.reshape(kinds * most),
+    )
+
+
 @allocating_kernel
 def _answer(
     table: HorizonMap,
     fixed: GaussNodes,
-    u: Float32,
-    v: Float32,
-    footprints: tuple[Float32, Float32, Float32],
+    footprints: Footprints,
     wi: Float32,
     wo: Float32,
     along: int,
@@ -106,28 +163,41 @@ def _answer(
     shadows: bool,
     soft: bool,
 ) -> Float32:
-    """Answer every row; `footprints` has the deviations along x and y, and the correlation of the axes."""
-    deviation_x, deviation_y, correlation = footprints
-    rows, count = len(u), len(fixed.evenly)
-    result = np.zeros((rows, 4), np.float32)
+    """Answer every row; `footprints` has the columns u and v, the deviations along x and y, and their correlation."""
+    result = np.zeros((len(wi), 4), np.float32)
+    _answer_rows(table, fixed, footprints, wi, wo, along, finest, shadows, soft, _scratch_for(table, fixed), result)
+    return result
+
+
+# Not in `_answer`: what allocates counts references to every slice.
+@kernel
+def _answer_rows(
+    table: HorizonMap,
+    fixed: GaussNodes,
+    footprints: Footprints,
+    wi: Float32,
+    wo: Float32,
+    along: int,
+    finest: np.float32,
+    shadows: bool,
+    soft: bool,
+    scratch: _Scratch,
+    result: Float32,
+) -> None:
+    """Write the components of every row."""
+    u, v, deviation_x, deviation_y, correlation = footprints
     ends, picks = table.repeat[0], table.repeat[1]
-    nodes = table.grid * table.grid
-    wide, own_weight = fixed.points.copy(), np.zeros(count, np.float32)
-    values, shared = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
-    kinds, most = fixed.positions.shape
-    room = BANDS * fixed.own_positions.shape[1] ** 2
-    narrow, places = np.zeros((ROWS, room), np.float32), np.zeros((INTEGERS, room), np.int32)
-    of_x, of_y = np.zeros((ends, kinds, most), np.float32), np.zeros((picks, kinds, most), np.float32)
-    touched_x, touched_y = np.zeros(ends, np.bool_), np.zeros(picks, np.bool_)
-    cells = np.zeros(max(ends, picks), np.uint32)
-    line = np.zeros((4, most), np.float32)
-    line_places, line_shares = np.zeros(_POINTS, np.float32), np.zeros(_POINTS, np.float32)
+    nodes, count = table.grid * table.grid, len(fixed.evenly)
+    wide, own_weight, values, shared = scratch.wide, scratch.weight, scratch.values, scratch.shared
+    narrow, places, line = scratch.narrow, scratch.places, scratch.line
+    of_x, of_y, touched_x, touched_y = scratch.of_x, scratch.of_y, scratch.touched_x, scratch.touched_y
+    line_places, line_shares = scratch.line_places, scratch.line_shares
     seen, both, areas, diffuse, specular = wide[SEEN], wide[BOTH], wide[AREA], wide[DIFFUSE], wide[SPECULAR]
     warpness, weftness = wide[WARPNESS], wide[WEFTNESS]
-    positions, weights, pieces, copies = fixed.positions, fixed.weights, fixed.pieces, fixed.copies
+    weights, pieces, copies = fixed.weights, fixed.pieces, fixed.copies
     mean, steepness, evenly = fixed.mean, fixed.steepness, fixed.evenly
     azimuths, sharpness = table.azimuths, np.float32(1.0 if soft else 1e9)
-    for row in range(rows):
+    for row in range(len(u)):
         dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
         # Narrow footprints that are not round count as round ones of the same area.
         s = dx if dx == dy and rho == _0 else np.sqrt(dx * dy * np.sqrt(_1 - rho * rho))
@@ -146,8 +216,8 @@ def _answer(
                 weight[:] = _0
                 for point in range(line_points(rho, COARSE_LINE, line_places, line_shares)):
                     z, share = line_places[point], line_shares[point]
-                    _densities(positions, weights, x + z * line_x, blur_x, even_x, of_x, touched_x, cells)
-                    _densities(positions, weights, y + z * line_y, blur_y, even_y, of_y, touched_y, cells)
+                    _densities(scratch, weights, x + z * line_x, blur_x, even_x, of_x, scratch.flat_x, touched_x)
+                    _densities(scratch, weights, y + z * line_y, blur_y, even_y, of_y, scratch.flat_y, touched_y)
                     product_weights(pieces, copies, of_x, of_y, touched_x, touched_y, share, weight)
             for axis in range(3):
                 wide[IX + axis], wide[OX + axis] = wi[row, axis], wo[row, axis]
@@ -181,29 +251,25 @@ def _answer(
             inverse = _1 / area
             result[row, 0], result[row, 1] = a * inverse, b * inverse
             result[row, 2], result[row, 3] = c * inverse, d * inverse
-    return result
 
 
-@fast_kernel
+@inlined_fast_kernel
 def _densities(
-    positions: Float32,
+    scratch: _Scratch,
     weights: Float32,
     centre: np.float32,
     s: np.float32,
     even: bool,
     out: Float32,
+    flat: Float32,
     touched: Mask,
-    cells: npt.NDArray[np.uint32],
 ) -> None:
-    """Write the footprint's densities in all cells of one axis; `cells` is scratch."""
+    """Write the footprint's densities in all cells of one axis; `flat` is the memory of `out`."""
     if even:
         touched[:] = True
         even_densities(weights, s, out)
     else:
-        axis_densities(
-            positions.reshape(positions.size), weights.reshape(weights.size), centre, s, np.float32(REACH),
-            out.reshape((len(out), positions.size)), touched, cells,
-        )  # fmt: skip
+        axis_densities(scratch.positions, scratch.weights, centre, s, np.float32(REACH), flat, touched, scratch.cells)
 
 
 @fast_kernel

@@ -10,7 +10,10 @@ share of the footprint that a point stands for: biased, and with less variance.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
 from pipeline.analytic.horizon_points.rows import (
@@ -50,6 +53,8 @@ _MIX_1, _MIX_2 = np.uint32(0x7FEB352D), np.uint32(0x846CA68B)
 _S15, _S16, _S9 = np.uint32(15), np.uint32(16), np.uint32(9)
 _UNIT = np.float32(2.0**-23)
 
+Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
+
 
 class HorizonSampler:
     """A fabric's horizon map, tabulated once.
@@ -74,36 +79,60 @@ class HorizonSampler:
         u, v, wi, wo = (
             np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
         )
-        return _sample(self.map, u, v, *deviations(queries), wi, wo, count, r2, self._soft, np.uint64(seed))
+        footprints = (u, v, *deviations(queries))
+        return _sample(self.map, footprints, wi, wo, count, r2, self._soft, np.uint64(seed))
 
     def bytes_stored(self) -> int:
         """Return the bytes of the map."""
         return self.map.bytes_stored()
 
 
+class _Batch(NamedTuple):
+    """Scratch memory of the points of some queries at once: see `query_rows`, `fill_points` and `locate`."""
+
+    points: Float32
+    places: npt.NDArray[np.int32]
+    values: Float32
+    shared: npt.NDArray[np.int32]
+
+
 @allocating_kernel
 def _sample(
+    table: HorizonMap, footprints: Footprints, wi: Float32, wo: Float32, count: int, r2: bool, soft: bool,
+    seed: np.uint64,
+) -> Float32:  # fmt: skip
+    """Answer every row; `footprints` has the columns u and v, the deviations along x and y, and their correlation."""
+    result, at_once = np.zeros((len(wi), 4), np.float32), max(1, BATCH // count)
+    batch = _Batch(
+        np.zeros((ROWS, at_once * count), np.float32),
+        np.zeros((INTEGERS, at_once * count), np.int32),
+        np.zeros((9, at_once), np.float32),
+        np.zeros((4, at_once), np.int32),
+    )
+    batch.points[WEIGHT], batch.points[STEEPNESS] = _1, _STEP
+    _sample_rows(table, footprints, wi, wo, count, r2, soft, seed, batch, result)
+    return result
+
+
+# Not in `_sample`: what allocates counts references to every slice.
+@kernel
+def _sample_rows(
     table: HorizonMap,
-    u: Float32,
-    v: Float32,
-    deviation_x: Float32,
-    deviation_y: Float32,
-    correlation: Float32,
+    footprints: Footprints,
     wi: Float32,
     wo: Float32,
     count: int,
     r2: bool,
     soft: bool,
     seed: np.uint64,
-) -> Float32:
-    rows = len(u)
-    result = np.zeros((rows, 4), np.float32)
-    at_once = max(1, BATCH // count)
-    points, places = np.zeros((ROWS, at_once * count), np.float32), np.zeros((INTEGERS, at_once * count), np.int32)
-    points[WEIGHT], points[STEEPNESS] = _1, _STEP
-    ends, picks = table.repeat[0], table.repeat[1]
-    nodes = table.grid * table.grid
-    values, shared = np.zeros((9, at_once), np.float32), np.zeros((4, at_once), np.int32)
+    batch: _Batch,
+    result: Float32,
+) -> None:
+    """Write the components of every row."""
+    u, v, deviation_x, deviation_y, correlation = footprints
+    points, places, values, shared = batch
+    rows, at_once = len(u), values.shape[1]
+    ends, picks, nodes = table.repeat[0], table.repeat[1], table.grid * table.grid
     at_x, at_y, area, diffuse, specular = points[X], points[Y], points[AREA], points[DIFFUSE], points[SPECULAR]
     warpness, weftness, azimuths = points[WARPNESS], points[WEFTNESS], table.azimuths
     for begin in range(0, rows, at_once):
@@ -137,7 +166,6 @@ def _sample(
                 inverse = _1 / a
                 result[row, 0], result[row, 1] = s_warp * inverse, s_weft * inverse
                 result[row, 2], result[row, 3] = c_warp * inverse, c_weft * inverse
-    return result
 
 
 @fast_kernel

@@ -14,7 +14,7 @@ class Detail(NamedTuple):
         Nodes of all groups of pieces on top above which groups are merged; half as many beneath.
     along : float
         Nodes along a yarn, as a multiple of those at level 2.
-    halves : int
+    parts : int
         Parts of a yarn across, each with nodes of its own.
     legendre : int
         Most nodes along each axis of a piece that a narrow footprint covers in part.
@@ -24,16 +24,16 @@ class Detail(NamedTuple):
 
     most: int
     along: float
-    halves: int
+    parts: int
     legendre: int
     narrow: float
 
 
 DETAILS: Final = {
-    1: Detail(most=64, along=0.5, halves=1, legendre=5, narrow=0.15),
-    2: Detail(most=256, along=1.0, halves=1, legendre=6, narrow=0.25),
-    4: Detail(most=1024, along=1.0, halves=2, legendre=6, narrow=0.25),
-    8: Detail(most=2048, along=2.0, halves=2, legendre=6, narrow=0.25),
+    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15),
+    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25),
+    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25),
+    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25),
 }
 """The details of every level k."""
 

@@ -1,7 +1,7 @@
 """Groups of similar pieces: the pieces of a repeat that share nodes.
 
 Pieces of one shape that lie alike on floats of one length form a group, of one thread alone where sums are wanted by
-thread. A yarn may be cut into parts across, each a piece of its own (`Detail.halves`). A draft of many different floats
+thread. A yarn may be cut into parts across, each a piece of its own (`Detail.parts`). A draft of many different floats
 has too many groups: then the two most alike are merged, again and again (Ward's distance between their inclinations),
 until the nodes of all groups are few enough.
 """
@@ -73,7 +73,7 @@ def gather(pieces: Sequence[tuple[Cell, Piece, int]], detail: Detail, by_thread:
     alike: dict[tuple[float | int, ...], PieceGroup] = {}
     for cell, whole, block in pieces:
         thread = cell[whole.family] if by_thread and whole.family != GAP else 0
-        for piece in _parts(whole, detail.halves):
+        for piece in _parts(whole, detail.parts):
             numbers = (*piece.across, *piece.along, piece.offset, piece.curve, piece.half)
             key = (piece.family, piece.side, thread, *(round(n, 6) for n in numbers))
             group = alike.setdefault(key, PieceGroup(piece, [], [], thread, detail.along))

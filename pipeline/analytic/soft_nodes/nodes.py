@@ -290,7 +290,7 @@ def _group_rows(
 
 def _together(waves: Float32) -> Float32:
     """Return waves (H, 2, nodes) by blocks of nodes, TOGETHER of them side by side."""
-    blocks = waves.reshape(len(waves) // TOGETHER, 2 * TOGETHER, -1, BLOCK_NODES)
+    blocks = waves.reshape(len(waves) // TOGETHER, 2 * TOGETHER, waves.shape[2] // BLOCK_NODES, BLOCK_NODES)
     return np.ascontiguousarray(blocks.transpose(2, 0, 1, 3))
 
 

@@ -20,7 +20,7 @@ from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.geometry.heightfield import WEFT
 
 MOST_WAVES: Final = 48
-"""Most waves kept; more would take more time than the densities of all cells."""
+"""Most waves kept. Where densities take less time they are taken instead (wide)."""
 
 HIGHEST: Final = 10
 """Largest number of periods in a repeat, along x and along y."""

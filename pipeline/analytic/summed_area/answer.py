@@ -175,11 +175,22 @@ def gap_area(
 
 @allocating_kernel
 def _answer(tables: Tables, queries: Rounds, places: Float64) -> Float32:
-    number, blocks = len(queries.u), tables.slots.shape[1]
-    result = np.zeros((number, 4), np.float32)
-    texels, weights = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
-    slots = np.zeros((blocks + 1, CORNERS), np.uint32)
-    for n in range(number):
+    """Return the components of all queries."""
+    result = np.zeros((len(queries.u), 4), np.float32)
+    window = Window(np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32))
+    slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
+    _answer_rows(tables, queries, places, window, slots, result)
+    return result
+
+
+# Not in `_answer`: what allocates counts references to every slice.
+@kernel
+def _answer_rows(
+    tables: Tables, queries: Rounds, places: Float64, window: Window, slots: Slots, result: Float32
+) -> None:
+    """Write the components of all queries; `window` and `slots` are scratch memory."""
+    texels, weights = window
+    for n in range(len(queries.u)):
         ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]
         ox, oy, oz = queries.wo[n, 0], queries.wo[n, 1], queries.wo[n, 2]
         i, o = azimuth(ix, iy), azimuth(ox, oy)
@@ -207,7 +218,6 @@ def _answer(tables: Tables, queries: Rounds, places: Float64) -> Float32:
             area += open_seen
             bare += open_area
         divide(result[n], area, bare)
-    return result
 
 
 @kernel

@@ -35,8 +35,8 @@ def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
     groups = gather(pieces, detail)
     nodes = [group.nodes for group in groups if group.piece.side == TOP]
     # Pieces that differ across are not merged: one group of each is left.
-    assert sum(nodes) <= max(detail.most, 2 * detail.halves * max(nodes))
-    cells = sorted(cell for cell, _, _ in pieces for _ in range(detail.halves))
+    assert sum(nodes) <= max(detail.most, 2 * detail.parts * max(nodes))
+    cells = sorted(cell for cell, _, _ in pieces for _ in range(detail.parts))
     assert sorted(cell for group in groups for cell in group.cells) == cells
 
     # What is merged keeps the mean inclination of its cells.
@@ -45,5 +45,5 @@ def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
         expected = np.mean([piece.offset * piece.curve for piece in own])
         merged = [group for group in groups if group.piece.family == family]
         found = sum(len(group.cells) * group.piece.offset * group.piece.curve for group in merged)
-        found /= detail.halves * len(own)
+        found /= detail.parts * len(own)
         assert found == pytest.approx(expected, abs=1e-9)
