@@ -68,7 +68,6 @@ _SHORTEST = np.float32(1e-6)  # least squared length of a half vector
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _LEVELS = np.float32(LEVELS)
-_NEGLIGIBLE = np.float32(1e-4)
 # A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
 _TAIL = np.float32(0.0005)
 
@@ -248,11 +247,6 @@ def shade_fixed(
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
-        total = _0
-        for k in range(BLOCK_NODES):
-            total += weight[b, k]
-        if total < _NEGLIGIBLE:
-            continue
         for k in range(BLOCK_NODES):
             over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
             over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
