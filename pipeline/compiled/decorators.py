@@ -127,7 +127,10 @@ kernel = _decorator()
 """Decorator of compiled functions that neither make nor return an array."""
 
 allocating_kernel = _decorator(allocates=True)
-"""Decorator of compiled functions that make or return arrays; `kernel` would not compile, or refuse."""
+"""Decorator of compiled functions that make or return arrays; `kernel` would not compile, or refuse.
+
+They count references to slices: a loop over queries belongs in a `kernel` that they call with their arrays.
+"""
 
 fast_kernel = _decorator(fastmath=_REGROUPED)
 """Decorator of the few flat loops in single precision that vector units must be free to sum in their own order.
