@@ -1,9 +1,9 @@
 """Calibration: standard errors and bounds of answers from the errors that an estimator itself reports.
 
-Estimators report errors in order to stop: they compare the norm of an answer's four errors with the requested one. The
-meaning of a reported error differs between the computations, the *stages*: sampled answers report the spread of
-randomisations, tables what they cannot resolve, quadrature the last change of its rules. Each stage has factors, fitted
-on random fabrics (grid: tests/fits/fit_calibration.py), that give two numbers with one meaning:
+Estimators report errors, and the meaning of a reported error differs between the computations, the *stages*: sampled
+answers report the spread of randomisations, tables what they cannot resolve, quadrature the last change of its rules.
+Each stage has factors, fitted on random fabrics (grid: tests/fits/fit_calibration.py), that give two numbers with one
+meaning:
 
     standard error   s^2 = r^2 + (b m)^2, r = a e / (1 + a e / (c m)): the root mean square of the true errors over many
                      queries
@@ -21,10 +21,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Mask
+from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import Raw
 
 COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED, QUADRATURE, QUADRATURE_CURVED = range(6)
-"""Stages: the two node tables, the fine one with sampled borders, sampling, quadrature of flat and of curved cloth."""
+"""Stages: the two node tables, the fine one with refined nodes, sampling, quadrature of flat and of curved cloth."""
 
 
 class Factors(NamedTuple):
@@ -51,7 +52,7 @@ class Factors(NamedTuple):
 COMPONENTS: Final = {
     COARSE_TABLE: Factors(0.76, 0.03, 0.0019, 5.5),
     FINE_TABLE: Factors(0.67, 0.1, 0.0014, 8.5),
-    REFINED: Factors(0.85, 0.1, 0.0005, 5.5),
+    REFINED: Factors(1.1, 0.1, 0.0005, 5.5),
     SAMPLED: Factors(1.0, math.inf, 0.0, 4.7),
     QUADRATURE: Factors(0.14, 0.3, 0.0015, 11.0),
     QUADRATURE_CURVED: Factors(0.17, 3.0, 0.001, 12.0),
@@ -61,7 +62,7 @@ COMPONENTS: Final = {
 BEHIND: Final = COMPONENTS | {
     COARSE_TABLE: Factors(0.8, 0.03, 0.002, 6.0),
     FINE_TABLE: Factors(0.8, 0.1, 0.0015, 10.0),
-    REFINED: Factors(1.1, 0.1, 0.0005, 5.0),
+    REFINED: Factors(1.4, 0.1, 0.0005, 5.0),
     QUADRATURE: Factors(0.8, 0.2, 0.0035, 9.0),
     QUADRATURE_CURVED: Factors(0.8, 0.2, 0.0035, 9.0),
 }
@@ -81,18 +82,35 @@ THROUGH: Final = {
 def calibrate(raw: Raw, behind: Mask) -> tuple[Float64, Float64]:
     """Return standard errors and bounds (N, 5); `behind` says which queries have light or viewer behind the cloth."""
     error, bound = np.zeros_like(raw.error), np.zeros_like(raw.error)
-    size = np.linalg.norm(raw.mean[:, :4], axis=1, keepdims=True)
+    size = np.linalg.norm(raw.mean[:, :4], axis=1)
     for table, chosen, columns in (
         (COMPONENTS, ~behind, slice(4)),
         (BEHIND, behind, slice(4)),
         (THROUGH, np.ones_like(behind), slice(4, 5)),
     ):
-        for stage, (a, c, b, k) in table.items():
-            here = chosen & (raw.stage == stage)
+        for stage, factors in table.items():
+            here = np.flatnonzero(chosen & (raw.stage == stage))
             scale = size[here] if table is not THROUGH else (size[here] > 0.0).astype(np.float64)
-            reported = a * raw.error[here, columns]
-            # A black answer has no scale: its error is that of the light that may have been missed.
-            beyond = reported / (c * np.where(scale > 0.0, scale, np.inf))
-            error[here, columns] = np.hypot(reported / (1.0 + beyond), b * scale)
-            bound[here, columns] = k * error[here, columns]
+            found = raw.error[here, columns]
+            _calibrate_all(found, scale, factors)
+            error[here, columns] = found
+            bound[here, columns] = factors.cover * found
     return error, bound
+
+
+@kernel
+def standard_error(reported: float, size: float, factors: Factors) -> float:
+    """Return the standard error of a component from the reported one; `size` is the norm of the components."""
+    error = factors.reported * reported
+    # A black answer has no scale: its error is that of the light that may have been missed.
+    if size > 0.0:
+        error /= 1.0 + error / (factors.largest * size)
+    return math.hypot(error, factors.missed * size)
+
+
+@kernel
+def _calibrate_all(error: Float64, size: Float64, factors: Factors) -> None:
+    """Replace reported errors (N, C) by standard errors."""
+    for row in range(error.shape[0]):
+        for column in range(error.shape[1]):
+            error[row, column] = standard_error(error[row, column], size[row], factors)

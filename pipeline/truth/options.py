@@ -38,8 +38,8 @@ class TruthOptions(BaseModel):
     footprint: Literal["gaussian", "box"] = "gaussian"
     """Kernel k_P; the box has the same standard deviations: sides sigma sqrt(12)."""
     relative_error: float = Field(default=0.02, gt=0, le=1)
-    """Stop when the norm of the four errors that the estimator reports falls below this share of the norm of the four
-    means."""
+    """Stop when the norm of the four errors falls below this share of the norm of the four means. With `auto` these are
+    the standard errors that answers state; with other estimators, what the estimator reports before calibration."""
     absolute_error: float = Field(default=1e-5, ge=0, le=1)
     """Also stop when that norm falls below this, 1/sr: dark patches need no more."""
     min_count: int = Field(default=256, ge=32, le=2**24)

@@ -4,18 +4,19 @@ The error of a sum over nodes comes mostly from borders of shadows that cross no
 far the border between them lies from half-way, and so by how much it moves the sum; this is reported as an error. Where
 the horizon jumps, the place of the border is unknown. Curvature within a node (`kernels.SMOOTH`) and errors that
 neither nodes nor borders show (`refine.UNSEEN`) add a share each; both were fitted to converged answers (tests/fits).
-Where the estimated error exceeds the requested one, the nodes on borders are sampled (refine).
+Where the standard error that this gives exceeds the requested one, the nodes that may be most wrong are refined.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float64, Index, Mask
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
+from pipeline.truth.calibration import Factors, standard_error
 from pipeline.truth.cloth import ClothSide, Columns
 from pipeline.truth.footprint.hidden import conceal
 from pipeline.truth.footprint.mixture import Line
@@ -25,6 +26,7 @@ from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP
 from pipeline.truth.monte_carlo import query_directions
 from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE, FINE_START, ROWS, START, Table
 from pipeline.truth.node_table.directions import NodeDirections, node_directions
+from pipeline.truth.node_table.doubts import doubtful_from
 from pipeline.truth.node_table.kernels import (
     Horizons,
     Layer,
@@ -36,16 +38,61 @@ from pipeline.truth.node_table.kernels import (
     transmitted,
     weigh,
 )
-from pipeline.truth.node_table.refine import UNSEEN, refine
+from pipeline.truth.node_table.refine import UNSEEN, RefineRoom, refine, refine_room
 from pipeline.truth.node_table.shares import NodeShares, no_shares, with_weight
 from pipeline.truth.node_table.weights import any_weight, fill_weights
 
-_SUBDIVISIONS: Final = (2, 4)
+_ROWS: Final = (2, 4, 8)
+"""Rows of a refined node, tried in this order."""
 
 UNDECIDED: Final = 0.3
 """Error by nodes whose horizons disagree, relative to the components of the patch and to the share of the nodes."""
 
 _0 = np.float32(0.0)
+
+
+class Requested(NamedTuple):
+    """When an answer is good enough.
+
+    Attributes
+    ----------
+    relative, absolute : float
+        Requested standard error: relative to the norm of the four components, and 1/sr.
+    table, refined : Factors
+        Calibration of answers by the table alone, and of refined ones.
+    table_behind, refined_behind : Factors
+        The same for light from behind.
+    """
+
+    relative: float
+    absolute: float
+    table: Factors
+    refined: Factors
+    table_behind: Factors
+    refined_behind: Factors
+
+
+class _Room(NamedTuple):
+    """Room for one query: shares of an own and of an even footprint, of its rows and columns, and for refinement."""
+
+    own: NodeShares
+    everywhere: NodeShares
+    scratch: Float32
+    touched: Mask
+    points: Float32
+    moved: Float64
+    mean: Float64
+    error: Float64
+    refinement: RefineRoom
+
+
+class _Found(NamedTuple):
+    """Answers: means and errors (N, 5), nodes and places visited (N,), and whether nodes were refined (N,)."""
+
+    mean: Float64
+    error: Float64
+    count: Index  # type: ignore[assignment]  # the field's word, though tuples have a count too
+    refined: Mask
 
 
 @allocating_kernel
@@ -54,59 +101,113 @@ def sum_rows(
     table: Table,
     columns: Columns,
     index: Index,
-    relative_error: float,
-    absolute_error: float,
+    requested: Requested,
     seed: np.uint64,
     line: Line,
-) -> tuple[Float64, Float64, Index, Mask]:
-    """Answer every row: means and errors (N, 5), nodes visited, and whether it was refined; ellipses by a `line`.
+) -> _Found:
+    """Answer every row; ellipses by a `line`.
 
     Footprints are Gaussian or lie along the axes, the cloth is flat, cosines go to the ply normal, points hide one
     another, and there is light from behind only if the table has horizons there.
     """
-    rows = len(columns.u)
-    means, errors, counts = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64)
-    refined = np.zeros(rows, np.bool_)
-    own = no_shares(table.normal.shape[1])
-    everywhere = with_weight(own, table.evenly)
-    cells = max(table.repeat[0], table.repeat[1])
-    scratch = np.zeros((2, cells, len(table.edges), table.edges.shape[1] - 1), np.float32)
-    touched = np.zeros((2, cells, len(table.edges)), np.bool_)
-    points = np.zeros((2, 2 * line.half + 1), np.float32)
-    moved, known, known_error = np.zeros(5), np.zeros(5), np.zeros(5)
-    for row in range(rows):
-        towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+    rows, nodes = len(columns.u), table.normal.shape[1]
+    own = no_shares(nodes)
+    cells, kinds = max(table.repeat[0], table.repeat[1]), len(table.edges)
+    room = _Room(
+        own,
+        with_weight(own, table.evenly),
+        np.zeros((2, cells, kinds, table.edges.shape[1] - 1), np.float32),
+        np.zeros((2, cells, kinds), np.bool_),
+        np.zeros((2, 2 * line.half + 1), np.float32),
+        np.zeros(5),
+        np.zeros(5),
+        np.zeros(5),
+        refine_room(nodes),
+    )
+    found = _Found(np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64), np.zeros(rows, np.bool_))
+    _answer_rows(cloth, table, columns, index, requested, seed, line, room, found)
+    return found
+
+
+@kernel
+def _answer_rows(
+    cloth: ClothSide,
+    table: Table,
+    columns: Columns,
+    index: Index,
+    requested: Requested,
+    seed: np.uint64,
+    line: Line,
+    room: _Room,
+    found: _Found,
+) -> None:
+    """Answer every row."""
+    for row in range(len(columns.u)):
         even = cloth.shape == GAUSSIAN and min(columns.sigma[row], columns.sigma_minor[row]) >= table.uniform
         if not even:
-            fill_weights(table, cloth.shape, columns, row, scratch, touched, line, points, own.weight)
-        shares = everywhere if even else own
+            fill_weights(
+                table, cloth.shape, columns, row, room.scratch, room.touched, line, room.points, room.own.weight
+            )
+        shares = room.everywhere if even else room.own
+        _answer_row(cloth, table, columns, row, derive(seed, index[row]), requested, shares, room, found)
 
-        area, area_error, moved_area, undecided, nodes = _sum_pieces(
-            cloth, table, towards, shares, means[row], moved, errors[row]
+
+@kernel
+def _answer_row(
+    cloth: ClothSide,
+    table: Table,
+    columns: Columns,
+    row: int,
+    key: np.uint64,
+    requested: Requested,
+    shares: NodeShares,
+    room: _Room,
+    found: _Found,
+) -> None:
+    """Answer a row whose footprint is spread over the nodes; `key` names its random numbers."""
+    mean, error = found.mean[row], found.error[row]
+    towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+    area, area_error, moved_area, undecided, nodes = _sum_pieces(cloth, table, towards, shares, mean, room.moved, error)
+    found.count[row] += nodes
+    cosine = columns.wo[row, 2]
+    if area <= 0.0:
+        mean[:] = 0.0
+        error[:] = 0.0
+        return
+    _divide(cloth.projected, cosine, area, area_error, moved_area, room.moved, mean, error)
+    add_undecided(undecided / (area + undecided), mean, error)
+    share, share_error = area / cosine, (math.hypot(moved_area, math.sqrt(area_error)) + undecided) / cosine
+    if conceal(share, share_error, mean, error):
+        return
+    target = max(requested.relative**2 * _squared_norm(mean), requested.absolute**2)
+    plain, refined = requested.table, requested.refined
+    if columns.wi[row, 2] < 0.0:
+        plain, refined = requested.table_behind, requested.refined_behind
+    if _squared_error(mean, error, plain) <= target:
+        return
+    found.refined[row] = True
+    below = cosine if cloth.projected else area
+    directions = query_directions(columns, row)
+    least = doubtful_from(table, shares, mean, below, target / refined.reported**2, room.refinement.doubts)
+    for q in range(5):
+        room.mean[q], room.error[q] = mean[q], error[q]
+    for rows in _ROWS:
+        for q in range(5):
+            mean[q], error[q] = room.mean[q], room.error[q]
+        found.count[row] += refine(
+            cloth, table, directions, key, rows, shares, least, below, room.refinement, mean, error
         )
-        counts[row] += nodes
-        cosine = columns.wo[row, 2]
-        if area <= 0.0:
-            means[row], errors[row] = 0.0, 0.0
-            continue
-        _divide(cloth.projected, cosine, area, area_error, moved_area, moved, means[row], errors[row])
-        add_undecided(undecided / (area + undecided), means[row], errors[row])
-        share, share_error = area / cosine, (math.hypot(moved_area, math.sqrt(area_error)) + undecided) / cosine
-        if conceal(share, share_error, means[row], errors[row]):
-            continue
-        size, doubt = _squared_norm(means[row]), _squared_norm(errors[row])
-        target = max(relative_error**2 * size, absolute_error**2)
-        if doubt > target:
-            refined[row] = True
-            known[:], known_error[:] = means[row], errors[row]
-            directions, key = query_directions(columns, row), derive(seed, index[row])
-            below = cosine if cloth.projected else area
-            for side in _SUBDIVISIONS:
-                means[row], errors[row] = known, known_error
-                counts[row] += refine(cloth, table, directions, key, side, shares, below, means[row], errors[row])
-                if _squared_norm(errors[row]) <= target:
-                    break
-    return means, errors, counts, refined
+        if _squared_error(mean, error, refined) <= target:
+            break
+
+
+@kernel
+def _squared_error(mean: Float64, error: Float64, factors: Factors) -> float:
+    """Return the sum of the squares of the standard errors of the four components."""
+    size, total = math.sqrt(_squared_norm(mean)), 0.0
+    for q in range(4):
+        total += standard_error(error[q], size, factors) ** 2
+    return total
 
 
 @kernel

@@ -1,10 +1,13 @@
 """The estimators `node_table` and `auto`: sums over tabulated nodes, and sampling of all other queries.
 
-`auto` evaluates wide footprints by a coarse table. All others, and those whose error exceeds the requested one, go to a
-fine table, which costs ten to forty microseconds a query. Where its error is too large, the fine table samples the
-nodes on borders of shadows (refine). Queries whose error is still too large are sampled as a whole. So are all queries
-that no table can answer: tiny and very thin footprints, curved cloth, cloths of many different cells, and options of
-the truth other than the default.
+`auto` evaluates wide footprints by a coarse table. All others, and those whose standard error exceeds the requested
+one, go to a fine table, which costs ten to forty microseconds a query. Where its error is too large, the nodes that may
+be most wrong are integrated with exact visibility (refine). Queries whose error is still too large are sampled as a
+whole. So are all queries that no table can answer: tiny and very thin footprints, curved cloth, cloths of many
+different cells, and options of the truth other than the default.
+
+Each stage stops at the calibrated standard error, not at the error that it reports (pipeline.truth.calibration): the
+requested error has one meaning for all stages.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
-from pipeline.truth.calibration import SAMPLED
+from pipeline.truth.calibration import SAMPLED, calibrate
 from pipeline.truth.cloth import ClothSide, Columns, Raw
 from pipeline.truth.monte_carlo import OWEN, sample_rows
 from pipeline.truth.node_table.tables import ALLOWED, COARSE, FINE, UNBOUNDED
@@ -30,7 +33,7 @@ samples, so that three of them cover as much as three of a normal distribution."
 
 
 def auto_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
-    """Answer each query by the first that reaches the requested error: a coarse table, a fine one, sampling."""
+    """Answer each query by the first whose standard error is small enough: a coarse table, a fine one, sampling."""
     answers = Raw.empty(len(index))
     known, wide = FINE.knows(cloth, columns), _wide(columns)
     requested = options.relative_error, options.absolute_error
@@ -40,7 +43,8 @@ def auto_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOp
         if not here.size:
             continue
         found = table.answer(cloth, columns.take(here), index[here], *bound, seed)
-        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (found.mean, found.error))
+        errors, _ = calibrate(found, columns.wi[here, 2] < 0.0)
+        size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (found.mean, errors))
         good = doubt <= np.maximum(options.relative_error * size, options.absolute_error)
         answers.put(here, *found)
         left[here[good]] = False

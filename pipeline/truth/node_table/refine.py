@@ -1,13 +1,14 @@
-"""Refinement of an answer: nodes that a border of a shadow crosses, or may cross, are sampled with exact visibility.
+"""Refinement of an answer: the nodes that may be most wrong are integrated with exact visibility.
 
-All other nodes keep their share from the table. A few hundred points are then as accurate as thousands over the whole
-footprint.
+The other nodes keep their share from the table. A refined node is cut along a few rows that cross its border (cut); the
+scatter of the rows states the error. Some hundred tests of visibility are then as accurate as thousands of points over
+the whole footprint.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,109 +17,158 @@ from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA, SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.monte_carlo import add_point
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, KIND_X, KIND_Y, ROWS, START, Table
-from pipeline.truth.node_table.kernels import SMOOTH
+from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE, KIND_X, KIND_Y, ROWS, START, Table
+from pipeline.truth.node_table.cut import Known, Row, RowRoom, add_row, row_room
+from pipeline.truth.node_table.doubts import Doubts, no_doubts
 from pipeline.truth.node_table.shares import NodeShares
 from pipeline.truth.scattering.point import Directions
 
 UNSEEN: Final = 0.002
 """Relative error of an answer that neither nodes nor borders show."""
 
-_NEGLIGIBLE: Final = 1e-5
+_SPREAD: Final = 0.5
+"""Variance of the mean of stratified rows over what independent rows of that scatter would have."""
+
+_0 = np.float32(0.0)
+
+
+class RefineRoom(NamedTuple):
+    """Room for the refinement of a query.
+
+    Attributes
+    ----------
+    doubts : Doubts
+        What nodes may be wrong by.
+    row : RowRoom
+        Room for a row.
+    change : float64 (SUMS,)
+        Change of the sums.
+    variance : float64 (4,)
+        Squared error of the numerators.
+    first, second : float64 (SUMS,), float64 (4,)
+        Sums over a node's rows, and of the squares of their residuals.
+    """
+
+    doubts: Doubts
+    row: RowRoom
+    change: Float64
+    variance: Float64
+    first: Float64
+    second: Float64
 
 
 @allocating_kernel
+def refine_room(nodes: int) -> RefineRoom:
+    """Return room for a table of so many nodes."""
+    return RefineRoom(no_doubts(nodes), row_room(), np.zeros(SUMS), np.zeros(4), np.zeros(SUMS), np.zeros(4))
+
+
+@kernel
 def refine(
     cloth: ClothSide,
     table: Table,
     directions: Directions,
     key: np.uint64,
-    side: int,
+    rows: int,
     shares: NodeShares,
+    least: float,
     below: float,
+    room: RefineRoom,
     mean: Float64,
     error: Float64,
 ) -> int:
-    """Replace the shares of the nodes on borders by samples with exact visibility; return the number of points.
+    """Replace the shares of nodes that may be wrong by integrals over `rows` rows each; return the places tested.
 
-    Each such node gets `side` by `side` jittered points. `mean` and `error` of the four components are the table's and
+    Nodes with a score of at least `least` are refined. `mean` and `error` of the four components are the table's and
     are written; `below` is the table's denominator.
     """
-    subsamples = side * side
-    change, variance = np.zeros(SUMS), np.zeros(4)
-    value, first, second = np.zeros((1, SUMS)), np.zeros(SUMS), np.zeros(4)
-    points = 0
-    weight, margins, lit_margins = shares.weight, shares.margins, shares.lit_margins
+    change, variance, left, score = room.change, room.variance, room.doubts.left, room.doubts.score
+    change[:] = 0.0
+    variance[:] = 0.0
+    tested = 0
     for p in range(len(table.pieces)):
-        piece = table.pieces[p]
-        start, across, family = piece[START], piece[COLUMNS], piece[FAMILY]
-        stop = start + across * piece[ROWS]
-        gap = family == GAP
-        end, pick = table.copies[p, 0, 0], table.copies[p, 0, 1]
-        x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
-        for k in range(start, stop):
-            a, c = np.float64(shares.areas[k]), np.float64(0.0 if gap else shares.diffuses[k]) / math.pi
-            s, share = np.float64(shares.speculars[k]), np.float64(weight[k])
-            if share <= 0.0:
+        start, family = table.pieces[p, START], table.pieces[p, FAMILY]
+        for k in range(start, start + table.pieces[p, COLUMNS] * table.pieces[p, ROWS]):
+            if score[k] == _0 or score[k] < least:
                 continue
-            border = _on_border(margins, k, across, start, stop) or _on_border(lit_margins, k, across, start, stop)
-            if not border and shares.undecided[k] == 0.0:
-                if gap:
-                    continue
-                # Error from curvature within the node.
-                for kind, part in ((0, s), (2, c)):
-                    residual = part - mean[kind + family] * a
-                    variance[kind + family] += residual * residual * SMOOTH
-                continue
-            if share < _NEGLIGIBLE * below:
-                continue
-            i, j = (k - start) % across, (k - start) // across
-            tilt_x = _tilt(weight, k, 1, x_edges, i, across)
-            tilt_y = _tilt(weight, k, across, y_edges, j, piece[ROWS])
-            first[:], second[:] = 0.0, 0.0
-            for sub in range(subsamples):
-                u = (sub % side + uniform(key, k, 2 * sub)) / side
-                v = (sub // side + uniform(key, k, 2 * sub + 1)) / side
-                x = end + x_edges[i] + u * (x_edges[i + 1] - x_edges[i])
-                y = pick + y_edges[j] + v * (y_edges[j + 1] - y_edges[j])
-                value[:] = 0.0
-                tilted = share * max(1.0 + tilt_x * (u - 0.5) + tilt_y * (v - 0.5), 0.0)
-                add_point(cloth, x, y, tilted, directions, value, 0)
-                for q in range(4):
-                    residual = value[0, q] - mean[q] * value[0, AREA]
-                    second[q] += residual * residual
-                for q in range(SUMS):
-                    first[q] += value[0, q]
-            points += subsamples
-            for q in range(4):
-                residual = first[q] - mean[q] * first[AREA]
-                spread = second[q] - residual * residual / subsamples
-                variance[q] += max(spread, 0.0) / (subsamples * (subsamples - 1.0))
-                change[q] += first[q] / subsamples
-            change[AREA] += first[AREA] / subsamples - a
-            if not gap:
-                change[family] -= s
-                change[2 + family] -= c
+            tested += _integrate(cloth, table, p, k, directions, key, rows, shares, mean, room)
+            change[AREA] -= shares.areas[k]
+            if family != GAP:
+                change[family] -= np.float64(shares.speculars[k])
+                change[2 + family] -= np.float64(shares.diffuses[k]) / math.pi
     total = below if cloth.projected else below + change[AREA]
     for q in range(4):
         mean[q] = max((mean[q] * below + change[q]) / total, 0.0)
-        error[q] = math.sqrt(variance[q]) / total + UNSEEN * mean[q]
-    return points
+        error[q] = math.sqrt(variance[q] + 0.25 * left[0] + left[1 + q] ** 2) / total + UNSEEN * mean[q]
+    return tested
 
 
 @kernel
-def _on_border(margins: Float32, k: int, columns: int, first: int, last: int) -> bool:
-    """Return whether a neighbour of node k is on the other side of a border."""
-    here = margins[k] > 0.0
-    column = (k - first) % columns
-    if column > 0 and (margins[k - 1] > 0.0) != here:
-        return True
-    if column < columns - 1 and (margins[k + 1] > 0.0) != here:
-        return True
-    if k - columns >= first and (margins[k - columns] > 0.0) != here:
-        return True
-    return k + columns < last and (margins[k + columns] > 0.0) != here
+def _integrate(
+    cloth: ClothSide,
+    table: Table,
+    p: int,
+    k: int,
+    directions: Directions,
+    key: np.uint64,
+    rows: int,
+    shares: NodeShares,
+    mean: Float64,
+    room: RefineRoom,
+) -> int:
+    """Add the integral over node k of piece p to the changes, and its squared error; return the places tested."""
+    piece, weight = table.pieces[p], shares.weight
+    start, across, gap = piece[START], piece[COLUMNS], piece[FAMILY] == GAP
+    stop = start + across * piece[ROWS]
+    i, j = (k - start) % across, (k - start) // across
+    x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
+    tilt_x = _tilt(weight, k, 1, x_edges, i, across)
+    tilt_y = _tilt(weight, k, across, y_edges, j, piece[ROWS])
+    x, dx = table.copies[p, 0, 0] + np.float64(x_edges[i]), np.float64(x_edges[i + 1]) - np.float64(x_edges[i])
+    y, dy = table.copies[p, 0, 1] + np.float64(y_edges[j]), np.float64(y_edges[j + 1]) - np.float64(y_edges[j])
+
+    # Rows lead along the axis that crosses the border.
+    right, down = room.doubts.right, room.doubts.down
+    along_x = right[k] + (right[k - 1] if i > 0 else _0) >= down[k] + (down[k - across] if j > 0 else _0)
+    decided = shares.undecided[k] == _0
+    seen = decided and _clear(shares.margins, k, i, across, start, stop)
+    lit = decided and not gap and directions.light.z > 0.0 and _clear(shares.lit_margins, k, i, across, start, stop)
+    known = Known(seen, lit, not gap and piece[FINE] > 1)
+    first, second, value = room.first, room.second, room.row.value
+    first[:] = 0.0
+    second[:] = 0.0
+    tested = 0
+    for r in range(rows):
+        t, offset = (r + uniform(key, k, 2 * r)) / rows, uniform(key, k, 2 * r + 1)
+        if along_x:
+            share = weight[k] * max(1.0 + tilt_y * (t - 0.5), 0.0)
+            row = Row(x, y + t * dy, dx, 0.0, offset, share, tilt_x)
+        else:
+            share = weight[k] * max(1.0 + tilt_x * (t - 0.5), 0.0)
+            row = Row(x + t * dx, y, 0.0, dy, offset, share, tilt_y)
+        tested += add_row(cloth, directions, row, known, room.row)
+        for q in range(4):
+            second[q] += (value[q] - mean[q] * value[AREA]) ** 2
+        for q in range(SUMS):
+            first[q] += value[q]
+    for q in range(4):
+        spread = second[q] - (first[q] - mean[q] * first[AREA]) ** 2 / rows
+        room.variance[q] += _SPREAD * max(spread, 0.0) / (rows * (rows - 1.0))
+    for q in range(SUMS):
+        room.change[q] += first[q] / rows
+    return tested
+
+
+@kernel
+def _clear(margins: Float32, k: int, i: int, across: int, start: int, stop: int) -> bool:
+    """Return whether node k, number i of its line, and its neighbours clear the horizon."""
+    if margins[k] <= _0:
+        return False
+    if (i > 0 and margins[k - 1] <= _0) or (i < across - 1 and margins[k + 1] <= _0):
+        return False
+    if k - across >= start and margins[k - across] <= _0:
+        return False
+    return bool(k + across >= stop or margins[k + across] > _0)
 
 
 @kernel

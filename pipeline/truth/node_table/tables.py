@@ -15,13 +15,13 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
-from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED
+from pipeline.truth.calibration import BEHIND, COARSE_TABLE, COMPONENTS, FINE_TABLE, REFINED
 from pipeline.truth.cloth import ClothSide, Columns, Raw
 from pipeline.truth.footprint.mixture import FINE_LINE, Line, axes
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField
 from pipeline.truth.geometry.symmetry import different_cells
-from pipeline.truth.node_table.answer import sum_rows
+from pipeline.truth.node_table.answer import Requested, sum_rows
 from pipeline.truth.node_table.build import Table, tabulate
 from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA
 
@@ -33,7 +33,7 @@ AZIMUTHS: Final = 128
 """Directions in which the truth's tables hold horizons."""
 
 UNBOUNDED: Final = (1.0, np.inf)
-"""Relative and absolute error of an answer that is not refined."""
+"""Relative and absolute standard error of an answer that is not refined."""
 
 _FEW: Final = 8
 _COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
@@ -82,14 +82,15 @@ class NodeTable:
     def answer(
         self, cloth: ClothSide, columns: Columns, index: Index, relative_error: float, absolute_error: float, seed: int
     ) -> Raw:
-        """Answer queries that the table knows; nodes on borders are sampled where the error exceeds the requested one.
+        """Answer queries that the table knows; nodes are refined where the standard error exceeds the requested one.
 
-        `index` and `seed` name the random numbers of these samples.
+        `index` and `seed` name the random numbers of refined nodes.
         """
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
-        bounds = relative_error, absolute_error
-        mean, error, count, refined = sum_rows(cloth, table, columns, index, *bounds, np.uint64(seed), self._line)
-        return Raw(mean, error, count, np.where(refined, REFINED, self._stage))
+        factors = (sides[stage] for sides in (COMPONENTS, BEHIND) for stage in (self._stage, REFINED))
+        requested = Requested(relative_error, absolute_error, *factors)
+        found = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
+        return Raw(found.mean, found.error, found.count, np.where(found.refined, REFINED, self._stage))
 
     def table(self, cloth: ClothSide, behind: bool) -> Table:
         """Return the table of one side of a cloth, with horizons `behind` it if there is light."""

@@ -122,7 +122,7 @@ def point_share(
     if light.z > 0.0 or light.bend > 0.0:
         lit = cos_i > 0.0 and (not choices.shadows or visible(front, x, y, z, side, light))
     if not lit and light.z < 0.0:
-        lit = transmitted = cos_i < 0.0 and _lit_from_behind(back, x, y, directions.light_behind, choices)
+        lit = transmitted = cos_i < 0.0 and lit_from_behind(back, x, y, directions.light_behind, choices)
     if not lit:
         return family, area, 0.0, 0.0, through
     facing = abs(cos_i)
@@ -139,7 +139,7 @@ def point_share(
 
 
 @inlined_kernel
-def _lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices: Choices) -> bool:
+def lit_from_behind(back: HeightField, x: float, y: float, light: Ray, choices: Choices) -> bool:
     """Return whether the back of the cloth sees the light at (x, y), everything reflected in the fabric plane."""
     if not choices.shadows:
         return True

@@ -1,0 +1,97 @@
+"""Refined nodes: a cut row against the mean of many points, and the choice of the nodes that are refined."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.calibration import REFINED
+from pipeline.truth.cloth import AREA, SUMS, cloth_side, columns_of
+from pipeline.truth.estimator import uncalibrated
+from pipeline.truth.monte_carlo import add_point, query_directions
+from pipeline.truth.node_table.cut import Known, Row, add_row, row_room
+from pipeline.truth.node_table.doubts import doubtful_from, no_doubts
+from pipeline.truth.node_table.shares import no_shares
+from pipeline.truth.node_table.tables import FINE
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import load_fabric
+
+EVERYWHERE = Known(False, False, False)
+EVERY_PLACE = Known(False, False, True)
+
+
+def mean_of_points(cloth, directions, x, y, size, tilt):
+    """Return the mean of the sums over a square of 60 by 60 points."""
+    sums = np.zeros((1, SUMS))
+    for u in (np.arange(60) + 0.5) / 60:
+        for v in (np.arange(60) + 0.5) / 60:
+            add_point(cloth, x + u * size, y + v * size, 1.0 + tilt * (u - 0.5), directions, sums, 0)
+    return sums[0] / 3600
+
+
+@pytest.mark.parametrize(("name", "behind"), [("denim", 0.0), ("gauze", 0.0), ("gauze", 1.0)])
+@pytest.mark.parametrize("known", [EVERYWHERE, EVERY_PLACE])
+def test_cut_rows_are_unbiased(name, behind, known):
+    """Rows at random heights of a square that borders cross agree with its points, over 12 squares of half a node."""
+    fabric = load_fabric(name)
+    cloth = cloth_side(fabric, TruthOptions())
+    columns = columns_of(draw_queries(QueryOptions(behind=behind), fabric.weave.repeat, 61, 0, 60))
+    random, room, size, tilt = np.random.default_rng(3), row_room(), 1.0 / 64, 0.6
+    scores, crossed = [], 0
+    for row in range(60):
+        directions = query_directions(columns, row)
+        x, y = (math.floor(64 * place) / 64 for place in (columns.u[row] % 1, columns.v[row] % 1))
+        exact = mean_of_points(cloth, directions, x, y, size, tilt)
+        values = []
+        for k in range(64):
+            height, offset = (k + random.random()) / 64, random.random()
+            add_row(cloth, directions, Row(x, y + height * size, size, 0.0, offset, 1.0, tilt), known, room)
+            values.append(room.value.copy())
+        found, spread = np.mean(values, axis=0), np.std(values, axis=0) / 8
+        for q in (0, 1, 2, 3, AREA):
+            crossed += spread[q] > 0.01 * abs(found[q])
+            # A point more or less on either side of a border: the squares of points are no closer.
+            allowed = 4 * spread[q] + 0.02 * abs(exact[q])
+            scores.append(abs(found[q] - exact[q]) <= allowed)
+    assert crossed >= 3
+    assert np.mean(scores) > 0.98
+
+
+def test_nodes_that_are_left_keep_a_share_of_the_requested_error():
+    """Two nodes of a row differ; a small requested error selects both, a large one neither."""
+    fabric = load_fabric("denim")
+    table = FINE.table(cloth_side(fabric, TruthOptions()), False)
+    shares, doubts = no_shares(table.normal.shape[1]), no_doubts(table.normal.shape[1])
+    shares.weight[:] = table.evenly
+    shares.areas[:], shares.margins[:], shares.lit_margins[:] = table.evenly, 1.0, 1.0
+    shares.diffuses[:] = table.evenly
+    # In shade from here on, without warning: the border's place is unknown.
+    first = int(table.pieces[0, 0])
+    dark = first + 5 * int(table.pieces[0, 1]) + 7
+    shares.lit_margins[dark], shares.diffuses[dark] = -1.0, 0.0
+    mean, below = np.zeros(5), float(shares.areas.sum())
+    mean[2:4] = 0.5 / math.pi
+    change = float(table.evenly[dark]) / math.pi / below
+    for requested, refined in ((1e-3 * change, True), (1e3 * change, False)):
+        least = doubtful_from(table, shares, mean, below, requested**2, doubts)
+        assert (doubts.score[dark] >= least) == refined
+        kept = doubts.score[doubts.score < least].astype(np.float64).sum()
+        assert kept <= 0.35 * (requested * below) ** 2
+        assert doubts.left[0] == pytest.approx(kept, rel=1e-4, abs=1e-300)
+
+
+def test_refined_answers_are_closer_than_the_table():
+    fabric = load_fabric("polyester_lining")
+    queries = draw_queries(QueryOptions(sigma=(0.05, 0.5)), fabric.weave.repeat, 35, 0, 120)
+    many = TruthOptions(estimator="owen", relative_error=1e-9, min_count=1 << 13, max_count=1 << 13)
+    exact = uncalibrated(fabric, queries, many, 2).mean[:, :4]
+    errors = {}
+    for error in (1.0, 0.005):
+        found = uncalibrated(fabric, queries, TruthOptions(relative_error=error), 5)
+        errors[error] = np.linalg.norm(found.mean[:, :4] - exact, axis=1) / np.linalg.norm(exact, axis=1)
+    # Only refined answers: what was sampled as a whole, or went to the fine table, says nothing of refinement.
+    refined = (found.stage == REFINED) & (errors[1.0] != errors[0.005])
+    assert refined.sum() > 20
+    before, after = (np.sqrt(np.mean(errors[error][refined] ** 2)) for error in (1.0, 0.005))
+    assert after < 0.5 * before
