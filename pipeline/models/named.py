@@ -2,15 +2,18 @@
 
 `selvage` is a model that comes with the package, `out/models/NAME` the folder of a trained one, `soft_nodes` a model
 that learns nothing, and `point_sampled:16` one of its settings. Without a setting the last one is taken, which is the
-most accurate.
+most accurate. `selvage:.02` is that model at a wished relative error.
 """
 
 from __future__ import annotations
+
+import math
 
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
 from pipeline.models.options import Options
 from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
+from pipeline.models.selvage.model import Selvage
 from pipeline.storage import place
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
@@ -30,7 +33,8 @@ def named_method(name: str, where: str, key: str) -> Fallback:
     Parameters
     ----------
     name : str
-        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting, or a folder.
+        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting or ``:.02`` for a
+        wished error, or a folder.
     where, key : str
         The verb and its option that name the method, for messages.
 
@@ -43,6 +47,11 @@ def named_method(name: str, where: str, key: str) -> Fallback:
     if model in untrained_names():
         options = _with_setting(CLASSES[model](), setting, where, key, name)
         return Fallback(load_methods(options)[-1], options.kinds)
+    if model in pretrained_names() and setting:
+        (trained,) = load_model(model_folder(model, where, key))
+        assert isinstance(trained, Selvage)
+        chosen = trained.within(_wished_error(setting, where, key, name))
+        return Fallback(chosen, _kinds(chosen))
     if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():
         if name in CLASSES:
             raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
@@ -50,6 +59,17 @@ def named_method(name: str, where: str, key: str) -> Fallback:
         raise BadInput(where, key, name, f"the folder of a trained model or a name is needed; {nearest(name, known)}")
     (method,) = load_model(model_folder(name, where, key))
     return Fallback(method, _kinds(method))
+
+
+def _wished_error(setting: str, where: str, key: str, name: str) -> float:
+    """Return the wished error that a name ends with."""
+    try:
+        error = float(setting)
+    except ValueError:
+        error = math.nan
+    if not 0.0 < error < 1.0:
+        raise BadInput(where, key, name, "a relative error above 0 and below 1 after the colon is needed, such as :.02")
+    return error
 
 
 def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:

@@ -85,14 +85,17 @@ class Trained(Part):
         return [Fallback(one, kinds, footprint) for one in self.methods(out)]
 
     def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
-        """Return trained methods with or without an energy bound, and in other runtimes."""
+        """Return trained methods with or without an energy bound, in other runtimes, and at wished errors."""
         if not self.networks:
             return []
         from pipeline.models.bounded import counterpart
         from pipeline.models.runtimes import runs
+        from pipeline.models.selvage.model import Selvage
 
         others = [counterpart(one) for one in methods if ways.bounds]
-        return others + [run for one in methods for run in runs(one, ways.runtimes)]
+        others += [run for one in methods for run in runs(one, ways.runtimes)]
+        estimating = [one for one in methods if isinstance(one, Selvage)]
+        return others + [one.within(error) for one in estimating for error in ways.wished_errors]
 
 
 def bound_version(ways: RunOptions) -> dict[str, int]:

@@ -28,6 +28,12 @@ class SelvageOptions(Options):
     """Hidden layers."""
     level: Level = 2
     """Level of detail of its soft nodes."""
+    finest: Level = 8
+    """Level of detail of the soft nodes whose error is estimated beside its own."""
+    error_width: Literal[16, 32, 64] = 32
+    """Width of the hidden layer of the network that estimates errors."""
+    error_weight: Weight = 1e-5
+    """Weight of the loss of the estimated errors, which share no weights with the correction."""
     exchange: bool = True
     """Exchange warp and weft in a random half of the training steps."""
     measured_rows: int = Field(default=1024, ge=16, le=2**20)
