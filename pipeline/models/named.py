@@ -11,9 +11,9 @@ import math
 
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
+from pipeline.models.method import EstimatesErrors
 from pipeline.models.options import Options
 from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
-from pipeline.models.selvage.model import Selvage
 from pipeline.storage import place
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
@@ -49,7 +49,8 @@ def named_method(name: str, where: str, key: str) -> Fallback:
         return Fallback(load_methods(options)[-1], options.kinds)
     if model in pretrained_names() and setting:
         (trained,) = load_model(model_folder(model, where, key))
-        assert isinstance(trained, Selvage)
+        if not isinstance(trained, EstimatesErrors):
+            raise BadInput(where, key, name, f"{model} has no settings")
         chosen = trained.within(_wished_error(setting, where, key, name))
         return Fallback(chosen, _kinds(chosen))
     if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():

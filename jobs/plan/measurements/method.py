@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement, Picture
-from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, bound_version
+from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, ways_versions
 from jobs.plan.measurements.truth_edge import TruthEdge
 from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.measurements.truth_picture import TruthPicture
@@ -134,7 +134,7 @@ class OnFabric(Measurement):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of model, benchmark and energy bound; that of the truth is in its inputs."""
-        return {"bench": versions.BENCH, "model": self.model.options.version, **bound_version(self.ways)}
+        return {"bench": versions.BENCH, "model": self.model.options.version, **ways_versions(self.ways)}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""

@@ -16,6 +16,7 @@ class SelvageOptions(Options):
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
     without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind"})
     answers_outside: ClassVar[bool] = True
+    estimates_errors: ClassVar[bool] = True
     turns: ClassVar[bool] = True
 
     model: Literal["selvage"] = "selvage"
