@@ -20,14 +20,14 @@ MODELS: Final[dict[str, int]] = {
     "point_sampled": 2,
     "prefiltered": 2,
     "selvage": 4,
-    "soft_nodes": 5,
+    "soft_nodes": 6,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 7
+FALLBACK: Final = 8
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 1

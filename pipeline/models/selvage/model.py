@@ -183,15 +183,15 @@ class Selvage:
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know.
 
-        Light from behind is answered by the soft nodes alone.
+        Light from behind and curved cloth are answered by the soft nodes alone.
         """
-        behind = queries.wi[:, 2] < 0.0
-        self._refuse(queries, behind=True)
-        if not behind.any():
+        alone = (queries.wi[:, 2] < 0.0) | (queries.curvature > 0.0)
+        refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
+        if not alone.any():
             return self._corrected(fabric, queries)
-        result = np.empty((len(behind), 4), np.float32)
-        result[behind] = self._nodes.predict(fabric, queries.take(behind))
-        result[~behind] = self._corrected(fabric, queries.take(~behind))
+        result = np.empty((len(alone), 4), np.float32)
+        result[alone] = self._nodes.predict(fabric, queries.take(alone))
+        result[~alone] = self._corrected(fabric, queries.take(~alone))
         return result
 
     def outside_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
@@ -226,9 +226,9 @@ class Selvage:
         answer = _LARGEST * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
-    def _refuse(self, queries: Queries, behind: bool = False) -> None:
-        """Refuse queries of kinds that it does not know; `behind` lets light come from behind."""
-        refuse_other(queries, self.name, stretch=True, behind=behind)
+    def _refuse(self, queries: Queries) -> None:
+        """Refuse queries of kinds that the network does not know."""
+        refuse_other(queries, self.name, stretch=True)
 
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the soft nodes and the network."""
