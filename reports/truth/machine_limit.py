@@ -67,7 +67,8 @@ def operations_of(table: Table) -> Operations:
     number = np.float32
     stop = int(table.starts[1])
     # A tuple from a kernel holds numbers in double precision when it comes to Python.
-    towards = Directions(*map(number, directions(*map(number, (0.3, 0.2, 0.9, 0.1, 0.3, 0.9)), WARP)))
+    wi, wo = np.array([0.36, 0.48, 0.8], np.float32), np.array([0.0, 0.6, 0.8], np.float32)
+    towards = Directions(*map(number, directions(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2], WARP)))
     horizons = [table.mean[0, :stop], table.mean[1, :stop], table.sharpness[0, :stop], number(0.5)]
     optics = (number(table.yarn[WARP, ALPHA]), number(table.thickness), number(table.yarn[WARP, BLEND]))
     fixed = _optimised(shade_fixed, table.nodes[:stop], table.evenly[:stop], *horizons, *horizons, towards, *optics)

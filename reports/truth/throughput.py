@@ -21,6 +21,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.method import CHUNK, Method
+from pipeline.models.per_query import Portable
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -226,6 +227,7 @@ def _models(fabric: Fabric, limit: Rate) -> Iterator[Rate]:
     few = queries.take(slice(CHUNK))
     operations = operations_of(tabulate(fabric))
     (selvage,) = load_model(pretrained_folder("selvage"))
+    assert isinstance(selvage, Portable)
     network = network_of(selvage, fabric)
     methods: list[tuple[Method, int, int]] = [(SoftNodes(level), level, 0) for level in DETAILS]
     for method, level, products in [*methods, (selvage, network.level, network.multiply_adds)]:

@@ -63,8 +63,8 @@ def nodes_taken(table: Table, queries: Queries) -> Index:
     taken = np.zeros((len(queries.u), 2), np.int64)
     for n in range(len(taken)):
         scratch.stops[:] = 0
-        u, v, deviation_x, deviation_y, correlation, *rest = (column[n : n + 1] for column in columns)
-        _sum_rows(table, scratch, (u, v, deviation_x, deviation_y, correlation), *rest, sums, gaps)
+        u, v, deviation_x, deviation_y, correlation, wi, wo, bend = (column[n : n + 1] for column in columns)
+        _sum_rows(table, scratch, (u, v, deviation_x, deviation_y, correlation), wi, wo, bend, sums, gaps)
         taken[n, 1] = (-(-scratch.stops // BLOCK_NODES)).sum() * BLOCK_NODES
         taken[n, 0] = 0 if taken[n, 1] else table.starts[kinds] * BLOCK_NODES
     return taken

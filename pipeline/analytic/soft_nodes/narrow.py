@@ -75,7 +75,8 @@ def _place_round(
 ) -> np.float32:  # fmt: skip
     """Place nodes in every piece that a footprint along the axes touches; return the area seen through gaps.
 
-    The footprint ends at `reach` deviations and is cut into `parts` along each axis, which have nodes of their own.
+    The footprint ends at `reach` deviations and is cut into `parts` along each axis, which have nodes of their own. For
+    gaps, which both sides of the cloth hide, it counts as flat.
     """
     ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
     of_warp, of_weft, per_azimuth = table.kinds[0], table.kinds[1], size * size

@@ -183,15 +183,15 @@ class Selvage:
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know.
 
-        Light from behind and curved cloth are answered by the soft nodes alone.
+        Light from behind is answered by the soft nodes alone.
         """
-        alone = (queries.wi[:, 2] < 0.0) | (queries.curvature > 0.0)
+        behind = queries.wi[:, 2] < 0.0
         refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
-        if not alone.any():
+        if not behind.any():
             return self._corrected(fabric, queries)
-        result = np.empty((len(alone), 4), np.float32)
-        result[alone] = self._nodes.predict(fabric, queries.take(alone))
-        result[~alone] = self._corrected(fabric, queries.take(~alone))
+        result = np.empty((len(behind), 4), np.float32)
+        result[behind] = self._nodes.predict(fabric, queries.take(behind))
+        result[~behind] = self._corrected(fabric, queries.take(~behind))
         return result
 
     def outside_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
@@ -233,6 +233,8 @@ class Selvage:
     def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer by the soft nodes and the network."""
         table, bias = self._cloths.of(fabric)
+        if (queries.curvature > 0.0).any():
+            table = self._nodes.table_for(fabric, queries)
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK):

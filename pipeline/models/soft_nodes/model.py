@@ -9,7 +9,7 @@ tabulated at the first such query.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,9 +25,6 @@ from pipeline.models.plain import refuse_other
 from pipeline.models.soft_nodes.options import SoftNodesOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
-
-Read = Callable[[Table, Queries], npt.NDArray[np.float32]]
-"""Reads queries from a table."""
 
 
 class SoftNodes:
@@ -62,51 +59,41 @@ class SoftNodes:
         refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
         behind = queries.wi[:, 2] < 0.0
         if not behind.any():
-            return self._by_curvature(self._tables, fabric, queries, _in_front, 4)
+            return self._front(fabric, queries)
         result = np.empty((len(behind), 4), np.float32)
         result[behind] = self.behind(fabric, queries.take(behind))[:, :4]
-        result[~behind] = self._by_curvature(self._tables, fabric, queries.take(~behind), _in_front, 4)
+        result[~behind] = self._front(fabric, queries.take(~behind))
         return result
 
     def behind(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""
-        return self._by_curvature(self._behind, fabric, queries, read_behind, 5)
+        table, result = self.table_for(fabric, queries), np.empty((len(queries.u), 5), np.float32)
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            result[rows] = read_behind(table, queries.take(rows))
+        return result
 
     def transparency(self, fabric: Fabric, looks: Queries) -> npt.NDArray[np.float32]:
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
         return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
 
-    def _by_curvature(
-        self, tables: PerFabric[Table], fabric: Fabric, queries: Queries, read: Read, width: int
-    ) -> npt.NDArray[np.float32]:
-        """Answer N queries, (N, width): those about flat cloth by one table, others by that of curved cloth."""
-        curved = queries.curvature > 0.0
-        if not curved.any():
-            return _in_chunks(tables.of(fabric), queries, read, width)
-        if curved.all():
-            return _in_chunks(self._curved.of(fabric), queries, read, width)
-        result = np.empty((len(curved), width), np.float32)
-        result[curved] = _in_chunks(self._curved.of(fabric), queries.take(curved), read, width)
-        result[~curved] = _in_chunks(tables.of(fabric), queries.take(~curved), read, width)
+    def table_for(self, fabric: Fabric, queries: Queries) -> Table:
+        """Return the smallest table that knows all queries; every table answers what it knows by the same bits."""
+        if (queries.curvature > 0.0).any():
+            return self._curved.of(fabric)
+        return (self._behind if (queries.wi[:, 2] < 0.0).any() else self._tables).of(fabric)
+
+    def _front(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+        """Answer N queries with the light in front."""
+        table, result = self.table_for(fabric, queries), np.empty((len(queries.u), 4), np.float32)
+        for start in range(0, len(result), CHUNK):
+            rows = slice(start, start + CHUNK)
+            result[rows] = read_queries(table, queries.take(rows)).components
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table; light from behind doubles it, curved cloth makes it five times as large."""
         return self._tables.of(fabric).nbytes
-
-
-def _in_front(table: Table, queries: Queries) -> npt.NDArray[np.float32]:
-    """Return the components of N queries with the light in front, (N, 4)."""
-    return read_queries(table, queries).components
-
-
-def _in_chunks(table: Table, queries: Queries, read: Read, width: int) -> npt.NDArray[np.float32]:
-    """Return what `read` finds, (N, width)."""
-    result = np.empty((len(queries.u), width), np.float32)
-    for start in range(0, len(result), CHUNK):
-        rows = slice(start, start + CHUNK)
-        result[rows] = read(table, queries.take(rows))
-    return result
 
 
 def restore(options: SoftNodesOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[SoftNodes]:
