@@ -31,14 +31,14 @@ class Work(NamedTuple):
 
     Attributes
     ----------
-    fixed, placed : float
+    fixed, in_footprint : float
         Nodes of the cloth and nodes placed in the footprint, each over all queries.
     operations : float
         Their arithmetic operations.
     """
 
     fixed: float
-    placed: float
+    in_footprint: float
     operations: float
 
 
@@ -53,7 +53,7 @@ class Operations(NamedTuple):
     """Arithmetic operations of a node, fixed and placed in a footprint."""
 
     fixed: float
-    placed: float
+    in_footprint: float
 
 
 def work_of(table: Table, queries: Queries, operations: Operations) -> Work:
@@ -74,11 +74,11 @@ def operations_of(table: Table) -> Operations:
     fixed = _optimised(shade_fixed, table.nodes[:stop], table.evenly[:stop], *horizons, *horizons, towards, *optics)
     nodes, cells = np.ones((ROWS, BLOCK_NODES), np.float32), np.zeros(BLOCK_NODES, np.uint32)
     azimuths = [np.uint32(0), np.uint32(1), number(0.5)]
-    placed = _optimised(
+    narrow = _optimised(
         shade_footprint, nodes, cells, table.grid.ravel(), *azimuths, *azimuths, number(1.0), towards,
         table.yarn[WARP], optics[1],
     )  # fmt: skip
-    return Operations(loop_operations(fixed, SUMS), loop_operations(placed, SUMS))
+    return Operations(loop_operations(fixed, SUMS), loop_operations(narrow, SUMS))
 
 
 def _optimised(kernel: Callable[..., Any], *arguments: Any) -> str:

@@ -243,7 +243,7 @@ def _models(fabric: Fabric, limit: Rate) -> Iterator[Rate]:
 
         rate = _rate(count, what, fabric.name, "queries/s")
         share = rate.value * (work.operations + products) / limit.value
-        note = f"{work.fixed:.0f} fixed and {work.placed:.0f} placed nodes, {work.operations:,.0f} operations"
+        note = f"{work.fixed:.0f} fixed and {work.in_footprint:.0f} placed nodes, {work.operations:,.0f} operations"
         note += f", {products:,} multiply-adds of the network" if products else ""
         yield replace(rate, note=f"{note}; {share:.0%} of arithmetic alone")
         yield _threads_compared(what, fabric, answer, 4 * CHUNK)

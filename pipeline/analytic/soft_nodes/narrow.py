@@ -149,7 +149,7 @@ def _shade_curved(
     low_i, high_i = _offsets(table, look.low_i, look.high_i)
     low_o, high_o = _offsets(table, look.low_o, look.high_o)
     nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
-    horizons, order, yarn = scratch.curved_placed, scratch.order[:count], table.yarn[family]
+    horizons, order, yarn = scratch.curved_narrow, scratch.order[:count], table.yarn[family]
     light, viewer = bend_of(look.bend_i), bend_of(look.bend_o)
     # Lights behind are hidden by the back, which counts as flat.
     grid = scratch.grid if look.iz > _0 else scratch.behind_grid

@@ -171,8 +171,7 @@ def tabulate(
     grid = _grids(sines, size)
     grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)
     for own, curvature in zip(grid_falls, CURVATURES, strict=False):
-        fall = sines - horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature)
-        own[:] = _grids(np.clip(fall / (FALL * curvature), 0.0, 1.0), size)
+        own[:] = _falls(sines, horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature), curvature, size)
     behind_grid = grid[:0]
     if behind:
         slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
@@ -212,11 +211,6 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    def in_blocks(values: Float64) -> Float32:
-        return np.ascontiguousarray(
-            values.reshape(*values.shape[:-1], values.shape[-1] // BLOCK_NODES, BLOCK_NODES), np.float32
-        )
-
     return Table(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -226,10 +220,10 @@ def tabulate(
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
         kinds=np.array(kinds, np.int64),
-        nodes=np.ascontiguousarray(in_blocks(nodes).transpose(1, 0, 2)),
-        evenly=in_blocks(evenly),
-        mean=in_blocks(mean),
-        sharpness=in_blocks(_sharpness(variance)),
+        nodes=np.ascontiguousarray(_in_blocks(nodes).transpose(1, 0, 2)),
+        evenly=_in_blocks(evenly),
+        mean=_in_blocks(mean),
+        sharpness=_in_blocks(_sharpness(variance)),
         groups=_group_rows(groups, first_nodes, axes),
         lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
@@ -245,14 +239,20 @@ def tabulate(
         pieces=np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
         bounds=np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
         grid=grid,
-        behind_mean=in_blocks(behind_mean),
-        behind_sharpness=in_blocks(_sharpness(behind_variance)),
+        behind_mean=_in_blocks(behind_mean),
+        behind_sharpness=_in_blocks(_sharpness(behind_variance)),
         behind_grid=behind_grid,
-        falls=in_blocks(falls),
+        falls=_in_blocks(falls),
         grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
     )
+
+
+def _in_blocks(values: Float64) -> Float32:
+    """Return numbers of nodes, (..., nodes), by blocks."""
+    blocks = values.shape[-1] // BLOCK_NODES
+    return np.ascontiguousarray(values.reshape(*values.shape[:-1], blocks, BLOCK_NODES), np.float32)
 
 
 class _Located(NamedTuple):
@@ -368,6 +368,11 @@ def _grids(sines: Float64, size: int) -> npt.NDArray[np.uint8]:
     """Return grids from the sines of horizons at azimuths even in the angle."""
     grids = from_even(sines).reshape(AZIMUTHS, -1, size, size).transpose(1, 0, 2, 3)
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
+
+
+def _falls(flat: Float64, bent: Float64, curvature: float, size: int) -> npt.NDArray[np.uint8]:
+    """Return grids of falls from the sines of horizons over a flat and a curved base, as shares."""
+    return _grids(np.clip((flat - bent) / (FALL * curvature), 0.0, 1.0), size)
 
 
 def _soft_horizons(

@@ -49,7 +49,7 @@ class Scratch(NamedTuple):
         Those of the table, flat.
     curved : float32 (2, B, BLOCK_NODES)
         Horizons of the fixed nodes towards light and viewer, over curved cloth.
-    curved_placed : float32 (2 most,)
+    curved_narrow : float32 (2 most,)
         The same of nodes placed in the footprint, of one kind of yarn; levels.
     order : uint32 (most,)
         Numbers from 0 on.
@@ -76,7 +76,7 @@ class Scratch(NamedTuple):
     behind_grid: npt.NDArray[np.uint8]
     grid_falls: npt.NDArray[np.uint8]
     curved: Float32
-    curved_placed: Float32
+    curved_narrow: Float32
     order: npt.NDArray[np.uint32]
 
 

@@ -50,7 +50,7 @@ def test_a_loop_that_was_counted_by_hand():
 def test_compiled_kernels_have_as_many_operations_as_their_formulas_about():
     """Four quotients of flakes alone take some 40; a node placed in the footprint has its surface to find too."""
     operations = operations_of(tabulate(load_fabric("denim")))
-    assert 60 < operations.fixed < operations.placed < 400
+    assert 60 < operations.fixed < operations.in_footprint < 400
 
 
 def test_nodes_of_wide_and_narrow_footprints():
