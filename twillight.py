@@ -3,7 +3,7 @@
     load_fabric, Fabric     a draft and two yarns
     Queries                 a footprint, a light and a viewer in each row
     evaluate                the ground truth: components with their standard errors
-    load_model              a trained model, which predicts the same components in less time
+    load_model              a model, which predicts the same components in less time
     to_rgb                  colours from components
     open_dataset, Dataset   rows of a data set as NumPy arrays, a pandas frame, or batches of PyTorch
     COMPONENTS              names of the components, in the order of all arrays
@@ -125,23 +125,25 @@ def evaluate(fabric: Fabric, queries: Queries, *, seed: int = 0, **options: Any)
 
 
 def load_model(name_or_folder: str | Path) -> Method:
-    """Load a trained model.
+    """Load a model, to answer many queries on all cores.
 
     Parameters
     ----------
     name_or_folder : str or Path
-        Name of a model that comes with the package, such as ``"selvage"``, or the folder of a trained model.
+        Name of a model that comes with the package, such as ``"selvage"``, or that learns nothing, such as
+        ``"soft_nodes:2"`` with k = 2, or the folder of a trained model.
 
     Returns
     -------
     Method
         ``predict(fabric, queries)`` returns the components of N queries, float32 (N, 4). It refuses kinds of queries
-        that the model was not trained on; yarns unlike those of its training are extrapolated.
+        that the model does not know; yarns unlike those of its training are extrapolated. No bit of an answer depends
+        on the number of cores.
 
     Raises
     ------
     BadInput
-        If there is no such model, or its files are damaged or of another version.
+        If there is no such model, it must be trained first, or its files are damaged or of another version.
 
     Examples
     --------
@@ -150,11 +152,10 @@ def load_model(name_or_folder: str | Path) -> Method:
     >>> model.predict(load_fabric("denim"), queries).shape
     (1, 4)
     """
-    from pipeline.models.registry import load_model as methods_of
-    from pipeline.models.registry import model_folder
+    from pipeline.models.all_cores import AllCores
+    from pipeline.models.named import own_method
 
-    (method,) = methods_of(model_folder(str(name_or_folder), "load_model", "name_or_folder"))
-    return method
+    return AllCores(own_method(str(name_or_folder), "load_model", "name_or_folder"))
 
 
 def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.NDArray[np.float64]:

@@ -260,7 +260,7 @@ def evaluate(
     if model is not None:
         from jobs.verbs.evaluate_model import answerer, refuse_truth_options
 
-        refuse_truth_options(chosen | {"seed": seed or None, "workers": workers or None})
+        refuse_truth_options(chosen | {"seed": seed or None})
         other = answerer(model, cloth, extrapolate)
     answer(cloth, queries, out, options, seed, workers, skip_bad, other)
 

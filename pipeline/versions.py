@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-TRUTH: Final = 6
+TRUTH: Final = 7
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
 TRAINING: Final = 4
@@ -20,14 +20,14 @@ MODELS: Final[dict[str, int]] = {
     "point_sampled": 2,
     "prefiltered": 2,
     "selvage": 5,
-    "soft_nodes": 5,
+    "soft_nodes": 6,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 7
+FALLBACK: Final = 8
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 1

@@ -238,7 +238,7 @@ class Selvage:
         Light from behind is answered by the soft nodes alone.
         """
         behind = queries.wi[:, 2] < 0.0
-        self._refuse(queries, behind=True)
+        refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
         if not behind.any():
             return self._corrected(fabric, queries)
         result = np.empty((len(behind), 4), np.float32)
@@ -278,12 +278,12 @@ class Selvage:
         answer = _LARGEST * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
-    def _refuse(self, queries: Queries, behind: bool = False) -> None:
-        """Refuse queries of kinds that it does not know; `behind` lets light come from behind."""
-        refuse_other(queries, self.name, stretch=True, behind=behind)
+    def _refuse(self, queries: Queries) -> None:
+        """Refuse queries of kinds that the network does not know."""
+        refuse_other(queries, self.name, stretch=True)
 
     def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-        """Answer N queries lit from the front, and estimate errors.
+        """Answer N queries lit from the front, and estimate errors as those of flat cloth.
 
         Returns
         -------
@@ -291,7 +291,7 @@ class Selvage:
             Components; relative errors of a grey cloth's colour, root mean squares, of these components and of those by
             the finest soft nodes (`error_network`).
         """
-        self._refuse(queries)
+        refuse_other(queries, self.name, stretch=True, curvature=True)
         errors = np.empty((len(queries.u), 2), np.float32)
         return self._corrected(fabric, queries, errors), errors
 
@@ -306,11 +306,12 @@ class Selvage:
     ) -> npt.NDArray[np.float32]:
         """Answer by the soft nodes and the network; write estimated `errors` (N, 2), if an array is given."""
         cloth = self._cloths.of(fabric)
+        table = self._nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK):
                 rows = slice(start, start + CHUNK)
-                features, components, bounds = read_queries(cloth.table, queries.take(rows))
+                features, components, bounds = read_queries(table, queries.take(rows))
                 of_query = torch.from_numpy(features)[:, :OF_QUERY]
                 x = torch.addmm(cloth.bias, of_query, self._of_query)
                 for weight, shift in self._others:

@@ -14,7 +14,7 @@ class SelvageOptions(Options):
     """Soft nodes corrected by a residual perceptron: one network for many fabrics and scales; own design."""
 
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
-    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind"})
+    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
     answers_outside: ClassVar[bool] = True
     estimates_errors: ClassVar[bool] = True
     turns: ClassVar[bool] = True

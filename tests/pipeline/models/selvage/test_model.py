@@ -141,15 +141,24 @@ def test_it_refuses_what_it_was_not_taught(fabrics):
     domain = Domain.of({}, fabrics)
     method = Selvage(SelvageNetwork(SMALL), domain)
     asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 8)
-    for changed in (
-        asked._replace(wo=-asked.wo),
-        asked._replace(curvature=np.full(8, 0.1, np.float32)),
-    ):
-        with pytest.raises(BadInput, match="selvage"):
-            method.predict(fabrics[0], changed)
-        # Without a domain it still knows no more than the sums do.
-        with pytest.raises(BadInput, match="selvage"):
-            Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
+    changed = asked._replace(wo=-asked.wo)
+    with pytest.raises(BadInput, match="selvage"):
+        method.predict(fabrics[0], changed)
+    # Without a domain it still knows no more than the sums do.
+    with pytest.raises(BadInput, match="selvage"):
+        Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
+
+
+def test_the_network_corrects_soft_nodes_over_curved_cloth(fabrics):
+    """An untrained network is the soft nodes; a flat row beside curved ones keeps its bits."""
+    fabric, method = fabrics[0], Selvage(SelvageNetwork(SMALL.model_copy(update={"bound": False})))
+    asked = draw_queries(QueryOptions(curvature=(0.0, 0.5)), fabric.weave.repeat, 1, 0, 64)
+    asked.curvature[::3] = 0.0
+    found = method.predict(fabric, asked)
+    np.testing.assert_allclose(found, SoftNodes().predict(fabric, asked), rtol=1e-5, atol=1e-7)
+    flat = method.predict(fabric, asked._replace(curvature=np.zeros(64, np.float32)))
+    np.testing.assert_array_equal(found[::3], flat[::3])
+    assert (found != flat).any()
 
 
 def test_light_from_behind_is_answered_by_the_soft_nodes(fabrics):
