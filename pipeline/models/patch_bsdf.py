@@ -98,7 +98,7 @@ class PatchBSDF:
     """
 
     def __init__(
-        self, fabric: Fabric, method: str | Fallback = USUAL, points: int = 4, widening: float = 2.0
+        self, fabric: Fabric, method: str | Fallback = USUAL, points: int = 8, widening: float = 2.0
     ) -> None:
         if points < 1:
             raise BadInput("PatchBSDF", "points", points, "must be 1 or more")

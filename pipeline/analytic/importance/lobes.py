@@ -9,7 +9,8 @@ without a sample. At a small footprint all points are alike, and the mixture is 
 
 A lobe's share is its visible area, times k_s, times the light scattered once by the layer and not shadowed, about
 `SCATTERED` of 1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt; that of the light
-straight through is the area of gaps, and that of yarns times exp(-T Lambda). No light enters: shares change the
+straight through is the area of gaps, and that of yarns times exp(-T Lambda). Each has a little more, because few points may miss what the
+footprint has: without a sample, light would be lost. No light enters: shares change the
 variance, not the density.
 """
 
@@ -42,7 +43,17 @@ from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, ke
 from pipeline.compiled.float32 import arcsine
 from pipeline.compiled.normal import normal_quantile
 from pipeline.truth.footprint.sequences import r2_pair
-from pipeline.truth.geometry.heightfield import ALPHA, BETA, COS_TWIST, GAP, RADIUS, SIN_TWIST, WARP
+from pipeline.truth.geometry.heightfield import (
+    ALPHA,
+    BETA,
+    COS_TWIST,
+    GAP,
+    INVERSE_RADIUS,
+    RADIUS,
+    SIN_TWIST,
+    WARP,
+    WEFT,
+)
 from pipeline.truth.scattering.slab_float32 import unscattered
 
 ROWS: Final = 6
@@ -65,7 +76,10 @@ BROAD: Final = 0.2
 
 _SINE, _PLACE, _CURVE, _LIMIT, _SEEN, _WARPNESS, _YARNNESS = range(POINT_ROWS)
 _SCATTERED, _BROAD = np.float32(SCATTERED), np.float32(BROAD)
-_LEAST = np.float32(0.02)  # share of each cosine at least: no light is without a sample
+_ASTRAY = np.float32(0.15)  # share of the flakes' light that the cosine takes: no point finds it
+_CLEAR = np.float32(0.05)  # light straight through a yarn at least: few points may all be opaque, the footprint is not
+_LEAST = np.float32(0.02)  # share of each cosine and of light straight through at least: none is without a sample
+_HIDDEN = (np.float32(0.45), np.float32(0.1))  # shares of each and of light straight through where no point is seen
 _SHARPNESS = np.float32(20.0)  # 1 over the width of the ramp of a horizon
 _STEEPEST = np.float32(0.99999)
 _ALONE = np.float32(0.999)  # sum of squared shares from which on a family has one point
@@ -190,28 +204,50 @@ def _place_points(cloth: Surface, look: Look, places: Float32, points: Float32) 
         ):
             p += 1
         family, shift = cloth.pieces[p, FAMILY], bounds[p, SHIFT]
-        column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW]) * count
-        row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW]) * count
         sine, place = _0, _0
-        if family != GAP:
-            warp = family == WARP
-            across = fx - _HALF if warp else fy - _HALF
+        if family == WARP:
+            sine, place = (fx - _HALF) * cloth.yarn[WARP, INVERSE_RADIUS], fy - _HALF + shift
+            column = arcsine(sine) * _INVERSE_PI + _HALF
+            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
+        elif family == WEFT:
             # Along a weft, y of its frame runs against x.
-            place = fy - _HALF + shift if warp else _HALF - fx - shift
-            sine = min(max(across / cloth.yarn[family, RADIUS], -_STEEPEST), _STEEPEST)
-            at_v = (arcsine(sine) * _INVERSE_PI + _HALF) * count
-            if warp:
-                column = at_v
-            else:
-                row = at_v
-        at = int(min(max(row, _0), last)) * size + int(min(max(column, _0), last))
+            sine, place = (fy - _HALF) * cloth.yarn[WEFT, INVERSE_RADIUS], _HALF - fx - shift
+            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
+            row = arcsine(sine) * _INVERSE_PI + _HALF
+        else:
+            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
+            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
+        at = int(min(max(row * count, _0), last)) * size + int(min(max(column * count, _0), last))
         at += cloth.pieces[p, BLOCK] * AZIMUTHS * per_azimuth
         lower, upper = np.float32(cloth.grid[at + to_low]), np.float32(cloth.grid[at + to_high])
-        points[_SINE, k], points[_PLACE, k] = sine, place
+        points[_SINE, k], points[_PLACE, k] = min(max(sine, -_STEEPEST), _STEEPEST), place
         points[_CURVE, k], points[_LIMIT, k] = bounds[p, CURVE], bounds[p, BOUND]
         points[_SEEN, k] = ramp(above(level, lower, upper, look.turn, sharpness))
         points[_WARPNESS, k] = _1 if family == WARP else _0
         points[_YARNNESS, k] = _0 if family == GAP else _1
+
+
+class _Family(NamedTuple):
+    """Numbers of the yarns of a family, and luminances of k_s, k_d and k_dt."""
+
+    sin_twist: np.float32
+    cos_twist: np.float32
+    beta: np.float32
+    radius: np.float32
+    alpha: np.float32
+    specular: np.float32
+    diffuse: np.float32
+    through: np.float32
+
+
+@inlined_fast_kernel
+def _family(cloth: Surface, family: int) -> _Family:
+    """Return the numbers of one family."""
+    yarn, light = cloth.yarn, cloth.luminance
+    return _Family(
+        yarn[family, SIN_TWIST], yarn[family, COS_TWIST], yarn[family, BETA], yarn[family, RADIUS], yarn[family, ALPHA],
+        light[SPECULAR, family], light[DIFFUSE, family], light[THROUGH, family],
+    )  # fmt: skip
 
 
 @inlined_fast_kernel
@@ -219,16 +255,17 @@ def _shade_points(
     cloth: Surface, look: Look, points: Float32, lobes: Float32
 ) -> tuple[np.float32, np.float32, np.float32]:
     """Write tangent, alpha^2 and share of each point; return the sums of both cosines and of light straight through."""
-    yarn, light, near, far, straight = cloth.yarn, cloth.luminance, _0, _0, _0
+    near, far, straight = _0, _0, _0
+    # Numbers of both families, one of them chosen: no branch and no load, so that vector units take the loop.
+    first, second, thickness = _family(cloth, WARP), _family(cloth, WEFT), np.float32(cloth.thickness)
     for k in range(points.shape[1]):
         warp, solid, sine = points[_WARPNESS, k] > _HALF, points[_YARNNESS, k] > _HALF, points[_SINE, k]
-        # Numbers of both families, one of them chosen: no branch, so that vector units take the loop.
         fibre = Fibre(
-            yarn[0, SIN_TWIST] if warp else yarn[1, SIN_TWIST],
-            yarn[0, COS_TWIST] if warp else yarn[1, COS_TWIST],
-            yarn[0, BETA] if warp else yarn[1, BETA],
+            first.sin_twist if warp else second.sin_twist,
+            first.cos_twist if warp else second.cos_twist,
+            first.beta if warp else second.beta,
         )
-        radius, alpha = yarn[0, RADIUS] if warp else yarn[1, RADIUS], yarn[0, ALPHA] if warp else yarn[1, ALPHA]
+        radius, alpha = (first.radius if warp else second.radius), (first.alpha if warp else second.alpha)
         ox, oy = (look.ox if warp else look.oy), (look.oy if warp else -look.ox)
         cosine = np.sqrt((_1 - sine) * (_1 + sine))
         angles, _ = bend(sine, cosine, radius, points[_PLACE, k], points[_CURVE, k], points[_LIMIT, k])
@@ -237,14 +274,15 @@ def _shade_points(
         cos_o = max(ox * nx + oy * ny + look.oz * nz, _0)
         across = sigma(ox * t.x + oy * t.y + look.oz * t.z, alpha * alpha)
         area = points[_SEEN, k] * (cos_o / nz if solid else look.oz)
-        clear = unscattered(across, cos_o, cloth.thickness) if solid else _1
+        clear = unscattered(across, cos_o, thickness) if solid else _1
         own = area if solid else _0
-        near += own * (light[DIFFUSE, 0] if warp else light[DIFFUSE, 1])
-        far += own * (light[THROUGH, 0] if warp else light[THROUGH, 1])
-        straight += area * clear
+        specular = own * (first.specular if warp else second.specular) * _SCATTERED * (_1 - clear)
+        near += own * (first.diffuse if warp else second.diffuse) + _ASTRAY * specular
+        far += own * (first.through if warp else second.through)
+        straight += area * max(clear, _CLEAR)
         lobes[TX, k], lobes[TY, k], lobes[TZ, k] = (t.x if warp else -t.y), (t.y if warp else t.x), t.z
         lobes[SQUARE, k] = alpha * alpha
-        lobes[SHARE, k] = own * (light[SPECULAR, 0] if warp else light[SPECULAR, 1]) * _SCATTERED * (_1 - clear)
+        lobes[SHARE, k] = specular * (_1 - _ASTRAY)
     return near, far, straight
 
 
@@ -289,11 +327,12 @@ def _normalise(
     total = near + far + straight
     for k in range(lobes.shape[1]):
         total += lobes[SHARE, k]
-    seen = total > _TINY
-    scale, least = ((_1 - _LEAST - _LEAST) / total, _LEAST) if seen else (_0, _HALF)
+    scale, least, least_straight = _0, _HIDDEN[0], _HIDDEN[1]
+    if total > _TINY:
+        scale, least, least_straight = (_1 - _LEAST - _LEAST - _LEAST) / total, _LEAST, _LEAST
     for k in range(lobes.shape[1]):
         share, square = lobes[SHARE, k] * scale, lobes[SQUARE, k]
         along = look.ox * lobes[TX, k] + look.oy * lobes[TY, k] + look.oz * lobes[TZ, k]
         lobes[SHARE, k] = share
         lobes[HEIGHT, k] = share * _HEIGHT * square * np.sqrt(square) / sigma(along, square)
-    rest[NEAR], rest[FAR], rest[STRAIGHT] = near * scale + least, far * scale + least, straight * scale
+    rest[NEAR], rest[FAR], rest[STRAIGHT] = near * scale + least, far * scale + least, straight * scale + least_straight
