@@ -124,7 +124,7 @@ def truth(out: Path) -> None:
 
 
 def sampler(out: Path) -> None:
-    """Measure the variance that importance sampling saves, also in equal time; print the table and write the Records."""
+    """Measure the variance that importance sampling saves, also in equal time; print and write the Records."""
     from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.tables import truth_rows

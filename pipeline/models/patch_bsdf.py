@@ -97,9 +97,7 @@ class PatchBSDF:
     True
     """
 
-    def __init__(
-        self, fabric: Fabric, method: str | Fallback = USUAL, points: int = 8, widening: float = 2.0
-    ) -> None:
+    def __init__(self, fabric: Fabric, method: str | Fallback = USUAL, points: int = 8, widening: float = 2.0) -> None:
         if points < 1:
             raise BadInput("PatchBSDF", "points", points, "must be 1 or more")
         if not 0.0 <= widening < np.inf:
@@ -197,7 +195,9 @@ class PatchBSDF:
         if lobes is None:
             return self.lobes(looks)
         if len(lobes.rest) != len(looks.u):
-            raise BadInput("PatchBSDF", "lobes", f"{len(lobes.rest)} rows", f"must be those of the {len(looks.u)} looks")
+            raise BadInput(
+                "PatchBSDF", "lobes", f"{len(lobes.rest)} rows", f"must be those of the {len(looks.u)} looks"
+            )
         return lobes
 
     def _find(self, cloth: Surface, looks: Queries, result: Lobes) -> None:

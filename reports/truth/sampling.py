@@ -86,9 +86,7 @@ class Subject(NamedTuple):
     looks: Queries
 
 
-def measure(
-    looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES
-) -> Iterator[Saving]:
+def measure(looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES) -> Iterator[Saving]:
     """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:
         cloth = load_fabric(name)
@@ -177,7 +175,7 @@ def _estimates(subject: Subject) -> dict[str, _Estimate]:
         "one point": lambda: _one_point(point, places, random, straight),
         "lobes": lambda: _Directions(*bsdf.draw(looks, random[:, :3])),
     }
-    values, best = {}, {name: (math.inf, math.inf) for name in draws}
+    values, best = {}, dict.fromkeys(draws, (math.inf, math.inf))
     for _ in range(_REPEATS + 1):
         for name, draw in draws.items():
             begun = time.perf_counter()
@@ -240,7 +238,7 @@ def _one_point(bsdf: PatchBSDF, places: Queries, random: Floats, straight: Float
 def _far_share(lobes: Lobes) -> Floats:
     """Return the share of the scattered light that the lobes expect on the far side, roughly."""
     flakes, scattered = lobes.flakes[:, SHARE].sum(axis=1), 1.0 - lobes.rest[:, STRAIGHT]
-    return ((lobes.rest[:, FAR] + _TO_FAR * flakes) / np.maximum(scattered, 1e-6)).astype(np.float64)
+    return np.asarray((lobes.rest[:, FAR] + _TO_FAR * flakes) / np.maximum(scattered, 1e-6), np.float64)
 
 
 def _points_of(looks: Queries, normal: Floats) -> Queries:

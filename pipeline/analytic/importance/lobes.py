@@ -9,9 +9,9 @@ without a sample. At a small footprint all points are alike, and the mixture is 
 
 A lobe's share is its visible area, times k_s, times the light scattered once by the layer and not shadowed, about
 `SCATTERED` of 1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt; that of the light
-straight through is the area of gaps, and that of yarns times exp(-T Lambda). Each has a little more, because few points may miss what the
-footprint has: without a sample, light would be lost. No light enters: shares change the
-variance, not the density.
+straight through is the area of gaps, and that of yarns times exp(-T Lambda). Cosines and light straight through have a
+little more, because few points may miss what the footprint has: without a sample, light would be lost. Where the light
+comes from plays no part: shares change the variance, not the density.
 """
 
 from __future__ import annotations
@@ -104,8 +104,21 @@ class Lobes(NamedTuple):
 
 
 class Look(NamedTuple):
-    """A footprint within the repeat and its viewer: centre, deviations, correlation, whether it covers the cloth evenly;
-    wo; the azimuths around it, and where between them it lies."""
+    """A footprint and its viewer.
+
+    Attributes
+    ----------
+    x, y : float64
+        Centre, within the repeat.
+    dx, dy, rho : float32
+        Deviations along x and y, and correlation of the axes.
+    even : bool
+        Whether it covers the cloth evenly.
+    ox, oy, oz : float32
+        wo.
+    low, high, turn
+        Azimuths around wo, and where between them it lies.
+    """
 
     x: float
     y: float
@@ -122,8 +135,10 @@ class Look(NamedTuple):
 
 
 def point_places(count: int) -> Float32:
-    """Return the places of points, (count, 4): in deviations of a footprint, and in shares of the repeat, which hold
-    where the footprint covers it evenly. They are the first of a low-discrepancy sequence."""
+    """Return the places of points, float32 (count, 4), the first of a low-discrepancy sequence.
+
+    The first two columns are in deviations of a footprint; the others, where it covers the cloth evenly, in repeats.
+    """
     result = np.empty((count, 4), np.float32)
     for k in range(count):
         pair = r2_pair(np.uint64(0), k)

@@ -107,5 +107,7 @@ def _density(flakes: Float32, rest: Float32, wi: Float32, wo: Float32) -> np.flo
         own += flakes[HEIGHT, k] / (q * q)
         mirrored += flakes[HEIGHT, k] / (q_mirrored * q_mirrored)
     if iz * oz > _0:
-        return rest[NEAR] * abs(iz) * _INVERSE_PI + own + _MIRRORED * mirrored
-    return rest[FAR] * abs(iz) * _INVERSE_PI + (_1 - _MIRRORED) * own
+        near: np.float32 = rest[NEAR] * abs(iz) * _INVERSE_PI + own + _MIRRORED * mirrored
+        return near
+    far: np.float32 = rest[FAR] * abs(iz) * _INVERSE_PI + (_1 - _MIRRORED) * own
+    return far

@@ -1,4 +1,4 @@
-"""What lobes need of a cloth: its pieces, coarse grids of horizons, its yarns and the luminances of their colours."""
+"""One side of a cloth as lobes need it: pieces, coarse grids of horizons, yarns and luminances of their colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`sample`, `pdf` and `eval` agree: chi-square over the sphere, integrals, means of weights, the delta lobe, bad input."""
+"""`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
 
 import math
 
