@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-TRUTH: Final = 7
+TRUTH: Final = 6
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
 TRAINING: Final = 4

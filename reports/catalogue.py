@@ -320,7 +320,22 @@ METRICS: Final[dict[str, MetricRow]] = {
         MetricRow("kind_time", "time of a query", unit="s/query", table="truth_effort", of_machine=True),
         MetricRow("variance_saved", "variance of the cosine over its own", better="higher", table="sampler"),
         MetricRow(
+            "saved_in_time",
+            "variance x time of the cosine over its own",
+            better="higher",
+            table="sampler",
+            of_machine=True,
+        ),
+        MetricRow(
             "sample_time", "ns a direction", unit="ns/direction", format="grouped", table="sampler", of_machine=True
+        ),
+        MetricRow(
+            "estimate_time",
+            "ns a direction with its value",
+            unit="ns/direction",
+            format="grouped",
+            table="sampler",
+            of_machine=True,
         ),
     )
 }

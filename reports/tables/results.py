@@ -183,7 +183,10 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
         yield markdown_table(("fabric", *truth_rows.COLOURS), truth_rows.colour_rows(losses))
     if samplers:
         yield "## Sampling directions (`twillight bench sampler`)"
-        yield "How many times less variance than a cosine has, and the time of one direction."
+        yield (
+            "How many times less variance than a cosine on both sides has, how many times less in equal time, and the "
+            "time of one direction with its density."
+        )
         yield markdown_table(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(samplers))
 
 

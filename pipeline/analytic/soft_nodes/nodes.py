@@ -11,7 +11,7 @@ different pieces there are, the coarser they are, so that a table stays near a m
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
-from pipeline.truth.cloth import cloth_side
+from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
@@ -41,7 +41,9 @@ LEVELS: Final = 255.0
 
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
-_EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
+EVEN: Final = 0.42
+"""Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
+
 _SHARPEST = 0.02  # least spread of a horizon
 
 # Columns of `Table.groups`.
@@ -216,7 +218,7 @@ def tabulate(
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         float_length=_float_lengths(front),
-        uniform=_EVEN * (max(ends, picks) if by_thread else longest_period(front)),
+        uniform=EVEN * (max(ends, picks) if by_thread else longest_period(front)),
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
         kinds=np.array(kinds, np.int64),
@@ -235,9 +237,7 @@ def tabulate(
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
-        piece_starts=np.array(located.starts, np.int64),
-        pieces=np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
-        bounds=np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+        **_piece_columns(located),
         grid=grid,
         behind_mean=_in_blocks(behind_mean),
         behind_sharpness=_in_blocks(_sharpness(behind_variance)),
@@ -253,6 +253,30 @@ def _in_blocks(values: Float64) -> Float32:
     """Return numbers of nodes, (..., nodes), by blocks."""
     blocks = values.shape[-1] // BLOCK_NODES
     return np.ascontiguousarray(values.reshape(*values.shape[:-1], blocks, BLOCK_NODES), np.float32)
+
+
+class PieceGrids(NamedTuple):
+    """The pieces of a cloth and their grids of horizons alone: columns of `Table` of the same names.
+
+    Attributes
+    ----------
+    piece_starts, pieces : int64 (cells + 1,), (P, 2)
+    bounds : float32 (P, 7)
+    grid : uint8 (grids, AZIMUTHS, size, size)
+    """
+
+    piece_starts: Index
+    pieces: Index
+    bounds: Float32
+    grid: npt.NDArray[np.uint8]
+
+
+def tabulate_pieces(model: ClothSide, size: int) -> PieceGrids:
+    """Return the pieces of one side of a cloth, and grids of `size` cells along each axis."""
+    located = _locate(model.front)
+    x, y, gap = _grid_places(located.samples, size)
+    grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
+    return PieceGrids(**_piece_columns(located), grid=grid)
 
 
 class _Located(NamedTuple):
@@ -277,6 +301,15 @@ def _locate(front: HeightField) -> _Located:
             found.pieces.append(((end, pick), piece, blocks[key]))
         found.starts.append(len(found.pieces))
     return found
+
+
+def _piece_columns(located: _Located) -> dict[str, Any]:
+    """Return the columns of `Table` about pieces."""
+    return {
+        "piece_starts": np.array(located.starts, np.int64),
+        "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
+        "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+    }
 
 
 class _AxisRules(NamedTuple):
