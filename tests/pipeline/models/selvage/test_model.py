@@ -152,7 +152,7 @@ def test_it_refuses_what_it_was_not_taught(fabrics):
 def test_the_network_corrects_soft_nodes_over_curved_cloth(fabrics):
     """An untrained network is the soft nodes; a flat row beside curved ones keeps its bits."""
     fabric, method = fabrics[0], Selvage(SelvageNetwork(SMALL.model_copy(update={"bound": False})))
-    asked = draw_queries(QueryOptions(curvature=(0.0, 0.5)), fabric.weave.repeat, 1, 0, 64)
+    asked = draw_queries(QueryOptions(curvature=(0.05, 0.5)), fabric.weave.repeat, 1, 0, 64)
     asked.curvature[::3] = 0.0
     found = method.predict(fabric, asked)
     np.testing.assert_allclose(found, SoftNodes().predict(fabric, asked), rtol=1e-5, atol=1e-7)
