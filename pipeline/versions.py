@@ -20,7 +20,7 @@ MODELS: Final[dict[str, int]] = {
     "point_sampled": 2,
     "prefiltered": 2,
     "selvage": 4,
-    "soft_nodes": 5,
+    "soft_nodes": 6,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
