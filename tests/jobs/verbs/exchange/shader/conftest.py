@@ -1,0 +1,95 @@
+"""Exported folders, and the shader compiled as C++ and called from Python."""
+
+import ctypes
+import io
+import json
+import shutil
+import subprocess
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from jobs.verbs.exchange.shader.export_shader import export_shader
+from jobs.verbs.exchange.shader.languages import slangc
+from weaves.fabric import load_fabric
+
+
+def missing(*programs):
+    """Return the sentence for what a test needs and is not there, or nothing."""
+    there = {"slangc": slangc, "g++": lambda: shutil.which("g++"), "chromium": lambda: shutil.which("chromium")}
+    return ", ".join(f"{name} is not installed" for name in programs if there[name]() is None)
+
+
+@pytest.fixture(scope="session")
+def exported(tmp_path_factory):
+    """A function that exports a fabric once, and returns its folder."""
+    home = tmp_path_factory.mktemp("shaders")
+
+    @cache
+    def export(name, level=2, *languages):
+        folder = home / "-".join((name, str(level), *languages))
+        export_shader(load_fabric(name), folder, level, languages)
+        return folder
+
+    return export
+
+
+@pytest.fixture(scope="session")
+def read():
+    """A function that reads an exported folder as a program would that has only its files."""
+
+    def read(folder, type_of_nodes="float32"):
+        said = json.loads((folder / "soft_nodes.json").read_text())
+        codes = {"int32": "<i4", "float32": "<f4", "float16": "<f2"}
+        buffers = {}
+        for name, buffer in said["buffers"].items():
+            kind = type_of_nodes if name == "nodes" else next(iter(buffer["files"]))
+            path = folder / buffer["files"][kind]
+            if kind == "uint8":
+                values = np.asarray(Image.open(io.BytesIO(path.read_bytes()))).ravel()
+            else:
+                values = np.frombuffer(path.read_bytes(), codes[kind])
+            count = buffer["elements"] * buffer["channels"]
+            assert len(values) >= count and (kind == "uint8" or len(values) == count)
+            buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
+        golden = json.loads((folder / said["golden"]).read_text())
+        queries = np.array(golden["queries"], np.float32)
+        answers = np.concatenate([golden["components"], golden["bounds"]], axis=1)
+        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers)
+
+    return read
+
+
+class _Buffer(ctypes.Structure):
+    _fields_ = (("data", ctypes.c_void_p), ("count", ctypes.c_size_t))
+
+
+class _Groups(ctypes.Structure):
+    _fields_ = (("first", ctypes.c_uint32 * 3), ("stop", ctypes.c_uint32 * 3))
+
+
+@pytest.fixture(scope="session")
+def cpp(exported, tmp_path_factory):
+    """A function that evaluates queries, (N, 11), by the C++ form: components and bounds, (N, 8)."""
+    if lacking := missing("slangc", "g++"):
+        pytest.skip(lacking)
+    library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
+    source = exported("gingham", 2, "cpp") / "cpp" / "evaluate.cpp"
+    subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
+    evaluate = ctypes.CDLL(str(library)).evaluate
+
+    def call(buffers, queries):
+        count = -(-len(queries) // 64)
+        rows, answers = np.zeros((64 * count, 11), np.float32), np.zeros((64 * count, 8), np.float32)
+        rows[: len(queries)] = queries
+        arrays = [np.ascontiguousarray(buffers[name]) for name in ("integers", "numbers", "nodes", "grid")]
+        arrays += [rows, answers]
+        buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
+        groups = _Groups((0, 0, 0), (count, 1, 1))
+        evaluate(ctypes.byref(groups), None, ctypes.byref(buffer))
+        return answers[: len(queries)]
+
+    return call
