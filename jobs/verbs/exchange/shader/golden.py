@@ -1,8 +1,8 @@
 """Golden vectors: queries of every kind of footprint with the answers of pipeline.analytic.soft_nodes.
 
 Cells of grids and numbers of nodes are integers: a query may lie so near a step that the last digit of its place
-decides. Of such a query no implementation can be told right or wrong, so none is golden: its answer may change by at
-most STEADY, as a share of the range of its column, if the last digits of its footprint change.
+decides. No implementation can be right or wrong on such a query, so it is not golden: the answer may change by at most
+STEADY, as a share of the range of its column, if the last digits of its footprint change.
 """
 
 from __future__ import annotations

@@ -63,8 +63,8 @@ _ES: Final = (
     (r"layout\(row_major\) (?:uniform|buffer);\n", ""),
     (r"layout\(binding = \d+\)\n", ""),
 )
-"""What GLSL ES 3.00 says otherwise than GLSL 4.50: version and precision; matrices, of which there are none; bindings,
-which a program sets by name."""
+"""Replacements that make GLSL ES 3.00 of GLSL 4.50: version and precision; the layout of matrices, of which there are
+none; bindings, which a program sets by name."""
 
 
 def refuse_unknown(languages: Sequence[str]) -> None:

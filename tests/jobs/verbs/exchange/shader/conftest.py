@@ -1,11 +1,15 @@
 """Exported folders, and the shader compiled as C++ and called from Python."""
 
+import base64
 import ctypes
+import html
 import io
 import json
+import re
 import shutil
 import subprocess
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -91,5 +95,34 @@ def cpp(exported, tmp_path_factory):
         groups = _Groups((0, 0, 0), (count, 1, 1))
         evaluate(ctypes.byref(groups), None, ctypes.byref(buffer))
         return answers[: len(queries)]
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def webgl(exported, tmp_path_factory):
+    """A function that evaluates the golden queries of cloths by the GLSL ES form: components and bounds, (N, 8)."""
+    if lacking := missing("slangc", "chromium"):
+        pytest.skip(lacking)
+    source = (exported("gingham", 2, "glsles") / "glsles" / "evaluate.frag").read_text()
+    page = Path(__file__).with_name("evaluate.html").read_text()
+
+    def call(cloths, half=False):
+        jobs = []
+        for cloth in cloths:
+            # Three texels a query; the twelfth number is not read.
+            columns = {**cloth.buffers, "queries": np.pad(cloth.queries, ((0, 0), (0, 1)))}
+            columns["nodes"] = columns["nodes"].astype(np.float16 if half else np.float32)
+            encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
+            jobs.append({**encoded, "count": len(cloth.queries), "half": half})
+        written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
+        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source), 1))
+        command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
+        done = subprocess.run([*command, written.as_uri()], capture_output=True, text=True, timeout=600, check=True)
+        shown = re.search(r'<pre id="answers">(.*?)</pre>', done.stdout, re.DOTALL)
+        assert shown, done.stdout[-1000:]
+        text = html.unescape(shown[1])
+        assert text.startswith("["), text
+        return [np.concatenate([np.reshape(part, (-1, 4)) for part in answer], axis=1) for answer in json.loads(text)]
 
     return call
