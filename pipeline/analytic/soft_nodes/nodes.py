@@ -39,6 +39,10 @@ BLOCK_NODES: Final = 16
 LEVELS: Final = 255.0
 """Largest value of a grid, for a horizon straight above."""
 
+UPPER: Final = np.float32(4e-3)
+"""Cells of a grid: a place so near below the border of two belongs to the upper one. The middle of a piece is such a
+border and often a node; how a processor rounds must not decide."""
+
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
