@@ -14,7 +14,9 @@ def cloths(exported, read):
 @pytest.mark.parametrize(("half", "allowed"), [(False, 1e-4), (True, 1e-2)], ids=["float32", "float16"])
 def test_golden_vectors_are_answered(webgl, cloths, half, allowed):
     answers = webgl(cloths, half)
-    differences = {cloth.said["fabric"]: worst(found, cloth.answers) for cloth, found in zip(cloths, answers, strict=True)}
+    differences = {
+        cloth.said["fabric"]: worst(found, cloth.answers) for cloth, found in zip(cloths, answers, strict=True)
+    }
     assert max(differences.values()) < allowed, differences
     for found in answers:
         assert np.isfinite(found).all() and (found >= 0.0).all() and (found[:, :4] <= found[:, 4:]).all()
