@@ -11,7 +11,7 @@ import numpy as np
 from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
 from jobs.verbs.exchange.shader.descriptor import FILE, GOLDEN, descriptor, vectors
 from jobs.verbs.exchange.shader.golden import golden
-from jobs.verbs.exchange.shader.languages import SOURCE, made, refuse_unknown, slangc, translate
+from jobs.verbs.exchange.shader.languages import SOURCE, compiler_for, made, refuse_unknown, translate
 from jobs.verbs.exchange.shader.tables import Tables, layout_slang, refuse_large, tables
 from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
@@ -51,8 +51,7 @@ def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[
     if level not in DETAILS:
         raise BadInput("export", "--level", level, f"must be one of {', '.join(map(str, DETAILS))}")
     wanted = made(languages)
-    if wanted and slangc() is None:
-        translate(wanted, _HOME, folder)
+    compiler = compiler_for(wanted) if wanted else None
     picks, ends = fabric.weave.warp_over.shape
     refuse_large(ends, picks)
     table = tabulate(fabric, level=level)
@@ -63,7 +62,7 @@ def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[
         (source / "layout.slang").write_text(layout_slang(found), encoding="utf-8")
         for name in SOURCES:
             (source / name).write_bytes((_HOME / name).read_bytes())
-        files = translate(wanted, source, here)
+        files = translate(wanted, compiler, source, here) if compiler else {}
         _write_tables(found, here / "tables")
         (here / GOLDEN).write_text(vectors(golden(table)).model_dump_json() + "\n", encoding="utf-8")
         names = [f"{SOURCE}/{name}" for name in ("layout.slang", *SOURCES)]

@@ -91,13 +91,24 @@ def slangc() -> Path | None:
     return None if found is None else Path(found)
 
 
-def translate(languages: Sequence[str], source: Path, folder: Path) -> dict[str, list[str]]:
+def compiler_for(languages: Sequence[str]) -> Path:
+    """Return slangc; BadInput, naming the languages that need it, if it is not there."""
+    found = slangc()
+    if found is None:
+        allowed = f"slangc is needed: pip install --no-deps slangtorch; --language {SOURCE} is written without it"
+        raise BadInput("export", "--language", ", ".join(languages), allowed)
+    return found
+
+
+def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Path) -> dict[str, list[str]]:
     """Write the files of languages, each in a folder of its name, and return their paths in `folder`.
 
     Parameters
     ----------
     languages : sequence of str
         Keys of LANGUAGES.
+    compiler : Path
+        slangc.
     source : Path
         Folder with the Slang source and `layout.slang`.
     folder : Path
@@ -105,17 +116,9 @@ def translate(languages: Sequence[str], source: Path, folder: Path) -> dict[str,
 
     Raises
     ------
-    BadInput
-        If slangc is needed and not there.
     WorkFailed
         If slangc refuses the source.
     """
-    if not languages:
-        return {}
-    compiler = slangc()
-    if compiler is None:
-        allowed = f"slangc is needed: pip install --no-deps slangtorch; --language {SOURCE} is written without it"
-        raise BadInput("export", "--language", ", ".join(languages), allowed)
     found: dict[str, list[str]] = {}
     for name in languages:
         (folder / name).mkdir()

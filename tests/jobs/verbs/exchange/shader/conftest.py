@@ -3,12 +3,15 @@
 import base64
 import ctypes
 import html
+import http.server
 import io
 import json
+import queue
 import re
 import shutil
 import subprocess
-from functools import cache
+import threading
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -126,3 +129,37 @@ def webgl(exported, tmp_path_factory):
         return [np.concatenate([np.reshape(part, (-1, 4)) for part in answer], axis=1) for answer in json.loads(text)]
 
     return call
+
+
+class _Handler(http.server.SimpleHTTPRequestHandler):
+    """A folder for a browser, which posts what it has found."""
+
+    posted: queue.Queue = queue.Queue()
+
+    def do_POST(self):
+        self.posted.put(self.rfile.read(int(self.headers["Content-Length"])))
+        self.send_response(204)
+        self.end_headers()
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def browse(tmp_path):
+    """A function that opens a page of a folder in a browser, and returns what the page posts."""
+    handler = partial(_Handler, directory=tmp_path)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield partial(_posted, tmp_path, f"http://127.0.0.1:{server.server_port}")
+        server.shutdown()
+
+
+def _posted(folder, address, page, *options):
+    command = ["chromium", "--headless", "--no-sandbox", "--remote-debugging-port=0", *options]
+    command += [f"--user-data-dir={folder / 'profile'}", f"{address}/{page}"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
+        try:
+            return _Handler.posted.get(timeout=240)
+        finally:
+            browser.terminate()

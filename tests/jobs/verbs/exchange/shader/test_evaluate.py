@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jobs.verbs.exchange.shader.golden import rows_of
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.truth.query import Queries
@@ -63,8 +64,7 @@ def test_queries_that_are_not_golden_are_answered(cpp, exported, read, name):
     u, v = rng.uniform(-300.0, 300.0, (2, count))
     queries = Queries.round(u, v, sigma, wi, wo)
     expected = read_queries(table, queries)
-    straight = np.zeros(count, np.float32)
-    found = cpp(cloth.buffers, np.column_stack([queries.u, queries.v, queries.sigma, queries.sigma, straight, wi, wo]))
+    found = cpp(cloth.buffers, rows_of(queries))
     answers = np.concatenate([expected.components, expected.bounds], axis=1)
     differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > 1e-5
     assert differ.mean() < 0.01
@@ -90,3 +90,31 @@ def test_light_and_viewer_behind_answer_nothing(cpp, exported, read):
     rows[0, 7], rows[1, 10] = -rows[0, 7], -rows[1, 10]
     found = cpp(cloth.buffers, rows)
     assert (found[:2] == 0.0).all() and (found[2] > 0.0).any()
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_extreme_footprints_are_answered(cpp, exported, read, name):
+    """Deviations from 1e-5 to 1e5, ratios to 1e4, places to a million spacings."""
+    cloth, rng, count = read(exported(name)), np.random.default_rng(8), 1500
+    table = tabulate(load_fabric(name))
+    z, turn = rng.uniform(0.01, 1.0, (2, count)), rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    level = np.sqrt(1.0 - z**2)
+    wi, wo = np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)
+    sigma = 10.0 ** rng.uniform(-5.0, 5.0, count)
+    u, v = rng.uniform(-1.0, 1.0, (2, count)) * 10.0 ** rng.uniform(0.0, 6.0, count)
+    ratio, angle = 10.0 ** rng.uniform(-4.0, 0.0, count), rng.uniform(-2.0, 2.0, count)
+    columns = (u, v, sigma, wi, wo, sigma * ratio, angle, np.zeros(count))
+    queries = Queries(*(np.asarray(column, np.float32) for column in columns))
+    expected = read_queries(table, queries)
+    found = cpp(cloth.buffers, rows_of(queries))
+    answers = np.concatenate([expected.components, expected.bounds], axis=1)
+    differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > 1e-5
+    assert differ.mean() < 0.01 and (found >= 0.0).all()
+
+
+def test_odd_footprints_are_answered_with_numbers(cpp, exported, read):
+    cloth = read(exported("gauze"))
+    rows = cloth.queries[:64].copy()
+    rows[:16, 2:4], rows[16:32, 4], rows[32:48, 4], rows[40:48, 2:4] = 0.0, 1.0, -1.0, 1e9
+    rows[48:56, 8:], rows[56:, 5:8], rows[0, 0] = (1.0, 0.0, 1e-6), (0.0, 0.0, 1.0), 1e30
+    assert np.isfinite(cpp(cloth.buffers, rows)).all()

@@ -1,12 +1,8 @@
 """The examples of docs/shader.md, word for word: the picture in a browser and the node in C++."""
 
-import functools
-import http.server
-import queue
 import re
 import shutil
 import subprocess
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -23,49 +19,17 @@ def example(language):
     return found
 
 
-class Handler(http.server.SimpleHTTPRequestHandler):
-    """A folder for a browser, which posts what it has found."""
-
-    posted: queue.Queue = queue.Queue()
-
-    def do_POST(self):
-        self.posted.put(self.rfile.read(int(self.headers["Content-Length"])))
-        self.send_response(204)
-        self.end_headers()
-
-    def log_message(self, *_):
-        pass
-
-
-@pytest.fixture
-def served(tmp_path):
-    """A folder, and the address at which a browser finds it."""
-    handler = functools.partial(Handler, directory=tmp_path)
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield tmp_path, f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-
-
-def test_the_quad_draws_what_the_shader_answers(exported, read, cpp, served):
+def test_the_quad_draws_what_the_shader_answers(exported, read, cpp, tmp_path, browse):
     if lacking := missing("chromium"):
         pytest.skip(lacking)
-    folder, address = served
-    shutil.copytree(exported("denim", 2, "glsles"), folder / "shaders" / "denim")
+    shutil.copytree(exported("denim", 2, "glsles"), tmp_path / "shaders" / "denim")
     show = (
         "const seen = new Uint8Array(4 * 256 * 256);\n"
         "gl.readPixels(0, 0, 256, 256, gl.RGBA, gl.UNSIGNED_BYTE, seen);\n"
         'await fetch("/", { method: "POST", body: seen.slice(4 * 256 * 100, 4 * 256 * 101) });\n'
     )
-    (folder / "quad.html").write_text(example("html").replace("</script>", show + "</script>"))
-    command = ["chromium", "--headless", "--no-sandbox", "--remote-debugging-port=0"]
-    command += [f"--user-data-dir={folder / 'profile'}", f"{address}/quad.html"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
-        try:
-            seen = Handler.posted.get(timeout=240)
-        finally:
-            browser.terminate()
-    pixels = np.frombuffer(seen, np.uint8).reshape(256, 4)[:, :3].astype(float)
+    (tmp_path / "quad.html").write_text(example("html").replace("</script>", show + "</script>"))
+    pixels = np.frombuffer(browse("quad.html"), np.uint8).reshape(256, 4)[:, :3].astype(float)
 
     # The camera of the page: row 100 of 256, eight yarns wide, from 40 yarns above.
     cloth, side = read(exported("denim")), 8.0 / 256.0
