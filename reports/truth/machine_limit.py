@@ -93,7 +93,8 @@ def _optimised(kernel: Callable[..., Any], *arguments: Any) -> str:
 def network_of(method: Portable, fabric: Fabric) -> Network:
     """Return the network of `selvage`: what depends on the fabric alone is no work of a query."""
     network: Any = method.per_query(fabric).module.network
-    whole = sum(weight.numel() for weight in network.parameters() if weight.ndim == 2)
+    layers = [layer.weight for layer in (*network.hidden, network.last)]  # those of the correction
+    whole = sum(weight.numel() for weight in layers)
     return Network(network.options.level, whole - (FEATURES - OF_QUERY) * network.options.width)
 
 

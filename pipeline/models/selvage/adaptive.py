@@ -11,26 +11,36 @@ for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.models.domain import Domain
 from pipeline.models.fallback import fallback_answers
+from pipeline.models.method import Method
 from pipeline.models.selvage.error_network import FINEST, OWN
 from pipeline.models.selvage.options import SelvageOptions
 from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.models.soft_nodes.options import Level
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-if TYPE_CHECKING:
-    from pipeline.models.selvage.model import Selvage
-    from pipeline.models.soft_nodes.options import Level
-
 _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 
 Floats = npt.NDArray[np.float32]
+
+
+class Estimating(Method, Protocol):
+    """The part of `Selvage` that is used here."""
+
+    @property
+    def domain(self) -> Domain | None:
+        """Range of its training."""
+
+    def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[Floats, Floats]:
+        """Return components (N, 4), and estimated errors of these and of the finest soft nodes (N, 2)."""
 
 
 class Adaptive:
@@ -38,7 +48,7 @@ class Adaptive:
 
     Parameters
     ----------
-    selvage : Selvage
+    selvage : Estimating
         Answers first, and estimates errors.
     finest : int
         Level of detail of the soft nodes that answer second.
@@ -50,7 +60,7 @@ class Adaptive:
     """Kinds of queries that need no training: the soft nodes know them."""
     turns: ClassVar[bool] = SelvageOptions.turns
 
-    def __init__(self, selvage: Selvage, finest: Level, error: float) -> None:
+    def __init__(self, selvage: Estimating, finest: Level, error: float) -> None:
         if not 0.0 < error < 1.0:
             raise BadInput(selvage.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
         self.name, self.setting, self.domain = selvage.name, f"error {100 * error:g} %", selvage.domain

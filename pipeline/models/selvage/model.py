@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,15 +43,13 @@ from pipeline.models.method import CHUNK, Batch
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
 from pipeline.models.plain import refuse_other
+from pipeline.models.selvage.adaptive import Adaptive
 from pipeline.models.selvage.error_network import FLOOR, SLOPE, ErrorNetwork, colour_weights
 from pipeline.models.selvage.options import SelvageOptions
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
-
-if TYPE_CHECKING:
-    from pipeline.models.selvage.adaptive import Adaptive
 
 _LARGEST = 2.0  # factor
 _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
@@ -297,8 +295,6 @@ class Selvage:
 
     def within(self, error: float) -> Adaptive:
         """Return the method that answers by more nodes where the estimated error exceeds a relative error."""
-        from pipeline.models.selvage.adaptive import Adaptive
-
         return Adaptive(self, self._network.options.finest, error)
 
     def _corrected(
