@@ -133,7 +133,7 @@ class OnFabric(Measurement):
         return sum(width * height for width, height in map(self.picture_options.size, self.views))
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of model, benchmark and energy bound; that of the truth is in its inputs."""
+        """Return the versions of model, benchmark, energy bound and fallback; that of the truth is in its inputs."""
         return {"bench": versions.BENCH, "model": self.model.options.version, **ways_versions(self.ways)}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:

@@ -86,7 +86,7 @@ class OnUnseenPopulation(Measurement):
         return 4000 * len(self.fabrics)
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of model, benchmark and energy bound; that of the truth is in its inputs."""
+        """Return the versions of model, benchmark, energy bound and fallback; that of the truth is in its inputs."""
         return {"bench": versions.BENCH, "model": self.model.options.version, **ways_versions(self.ways)}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
