@@ -3,8 +3,9 @@
     load_fabric, Fabric     a draft and two yarns
     Queries                 a footprint, a light and a viewer in each row
     evaluate                the ground truth: components with their standard errors
-    load_model              a trained model, which predicts the same components in less time
+    load_model              a model, which predicts the same components in less time
     to_rgb                  colours from components
+    patch_bsdf              values, and directions drawn with their density, for a renderer
     open_dataset, Dataset   rows of a data set as NumPy arrays, a pandas frame, or batches of PyTorch
     COMPONENTS              names of the components, in the order of all arrays
 
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pipeline.models.method import Method
+    from pipeline.models.patch_bsdf import PatchBSDF
     from pipeline.shards.manifest import Role, Split
     from pipeline.training.stream import RowStream
     from pipeline.truth.query import Answers
@@ -72,6 +74,7 @@ __all__ = [
     "load_fabric",
     "load_model",
     "open_dataset",
+    "patch_bsdf",
     "to_rgb",
 ]
 
@@ -125,23 +128,25 @@ def evaluate(fabric: Fabric, queries: Queries, *, seed: int = 0, **options: Any)
 
 
 def load_model(name_or_folder: str | Path) -> Method:
-    """Load a trained model.
+    """Load a model, to answer many queries on all cores.
 
     Parameters
     ----------
     name_or_folder : str or Path
-        Name of a model that comes with the package, such as ``"selvage"``, or the folder of a trained model.
+        Name of a model that comes with the package, such as ``"selvage"``, or that learns nothing, such as
+        ``"soft_nodes:2"`` with k = 2, or the folder of a trained model.
 
     Returns
     -------
     Method
         ``predict(fabric, queries)`` returns the components of N queries, float32 (N, 4). It refuses kinds of queries
-        that the model was not trained on; yarns unlike those of its training are extrapolated.
+        that the model does not know; yarns unlike those of its training are extrapolated. No bit of an answer depends
+        on the number of cores.
 
     Raises
     ------
     BadInput
-        If there is no such model, or its files are damaged or of another version.
+        If there is no such model, it must be trained first, or its files are damaged or of another version.
 
     Examples
     --------
@@ -150,11 +155,10 @@ def load_model(name_or_folder: str | Path) -> Method:
     >>> model.predict(load_fabric("denim"), queries).shape
     (1, 4)
     """
-    from pipeline.models.registry import load_model as methods_of
-    from pipeline.models.registry import model_folder
+    from pipeline.models.all_cores import AllCores
+    from pipeline.models.named import own_method
 
-    (method,) = methods_of(model_folder(str(name_or_folder), "load_model", "name_or_folder"))
-    return method
+    return AllCores(own_method(str(name_or_folder), "load_model", "name_or_folder"))
 
 
 def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.NDArray[np.float64]:
@@ -184,6 +188,50 @@ def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.N
     from pipeline.scenes.shade import shade
 
     return shade(fabric, components, queries)
+
+
+def patch_bsdf(fabric: Fabric, method: str = "soft_nodes:2") -> PatchBSDF:
+    """Return a cloth's patch BSDF with importance sampling, as a renderer uses it.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth, with its colours.
+    method : str
+        Who answers: a model that comes with the package or learns nothing, with ``:k`` for a setting, or the folder of
+        a trained one.
+
+    Returns
+    -------
+    PatchBSDF
+        ``sample(looks, random)`` draws a light direction for each of N footprints and viewers, with its density and
+        weight; ``eval(queries)`` returns linear RGB (N, 3) with the incident cosine, ``pdf(queries)`` the density (N,).
+        Light straight through is drawn as a delta lobe. Footprints of any shape, both sides.
+
+    Raises
+    ------
+    BadInput
+        If there is no such method.
+
+    Examples
+    --------
+    The weights of many directions have the reflected light of an even sky as their mean:
+
+    >>> import numpy as np
+    >>> silk, up = patch_bsdf(load_fabric("silk_charmeuse")), np.tile([0.0, 0.0, 1.0], (5000, 1))
+    >>> half = np.full(5000, 0.5)
+    >>> looks = Queries.round(u=half, v=half, sigma=half, wi=up, wo=up)
+    >>> sample = silk.sample(looks, np.random.default_rng(0).random((5000, 3)))
+    >>> bool(0 < sample.weight.mean() < 1)
+    True
+    >>> scattered = ~sample.straight
+    >>> queries = looks._replace(wi=sample.wi).take(scattered)
+    >>> bool(np.allclose(silk.eval(queries) / silk.pdf(queries)[:, None], sample.weight[scattered]))
+    True
+    """
+    from pipeline.models.patch_bsdf import PatchBSDF
+
+    return PatchBSDF(fabric, method)
 
 
 def open_dataset(folder: str | Path) -> Dataset:

@@ -163,19 +163,30 @@ def export(
     mesh: Annotated[Local | None, Parameter(help="Triangle mesh to write, ending in .ply.")] = None,
     wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
     maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
+    shader: Annotated[Local | None, Parameter(help="Folder of a shader with its tables to write.")] = None,
     vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
     repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
     size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
+    level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None,
+    language: Annotated[
+        list[str],
+        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl or all, beside Slang; several."),
+    ] = NOTHING,
 ) -> None:
-    """Write a fabric for other programs: a mesh, a draft, or texture maps and materials."""
+    """Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader."""
     from jobs.terminal import Terminal
     from weaves.fabric import load_fabric
 
     cloth = load_fabric(fabric)
-    chosen = [option for option, path in (("--mesh", mesh), ("--wif", wif), ("--maps", maps)) if path is not None]
+    kinds = (("--mesh", mesh), ("--wif", wif), ("--maps", maps), ("--shader", shader))
+    chosen = [option for option, path in kinds if path is not None]
     if len(chosen) != 1:
-        raise BadInput("export", "", " and ".join(chosen) or "nothing", "one of --mesh, --wif and --maps is needed")
-    for option, value, owner in (("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps)):
+        allowed = "one of --mesh, --wif, --maps and --shader is needed"
+        raise BadInput("export", "", " and ".join(chosen) or "nothing", allowed)
+    for option, value, owner in (
+        ("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps),
+        ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
+    ):  # fmt: skip
         if value is not None and owner is None:
             raise BadInput("export", option, value, f"is not for {chosen[0]}; leave it out")
     if mesh is not None:
@@ -187,6 +198,11 @@ def export(
         from jobs.verbs.exchange.export_draft import write_draft
 
         said = write_draft(cloth, wif)
+    elif shader is not None:
+        from jobs.verbs.exchange.shader.export_shader import export_shader
+        from pipeline.analytic.soft_nodes.detail import USUAL
+
+        said = export_shader(cloth, shader, USUAL if level is None else level, language)
     else:
         from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
 
@@ -260,7 +276,7 @@ def evaluate(
     if model is not None:
         from jobs.verbs.evaluate_model import answerer, refuse_truth_options
 
-        refuse_truth_options(chosen | {"seed": seed or None, "workers": workers or None})
+        refuse_truth_options(chosen | {"seed": seed or None})
         other = answerer(model, cloth, extrapolate)
     answer(cloth, queries, out, options, seed, workers, skip_bad, other)
 

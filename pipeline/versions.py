@@ -19,21 +19,21 @@ MODELS: Final[dict[str, int]] = {
     "gauss_nodes": 2,
     "point_sampled": 2,
     "prefiltered": 2,
-    "selvage": 4,
-    "soft_nodes": 5,
+    "selvage": 5,
+    "soft_nodes": 6,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 7
+FALLBACK: Final = 8
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 1
 """The shipped scenes, and the queries of any scene."""
 
-BENCH: Final = 4
+BENCH: Final = 5
 """Measurements of methods and of the truth; also written into every Record."""
 
 SCENE_BENCH: Final = 4

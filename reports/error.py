@@ -13,6 +13,8 @@ relative MSE   <((m - t)^2 - s^2) / (t^2 + eps <t>^2)>: every pixel counts by it
                size (s / t)^2 remains [Rousselle2011Adaptive].
 relative RMSE  sqrt(max(MSE, 0)) / <t>, one component at a time.
 colour measure the relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft), which compares fabrics of any colour.
+               Where almost nothing of a patch is seen the truth is 0 by definition below a limit; a few such queries
+               hold most of the squared error of accurate methods. So there is a second figure, of 99 % of the queries.
 
 Intervals are 95 % percentile bootstraps over queries [Efron1993Bootstrap] by scipy, with a fixed seed.
 """
@@ -33,6 +35,10 @@ Floats = npt.NDArray[np.float64]
 
 COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 """Colours of the colour measure: one channel, (4, 1)."""
+
+
+MOST: Final = 0.99
+"""Share of the queries that `most_error` keeps."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,16 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resam
     """
     seen, truth = (_coloured(np.asarray(parts, np.float64), colours) for parts in (values, answers.mean))
     return squared_error(seen, truth, colour_noise(answers, colours), resamples)
+
+
+def most_error(values: npt.ArrayLike, answers: Answers) -> Error:
+    """Return the error in the colour measure of the share `MOST` of all queries, those of the largest errors left out.
+
+    Arguments as in `colour_error`; the noise of the truth is subtracted without choosing by it.
+    """
+    seen, truth = (_coloured(np.asarray(x, np.float64), COLOUR_WEIGHTS) for x in (values, answers.mean))
+    kept = np.argsort(np.abs(seen - truth)[:, 0], kind="stable")[: math.ceil(MOST * len(seen))]
+    return squared_error(seen[kept], truth[kept], colour_noise(answers, COLOUR_WEIGHTS)[kept], resamples=0)
 
 
 def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:

@@ -38,6 +38,10 @@ EXTREME_TRUTH: Final = TruthOptions(estimator="quadrature", relative_error=0.01)
 """Truth of the extremes: half a second a fabric, and 1 to 3 % from 16,384 points a query at every footprint."""
 
 
+WishedError = Annotated[float, Field(gt=0, lt=1)]
+"""A relative error."""
+
+
 class _Options(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -214,7 +218,7 @@ class TimingOptions(RepeatOptions, ErrorOptions):
 
 
 class RunOptions(_Options):
-    """Ways to run a trained network that are measured beside the network itself."""
+    """Ways to use a trained network that are measured beside the network itself."""
 
     bounds: bool = False
     """Measure every trained network a second time: under the energy bound of `pipeline.models.bounded`, or without it
@@ -222,6 +226,8 @@ class RunOptions(_Options):
     runtimes: tuple[RuntimeName, ...] = ()
     """Measure every trained network run in these ways too: errors, aliasing and time, of the same weights. What a
     machine cannot run is named on the page with the reason."""
+    wished_errors: Annotated[tuple[WishedError, ...], Field(max_length=16)] = ()
+    """Measure every network that estimates its errors (`selvage`) at these wished relative errors too."""
 
 
 class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):

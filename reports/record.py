@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -23,6 +22,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, Typ
 
 from pipeline import versions
 from pipeline.atomic import atomic_write
+from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
 from reports.catalogue import ADDED, METRICS, metric_row
 from reports.error import Error
@@ -200,11 +200,6 @@ class _MachineFile(Machine):
     def hash(self, records: str) -> str:
         """Return the hash over the SHA-256 of Records and over the other fields."""
         return hashlib.sha256(records.encode() + self.model_dump_json(exclude={"sha256"}).encode()).hexdigest()
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def this_machine(threads: int) -> Machine:

@@ -14,7 +14,6 @@ driver's machine may not be the one to measure.
 
 from __future__ import annotations
 
-import os
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -37,6 +36,7 @@ from jobs.run.receipt import Product, measure
 from jobs.run.workers import Workers
 from jobs.terminal import Terminal
 from pipeline import patience
+from pipeline.cores import cores
 from pipeline.storage import is_local, size_of
 from weaves.errors import BadInput, WorkFailed
 
@@ -136,7 +136,7 @@ def execute(
 
     board = Board(todo, form_of(progress, console or Terminal(stderr=True)))
     external = bool(scheduler.address)
-    slots = min(workers or os.cpu_count() or 1, len(todo))
+    slots = min(workers or cores(), len(todo))
     with connected(scheduler, slots, board.say) as client, board:
         crew = Workers(client, external, board.say)
         crew.look(now=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +17,7 @@ from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile, entry_of
 from jobs.run.reasons import CHANGED, NEVER, reasons
 from jobs.run.receipt import Product
+from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
 from pipeline.storage import is_local
 from weaves.errors import BadInput
@@ -62,7 +62,7 @@ def faults(
         Called with the share of the tasks whose products were read.
     """
     found: list[Fault] = []
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
             found += of_task
             seen((index + 1) / len(tasks))

@@ -124,7 +124,7 @@ def truth(out: Path) -> None:
 
 
 def sampler(out: Path) -> None:
-    """Measure the variance that importance sampling by lobes saves; print the table and write the Records."""
+    """Measure the variance that importance sampling saves, also in equal time; print and write the Records."""
     from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
     from reports.tables import truth_rows
@@ -137,9 +137,10 @@ def sampler(out: Path) -> None:
             found.append(one)
             status.update(f"the sampler: {one.fabric}, {one.sampler}")
     path = out / SAMPLER
-    write_records(path, sampling.RECORDS.to_records(found), this_machine(1))
+    records = sampling.RECORDS.to_records(found)
+    write_records(path, records, this_machine(1))
     console.print(_columns(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(found)))
-    console.print(f"\n{path}: {2 * len(found)} records", soft_wrap=True)
+    console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
 
 
 def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -11,6 +11,7 @@ from rich.table import Table
 from jobs.console import number, table_of
 from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import Terminal
+from pipeline.cores import cores
 from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
@@ -53,7 +54,7 @@ def evaluate(
 ) -> None:
     """Evaluate the queries of a file on some threads (0: one per core) and print a summary.
 
-    `other`, if given, replaces the ground truth.
+    `other`, if given, replaces the ground truth; torch then computes on the threads that call it.
 
     Raises
     ------
@@ -66,7 +67,8 @@ def evaluate(
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
     console = Terminal(stderr=True)
     columns = TextColumn("evaluating"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bars:
+    bars = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
+    with bars, _one_thread_each(other):
         bar = bars.add_task("evaluating", total=1.0)
         try:
             summary = evaluate_file(
@@ -76,7 +78,7 @@ def evaluate(
                 options,
                 seed,
                 skip_bad,
-                threads=workers or os.cpu_count() or 1,
+                threads=workers or cores(),
                 progress=lambda share: bars.update(bar, completed=share),
                 other=other,
             )
@@ -88,6 +90,15 @@ def evaluate(
         rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
         note = f"{rows} no answer; see {bad_list(out)}"
         Terminal().print(note, soft_wrap=True)
+
+
+def _one_thread_each(other: Answerer | None) -> AbstractContextManager[None]:
+    """Return what keeps a model's torch on the threads that call it; the truth needs no torch."""
+    if other is None:
+        return nullcontext()
+    from pipeline.models.method import one_thread
+
+    return one_thread()
 
 
 def evaluation_table(summary: Summary) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
@@ -19,6 +18,7 @@ from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE, reasons
 from jobs.terminal import Terminal
 from jobs.verbs.bench import measured_alone
+from pipeline.cores import cores
 from weaves.errors import BadInput
 
 MOST_WORKERS: Final = 100_000
@@ -110,9 +110,8 @@ def plan_table(tasks: Sequence[Task], facts: Facts) -> Table:
     table.add_row("all", "", *_sums(tasks, facts), "")
     if len(left) < len(tasks):
         table.add_row("to do", "", *_sums(left, facts), "")
-    cores = os.cpu_count() or 1
-    there = f"on the {cores} cores of this machine"
-    seconds = schedule(left, facts.seconds, cores).makespan
+    there = f"on the {cores()} cores of this machine"
+    seconds = schedule(left, facts.seconds, cores()).makespan
     table.caption = f"about {duration(seconds)} {there}" if left else "nothing to do"
     return table
 

@@ -206,7 +206,7 @@ def _model(
 
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
-    bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
+    bench = general.bench.model_copy(update={"bounds": False, "runtimes": (), "wished_errors": ()})
     found = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
 

@@ -58,6 +58,14 @@ class Method(Protocol):
         """Return the bytes that a renderer stores for this fabric."""
 
 
+@runtime_checkable
+class EstimatesErrors(Method, Protocol):
+    """A method that estimates the errors of its answers."""
+
+    def within(self, error: float) -> Method:
+        """Return the method at a wished relative error, above 0 and below 1: other answers where it is exceeded."""
+
+
 class Batch(NamedTuple):
     """Queries and targets of a training step: F fabrics, n queries each.
 

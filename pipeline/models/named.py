@@ -2,13 +2,16 @@
 
 `selvage` is a model that comes with the package, `out/models/NAME` the folder of a trained one, `soft_nodes` a model
 that learns nothing, and `point_sampled:16` one of its settings. Without a setting the last one is taken, which is the
-most accurate.
+most accurate. `selvage:.02` is that model at a wished relative error.
 """
 
 from __future__ import annotations
 
+import math
+
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
+from pipeline.models.method import EstimatesErrors, Method
 from pipeline.models.options import Options
 from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
 from pipeline.storage import place
@@ -25,31 +28,59 @@ def untrained_names() -> list[str]:
 
 
 def named_method(name: str, where: str, key: str) -> Fallback:
-    """Return a method that answers any query; others than its own go to the fallback.
+    """Return a method that answers any query; others than its own go to the fallback. As `own_method` otherwise."""
+    return Fallback(*_loaded(name, where, key))
+
+
+def own_method(name: str, where: str, key: str) -> Method:
+    """Return a method that answers queries of its own kinds.
 
     Parameters
     ----------
     name : str
-        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting, or a folder.
+        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting or ``:.02`` for a
+        wished error, or a folder.
     where, key : str
-        The verb and its option that name the method, for messages.
+        The verb or function and its option that name the method, for messages.
 
     Raises
     ------
     BadInput
         If there is no such method, it must be trained first, it has no such setting, or its files are damaged.
     """
+    return _loaded(name, where, key)[0]
+
+
+def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
+    """Return a method and the kinds of queries that it knows."""
     model, _, setting = name.partition(":")
     if model in untrained_names():
         options = _with_setting(CLASSES[model](), setting, where, key, name)
-        return Fallback(load_methods(options)[-1], options.kinds)
+        return load_methods(options)[-1], options.kinds
+    if model in pretrained_names() and setting:
+        (trained,) = load_model(model_folder(model, where, key))
+        if not isinstance(trained, EstimatesErrors):
+            raise BadInput(where, key, name, f"{model} has no settings")
+        chosen = trained.within(_wished_error(setting, where, key, name))
+        return chosen, _kinds(chosen)
     if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():
         if name in CLASSES:
             raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
         known = [TRUTH, *pretrained_names(), *untrained_names()]
         raise BadInput(where, key, name, f"the folder of a trained model or a name is needed; {nearest(name, known)}")
     (method,) = load_model(model_folder(name, where, key))
-    return Fallback(method, _kinds(method))
+    return method, _kinds(method)
+
+
+def _wished_error(setting: str, where: str, key: str, name: str) -> float:
+    """Return the wished error that a name ends with."""
+    try:
+        error = float(setting)
+    except ValueError:
+        error = math.nan
+    if not 0.0 < error < 1.0:
+        raise BadInput(where, key, name, "a relative error above 0 and below 1 after the colon is needed, such as :.02")
+    return error
 
 
 def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:

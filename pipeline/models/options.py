@@ -80,6 +80,9 @@ class Options(BaseModel):
     answers_outside: ClassVar[bool] = False
     """True if it evaluates queries outside its domain too, in another way than those within."""
 
+    estimates_errors: ClassVar[bool] = False
+    """True if its methods have a function ``within(error)`` that returns the method at a wished error."""
+
     turns: ClassVar[bool] = False
     """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
 

@@ -1,12 +1,13 @@
 """Cache of a method's results that are computed once for each fabric.
 
 Fabrics of equal optics share an entry. A known fabric object is found by its identity, because a fingerprint takes
-longer than a few hundred queries.
+longer than a few hundred queries. One thread computes; others wait for its product.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import RLock
 from typing import Generic, TypeVar
 
 from pipeline.fingerprint import fingerprint
@@ -28,6 +29,7 @@ class PerFabric(Generic[Made]):
 
     def __init__(self, make: Callable[[Fabric], Made]) -> None:
         self._make = make
+        self._lock = RLock()
         self._products: dict[str, Made] = {}
         # The fabric is kept beside its product: an identity is another object's once its own is gone.
         self._objects: dict[int, tuple[Fabric, Made]] = {}
@@ -38,9 +40,10 @@ class PerFabric(Generic[Made]):
         if known is not None:
             return known[1]
         key = fingerprint(fabric.optics())
-        if key not in self._products:
-            self._products[key] = self._make(fabric)
-        if len(self._objects) >= _MOST_OBJECTS:
-            self._objects.clear()
-        self._objects[id(fabric)] = fabric, self._products[key]
-        return self._products[key]
+        with self._lock:
+            if key not in self._products:
+                self._products[key] = self._make(fabric)
+            if len(self._objects) >= _MOST_OBJECTS:
+                self._objects.clear()
+            self._objects[id(fabric)] = fabric, self._products[key]
+            return self._products[key]

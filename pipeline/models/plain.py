@@ -10,10 +10,13 @@ from weaves.errors import BadInput
 _ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ
 
 
-def refuse_other(queries: Queries, method: str, stretch: bool = False, behind: bool = False) -> None:
+def refuse_other(
+    queries: Queries, method: str, stretch: bool = False, behind: bool = False, curvature: bool = False
+) -> None:
     """Refuse queries that are not plain: a BadInput that names row and column.
 
-    Footprints may be stretched with `stretch`, and the light may come from behind with `behind`.
+    Footprints may be stretched with `stretch`, the light may come from behind with `behind`, and the cloth may be
+    curved with `curvature`.
     """
     for name, rows, allowed in (
         ("wo", queries.wo[:, 2] < 0, "viewers in front of the cloth"),
@@ -23,7 +26,7 @@ def refuse_other(queries: Queries, method: str, stretch: bool = False, behind: b
             (np.abs(queries.sigma_minor - queries.sigma) > _ROUND * queries.sigma) & (not stretch),
             "round footprints (sigma_minor = sigma)",
         ),
-        ("curvature", queries.curvature > 0, "flat cloth (curvature = 0)"),
+        ("curvature", (queries.curvature > 0) & (not curvature), "flat cloth (curvature = 0)"),
     ):
         if rows.any():
             row = int(np.flatnonzero(rows)[0])

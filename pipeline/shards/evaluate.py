@@ -140,7 +140,7 @@ def evaluate_file(
     progress : callable
         Receives the finished share.
     other : Answerer, optional
-        Who answers in place of the ground truth. Errors are then null; `options`, `seed` and `threads` mean nothing.
+        Who answers in place of the ground truth. Errors are then null; `options` and `seed` mean nothing.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def evaluate_file(
             listing = csv.writer(stack.enter_context(path.open("w", encoding="utf-8", newline="")))
             listing.writerow(BadRow._fields)
         summary = Summary()
-        crew = _Crew(fabric, options, seed, stack.enter_context(_threads(1 if other else threads)), other)
+        crew = _Crew(fabric, options, seed, stack.enter_context(_threads(threads)), other)
         for block in blocks(queries, file):
             batch, bad = checked_queries(block, summary.rows, fabric.weave.repeat, wrong)
             if listing:

@@ -26,7 +26,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.added_metric import AddedMetric
 from reports.catalogue import enter
-from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors
+from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors, most_error
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
 from reports.options import ErrorOptions, Role, TimingOptions
@@ -80,6 +80,7 @@ def measure_errors(
     )
     records = subject.of_error(colour_error(values, truth, colours_of(cloth, queries)))
     relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
+    relative["colour_rrmse_99"] = most_error(values, truth)
     relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
     black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
     records.append(subject.of("zero_answers", float(black.mean()), len(black)))

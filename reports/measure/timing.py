@@ -19,8 +19,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pipeline.cores import cores
 from pipeline.truth.query import Queries
-from reports.record import cores
 from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]

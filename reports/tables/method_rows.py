@@ -15,7 +15,7 @@ from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.measure.memory import UNSURE
 from reports.over_fabrics import ERRORS, over_unseen
 from reports.over_seeds import LEAST, MOST, is_range
-from reports.record import TRUTH, Record
+from reports.record import TRUTH, Metric, Record
 from reports.tables.headline import learnt
 from reports.tables.number_format import (
     NO_BREAK,
@@ -82,6 +82,13 @@ def plain_text(cell: str | Row) -> str:
     return " ".join(filter(None, (cell["text"], cell.get("interval", ""), cell.get("range", ""))))
 
 
+ERROR_METRICS: Final[tuple[Metric, ...]] = (
+    "colour_rrmse",
+    "colour_rrmse_99",
+    *(f"rrmse_{name}" for name in COMPONENTS),
+)
+"""Relative errors of the error table."""
+
 ERROR: Final = (
     "MSE",
     "95 % interval",
@@ -89,6 +96,7 @@ ERROR: Final = (
     f"×{NO_BREAK}lower",
     f"interval of ×{NO_BREAK}lower",
     "colour",
+    f"colour, 99{NO_BREAK}%",
     *(f"{part}{NO_BREAK}{yarn}" for part in "SC" for yarn in ("warp", "weft")),
 )
 """Columns of `error_rows` after the method."""
@@ -106,7 +114,7 @@ def error_rows(errors: pd.DataFrame, per_material: Sequence[str]) -> dict[str, l
                 percent(row.noise_share),
                 ranged(times(row.ratio), row, "ratio", times) if (row.method, row.setting) != BASELINE else "1",
                 interval(row.ratio_low, row.ratio_high) if (row.method, row.setting) != BASELINE else NONE,
-                *(_metric(metric, row) for metric in ("colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS))),
+                *(_metric(metric, row) for metric in ERROR_METRICS),
             ],
         }
         line["label"] += " *" if known else ""

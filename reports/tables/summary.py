@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, metric_row
 from reports.error import ratio
 from reports.over_fabrics import ERRORS, OVER_FABRICS, columns_over_fabrics, over_unseen
@@ -44,16 +43,17 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
 
 @over_seeds(
     [*_KEYS, "role"],
-    ["ratio", *ERRORS, "zero_answers", *OVER_FABRICS],
+    ["ratio", *ERRORS, "colour_rrmse_99", "zero_answers", *OVER_FABRICS],
     {f"{name}{end}": stats.gmean for name in OVER_FABRICS for end in ("", "_low", "_high")},
 )
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.
 
     Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
-    mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2 points
-    over the method's); zero_answers, colour_rrmse and the four rrmse_<component> (means over fabrics); geometric means
-    over fabrics, and over trainings, with their intervals (`reports.over_fabrics.columns_over_fabrics`).
+    mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2
+    points over the method's); zero_answers, colour_rrmse, colour_rrmse_99 and the four rrmse_<component> (means
+    over fabrics); geometric means over fabrics, and over trainings, with their intervals
+    (`reports.over_fabrics.columns_over_fabrics`).
     """
     wide = _wide(records, "queries")
     result = []
@@ -69,7 +69,7 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
         row |= {"mse_measured": measured, "truth_noise": noise}
         row["noise_share"] = noise / measured if measured > 0 else math.nan
         row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
-        relative = ["zero_answers", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS)]
+        relative = ["zero_answers", "colour_rrmse_99", *ERRORS[1:]]
         row |= {name: group[name].mean() if name in group else math.nan for name in relative}
         row |= columns_over_fabrics(group, baseline)
         result.append(row)

@@ -1,28 +1,42 @@
-"""Variance saved by a sampler: one bounce under even light, against cosine sampling.
+"""Variance saved by a sampler, and variance saved in equal time: one bounce under even light, against cosine sampling.
 
-One bounce towards the viewer, L = integral over the whole sphere of f_P(wi, wo) d(wi) in luminance, estimated by one
-direction: f_P / pdf. For each patch the variance over its directions; "saved" is the mean variance of cosine sampling,
-half of its directions on either side of the cloth, over that of the sampler. f_P is the truth's (`node_table`), so
-nothing but the directions differs. The exact mixture is the best that lobes can do: 256 points of the footprint, none
-of them widened.
+One bounce towards the viewer, in luminance, estimated by one direction:
+
+    L = integral over the whole sphere of f_P(wi, wo) d(wi) + transparency
+
+f_P is that of one method for all samplers, so nothing but the directions differs; light straight through is a delta
+lobe with the same probability for all. For each look the variance over its directions; "saved" is the mean variance of
+cosine sampling, half of its directions on either side of the cloth, over that of the sampler; "saved in equal time" is
+that of variance times time, the time of a direction, its density and its value.
+
+cosine            half of the directions on either side of the cloth
+cosine by sides   the cosine, as many on either side as the lobes have there, roughly
+one point         the exact lobe of one random point of the footprint, and its cosines
+lobes             `PatchBSDF.sample`
+
+The probability of the delta lobe and the sides cost the cosines no time. Looks are random ones of the data sets, and of
+the first frame of every shipped scene, whose lights play no part.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.models.sampler import Sample, Sampler
-from pipeline.scenes.shade import colours
+from pipeline.analytic.importance.lobes import FAR, HEIGHT, SHARE, STRAIGHT, Lobes
+from pipeline.analytic.importance.mixture import LEAST_COSINE
+from pipeline.models.patch_bsdf import PatchBSDF
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.truth.row_records import RowRecords
 from weaves.colour import LUMINANCE
@@ -31,11 +45,18 @@ from weaves.fabric import Fabric, load_fabric
 FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
 """Lustrous cloth first."""
 
-SETTINGS: Final = (("cosine", 0), ("4 points", 4), ("8 points", 8), ("16 points", 16), ("exact mixture", 256))
-"""Samplers and their points; 0: the cosine."""
+SCENES: Final = tuple(SHIPPED)
+"""Scenes whose looks are measured."""
 
-_ROWS, _DIRECTIONS = 200, 16
-_LEAST_COSINE = 1e-6
+SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")
+"""Samplers."""
+
+_LOOKS, _DIRECTIONS = 400, 64
+_REPEATS = 2
+_TO_FAR = 0.1  # share of the flakes' light that reaches the far side, roughly
+_POINT = np.float32(1e-3)  # deviation of a point
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -45,68 +66,188 @@ class Saving:
     sampler: str
     """One of `SETTINGS`."""
     fabric: str
-    """On which cloth; "(specular)" where its diffuse light is left out."""
+    """On which cloth; "(specular)" where its diffuse light is left out; or in which scene."""
     variance_saved: float
     """Variance of cosine sampling over the sampler's."""
+    saved_in_time: float
+    """Variance of cosine sampling times its time over those of the sampler."""
     sample_time: float
     """Nanoseconds of a direction with its density."""
+    estimate_time: float
+    """Nanoseconds of a direction with its density and value."""
     count: int
     """Directions."""
 
 
-def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Saving]:
-    """Measure every sampler on every fabric, with all its light and with the specular part alone."""
+class Subject(NamedTuple):
+    """Cloth, and looks at it."""
+
+    fabric: Fabric
+    looks: Queries
+
+
+def measure(looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES) -> Iterator[Saving]:
+    """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:
         cloth = load_fabric(name)
-        yield from _savings(cloth, name, rows)
-        yield from _savings(_specular(cloth), f"{name} (specular)", rows)
+        drawn = draw_queries(QueryOptions(max_angle=75.0), cloth.weave.repeat, 3, 0, looks)
+        yield from _savings([Subject(cloth, drawn)], name)
+        yield from _savings([Subject(_specular(cloth), drawn)], f"{name} (specular)")
+    for name in scenes:
+        yield from _savings(scene_subjects(name, looks), f"scene {name}")
 
 
 RECORDS: Final = RowRecords(
     Saving,
-    {"variance_saved": "variance_saved", "sample_time": "sample_time"},
+    {
+        "variance_saved": "variance_saved",
+        "saved_in_time": "saved_in_time",
+        "sample_time": "sample_time",
+        "estimate_time": "estimate_time",
+    },
     setting=("sampler",),
     method="sampler",
 )
 """Savings as Records."""
 
 
-def _savings(fabric: Fabric, name: str, rows: int) -> Iterator[Saving]:
-    queries = draw_queries(QueryOptions(max_angle=75.0), fabric.weave.repeat, 3, 0, rows)
-    queries = queries.take(np.repeat(np.arange(rows), _DIRECTIONS))
-    random = np.random.default_rng(1).random((len(queries.u), 3))
-    base = math.nan
-    for label, points in SETTINGS:
-        sampler = Sampler(points, 0.0 if label == "exact mixture" else 2.0) if points else None
-        if sampler:
-            sampler.sample(fabric, queries.take(slice(16)), random[:16])
-        begun = time.perf_counter()
-        drawn = sampler.sample(fabric, queries, random) if sampler else _cosine(random)
-        seconds = time.perf_counter() - begun
-        values = _light(fabric, queries, drawn).reshape(rows, _DIRECTIONS)
+def scene_subjects(name: str, looks: int) -> list[Subject]:
+    """Return random looks of a scene's first frame, of each cloth as many as its share of the pixels."""
+    loaded = load(load_scene(name))
+    # Which lights reach a place takes most of the time of a frame, and matters not here.
+    frame = render(replace(loaded, lights=loaded.lights[:1]))
+    found = [
+        Subject(loaded.cloths[key][1], gbuffer.looks(loaded.cloths[key][1].weave.repeat))
+        for key, gbuffer in frame.gbuffers.items()
+        if len(gbuffer.pixel)
+    ]
+    stops = np.cumsum([len(subject.looks.u) for subject in found])
+    chosen = np.sort(np.random.default_rng(5).choice(stops[-1], min(looks, int(stops[-1])), replace=False))
+    parts = np.split(chosen, np.searchsorted(chosen, stops[:-1]))
+    return [
+        Subject(fabric, own.take(part - (stop - len(own.u))))
+        for (fabric, own), part, stop in zip(found, parts, stops.tolist(), strict=True)
+        if part.size
+    ]
+
+
+class _Estimate(NamedTuple):
+    """Values of the directions of a sampler, (looks, directions); seconds of them all, without and with values."""
+
+    values: Floats
+    draw_seconds: float
+    seconds: float
+
+
+def _savings(subjects: Sequence[Subject], name: str) -> Iterator[Saving]:
+    """Yield the savings of all samplers over the looks of some cloths together."""
+    found: dict[str, list[_Estimate]] = {sampler: [] for sampler in SETTINGS}
+    for subject in subjects:
+        for sampler, estimate in _estimates(subject).items():
+            found[sampler].append(estimate)
+    base, base_time = math.nan, math.nan
+    for sampler in SETTINGS:
+        values = np.concatenate([one.values for one in found[sampler]])
         variance = float(values.var(axis=1, ddof=1).mean())
-        base = variance if not points else base
-        yield Saving(label, name, base / variance, 1e9 * seconds / len(queries.u), len(queries.u))
+        draw_time, whole = (
+            1e9 * sum(seconds) / values.size
+            for seconds in zip(*((one.draw_seconds, one.seconds) for one in found[sampler]), strict=True)
+        )
+        if sampler == "cosine":
+            base, base_time = variance, whole
+        saved = base / variance
+        yield Saving(sampler, name, saved, saved * base_time / whole, draw_time, whole, values.size)
 
 
-def _light(fabric: Fabric, queries: Queries, drawn: Sample) -> npt.NDArray[np.float64]:
-    """Return luminance over density of each direction."""
-    wi = drawn.wi.copy()
-    wi[:, 2] = np.where(np.abs(wi[:, 2]) < _LEAST_COSINE, _LEAST_COSINE, wi[:, 2])
-    answers = estimate(fabric, queries._replace(wi=wi), TruthOptions(estimator="node_table"), 1).mean.astype(np.float64)
-    front = colours(fabric) @ LUMINANCE
-    through = [yarn.diffuse_transmission_rgb for yarn in (fabric.warp, fabric.weft)]
-    back = np.concatenate([front[:2], np.array(through) @ LUMINANCE])
-    return np.asarray(np.where(wi[:, 2] > 0, answers @ front, answers @ back) / drawn.pdf)
+def _estimates(subject: Subject) -> dict[str, _Estimate]:
+    """Return what each sampler finds; samplers are timed in turns by the processor's clock, the shortest counts."""
+    count = len(subject.looks.u)
+    looks = subject.looks.take(np.repeat(np.arange(count), _DIRECTIONS))
+    random = np.random.default_rng(1).random((len(looks.u), 5))
+    bsdf = PatchBSDF(subject.fabric)
+    point, lobes = PatchBSDF(subject.fabric, bsdf.method, points=1), bsdf.lobes(looks)
+    straight, far = lobes.rest[:, STRAIGHT].astype(np.float64), _far_share(lobes)
+    places = _points_of(looks, np.random.default_rng(2).standard_normal((len(looks.u), 2)))
+    half = np.full(len(far), 0.5)
+    draws: dict[str, Callable[[], _Directions]] = {
+        "cosine": lambda: _cosine(looks, random, half, straight),
+        "cosine by sides": lambda: _cosine(looks, random, far, straight),
+        "one point": lambda: _one_point(point, places, random, straight),
+        "lobes": lambda: _Directions(*bsdf.draw(looks, random[:, :3])),
+    }
+    values, best = {}, dict.fromkeys(draws, (math.inf, math.inf))
+    for _ in range(_REPEATS + 1):
+        for name, draw in draws.items():
+            begun = time.thread_time()
+            drawn = draw()
+            middle = time.thread_time()
+            weight = _weights(bsdf, looks, drawn)
+            end = time.thread_time()
+            # The first round tabulates and compiles.
+            if name in values:
+                best[name] = min(best[name][0], middle - begun), min(best[name][1], end - begun)
+            values[name] = weight
+    return {name: _Estimate(values[name].reshape(count, -1), *best[name]) for name in draws}
 
 
-def _cosine(random: npt.NDArray[np.float64]) -> Sample:
-    """Draw directions by the cosine, on either side alike."""
-    side = np.where(random[:, 0] < 0.5, 1.0, -1.0)
+class _Directions(NamedTuple):
+    """Unit wi, their densities, and which are straight through: these have its probability."""
+
+    wi: npt.NDArray[np.float32]
+    pdf: npt.NDArray[np.floating[Any]]
+    straight: npt.NDArray[np.bool_]
+
+
+def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Floats:
+    """Return the luminance of f_P over the density, and of transparency over its probability."""
+    queries, straight = looks._replace(wi=drawn.wi), drawn.straight
+    found = np.empty(len(straight))
+    found[~straight] = bsdf.eval(queries.take(~straight)) @ LUMINANCE
+    if straight.any():
+        found[straight] = bsdf.method.transparency(bsdf.fabric, queries.take(straight))
+    return np.asarray(found / drawn.pdf)
+
+
+def _cosine(looks: Queries, random: Floats, far: Floats, straight: Floats) -> _Directions:
+    """Draw directions by the cosine, of which `far` are on the far side, or straight through."""
+    through = random[:, 3] < straight
+    behind = random[:, 0] < far
+    z = np.maximum(np.sqrt(1.0 - random[:, 1]), LEAST_COSINE)
     radius, turn = np.sqrt(random[:, 1]), 2.0 * math.pi * random[:, 2]
-    z = side * np.sqrt(np.maximum(1.0 - random[:, 1], _LEAST_COSINE**2))
-    wi = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1)
-    return Sample(wi.astype(np.float32), np.abs(z) / (2.0 * math.pi))
+    side = np.where(behind, -1.0, 1.0) * np.sign(looks.wo[:, 2])
+    wi = np.stack([radius * np.cos(turn), radius * np.sin(turn), side * z], axis=-1).astype(np.float32)
+    wi[through] = -looks.wo[through]
+    pdf = (1.0 - straight) * np.where(behind, far, 1.0 - far) * z / math.pi
+    return _Directions(wi, np.where(through, straight, pdf), through)
+
+
+def _one_point(bsdf: PatchBSDF, places: Queries, random: Floats, straight: Floats) -> _Directions:
+    """Draw directions by the lobe of one point each, or straight through with the footprint's probability."""
+    through = random[:, 3] < straight
+    found = bsdf.lobes(places)
+    # Of its own light straight through nothing is drawn.
+    rest = 1.0 / np.maximum(1.0 - found.rest[:, STRAIGHT], 1e-6)
+    found.flakes[:, [SHARE, HEIGHT]] *= rest[:, None, None]
+    found.rest[:] *= rest[:, None]
+    found.rest[:, STRAIGHT] = 0.0
+    wi, pdf, _ = bsdf.draw(places, random[:, :3], found)
+    wi[through] = -places.wo[through]
+    return _Directions(wi, np.where(through, straight, (1.0 - straight) * pdf), through)
+
+
+def _far_share(lobes: Lobes) -> Floats:
+    """Return the share of the scattered light that the lobes expect on the far side, roughly."""
+    flakes, scattered = lobes.flakes[:, SHARE].sum(axis=1), 1.0 - lobes.rest[:, STRAIGHT]
+    return np.asarray((lobes.rest[:, FAR] + _TO_FAR * flakes) / np.maximum(scattered, 1e-6), np.float64)
+
+
+def _points_of(looks: Queries, normal: Floats) -> Queries:
+    """Return a random point of each footprint, from two standard normal numbers each."""
+    along, across = looks.sigma * normal[:, 0], looks.sigma_minor * normal[:, 1]
+    cosine, sine = np.cos(looks.angle), np.sin(looks.angle)
+    u, v = looks.u + along * cosine - across * sine, looks.v + along * sine + across * cosine
+    size = np.full_like(looks.sigma, _POINT)
+    return looks._replace(u=u.astype(np.float32), v=v.astype(np.float32), sigma=size, sigma_minor=size)
 
 
 def _specular(fabric: Fabric) -> Fabric:

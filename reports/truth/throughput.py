@@ -1,5 +1,7 @@
 """How fast the ground truth is: points and patch queries a second, beside a plain NumPy version in the same process.
 
+The same of soft nodes and `selvage`, with the share of the processor's arithmetic that they use.
+
 Every rate is the median over repeats of a call that takes long enough for the clock. The NumPy version is what one
 writes first: surface and point model by array expressions, visibility from the same table of horizons.
 """
@@ -8,7 +10,7 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Final
@@ -16,6 +18,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.soft_nodes.detail import DETAILS
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.method import CHUNK, Method
+from pipeline.models.per_query import Portable
+from pipeline.models.registry import load_model, pretrained_folder
+from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
@@ -24,6 +32,7 @@ from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from reports.measure.timing import set_threads
+from reports.truth.machine_limit import network_of, operations_of, work_of
 from reports.truth.rate import MULTIPLY_ADDS, OPERATIONS, evaluate_points, multiply_adds
 from reports.truth.row_records import RowRecords
 from weaves.fabric import Fabric, load_fabric
@@ -33,6 +42,7 @@ FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twi
 """One of each family, and the largest repeats."""
 
 _REPEATS = 5
+_TURNS = 15  # of one thread and two
 _SEED = 20
 
 
@@ -69,10 +79,13 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
         Presets whose patch queries are timed.
     """
     set_threads(1)
-    yield from _points()
+    limit = _arithmetic()
+    yield limit
+    yield from _points(limit)
     for name in fabrics:
         yield from _queries(load_fabric(name), rows)
     yield _two_threads(load_fabric(fabrics[0]), rows)
+    yield from _models(load_fabric(fabrics[0]), limit)
     yield _memory(load_fabric(fabrics[0]), rows)
 
 
@@ -97,8 +110,19 @@ def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: st
     return Rate(what, fabric, middle, low, high, unit, note)
 
 
-def _points() -> Iterator[Rate]:
-    """Yield points a second: vectorised kernels, NumPy, and what arithmetic alone could do."""
+def _arithmetic() -> Rate:
+    """Return the multiply-adds a second of one core that does nothing else."""
+    values = np.linspace(0.1, 0.9, 4096, dtype=np.float32)
+
+    def arithmetic() -> float:
+        multiply_adds(values, 200)
+        return 200.0 * values.size * MULTIPLY_ADDS
+
+    return _rate(arithmetic, "multiply-adds alone", "", "1/s")
+
+
+def _points(limit: Rate) -> Iterator[Rate]:
+    """Yield points a second: vectorised kernels and NumPy."""
     fabric = load_fabric("polyester_lining")
     model = cloth_side(fabric, TruthOptions())
     table = FINE.table(model, False)
@@ -107,14 +131,6 @@ def _points() -> Iterator[Rate]:
 
     plain = _rate(lambda: float(_numpy_points(fabric, table, queries)), "points, NumPy", fabric.name, "points/s")
     yield plain
-    values = np.linspace(0.1, 0.9, 4096, dtype=np.float32)
-
-    def arithmetic() -> float:
-        multiply_adds(values, 200)
-        return 200.0 * values.size * MULTIPLY_ADDS
-
-    limit = _rate(arithmetic, "multiply-adds alone", "", "1/s")
-    yield limit
     for name, visibility in (("specular", False), ("everything", True)):
         rate = _rate(
             lambda visibility=visibility: float(evaluate_points(model, table, columns, visibility)[1]),  # type: ignore[misc]
@@ -175,15 +191,62 @@ def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
 def _two_threads(fabric: Fabric, rows: int) -> Rate:
     """Return how much faster two threads answer than one; kernels run without the interpreter's lock."""
     options = TruthOptions(estimator="node_table")
-    halves = [draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, k * 4 * rows, 4 * rows) for k in range(2)]
 
-    def answer(queries: Queries) -> int:
-        return len(estimate(fabric, queries, options, _SEED).count)
+    def answer(queries: Queries) -> object:
+        return estimate(fabric, queries, options, _SEED)
+
+    return _threads_compared("queries", fabric, answer, 4 * rows)
+
+
+def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], object], rows: int) -> Rate:
+    """Return the rate of two threads with `rows` queries each; its note compares the fastest calls of two and of one.
+
+    One thread and two take turns, so that other work on the machine falls on both.
+    """
+    halves = [draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, k * rows, rows) for k in range(2)]
+
+    def both(apply: Callable[..., Iterable[object]]) -> float:
+        start = time.perf_counter()
+        list(apply(answer, halves))
+        return 2 * rows / (time.perf_counter() - start)
 
     with ThreadPoolExecutor(2) as pool:
-        one = _rate(lambda: float(sum(map(answer, halves))), "queries, one thread", fabric.name, "queries/s")
-        two = _rate(lambda: float(sum(pool.map(answer, halves))), "queries, two threads", fabric.name, "queries/s")
-    return replace(two, note=f"{two.value / one.value:.2f} x one thread")
+        found = [(both(map), both(pool.map)) for _ in range(1 + _TURNS)][1:]
+    one, two = zip(*found, strict=True)
+    low, middle, high = np.percentile(two, [25, 50, 75]).tolist()
+    note = f"{max(two) / max(one):.2f} x one thread"
+    return Rate(f"{what}, two threads", fabric.name, middle, low, high, "queries/s", note, _TURNS)
+
+
+def _models(fabric: Fabric, limit: Rate) -> Iterator[Rate]:
+    """Yield queries a second of soft nodes and of `selvage`, what arithmetic they need, and how far that is from all.
+
+    The arithmetic is that of the nodes and of the network; placing nodes, weights and features are the rest.
+    """
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK)
+    few = queries.take(slice(CHUNK))
+    operations = operations_of(tabulate(fabric))
+    (selvage,) = load_model(pretrained_folder("selvage"))
+    assert isinstance(selvage, Portable)
+    network = network_of(selvage, fabric)
+    methods: list[tuple[Method, int, int]] = [(SoftNodes(level), level, 0) for level in DETAILS]
+    for method, level, products in [*methods, (selvage, network.level, network.multiply_adds)]:
+        work = work_of(tabulate(fabric, level=level), few, operations)
+        what = " ".join(filter(None, ("queries,", method.name, method.setting)))
+
+        def answer(asked: Queries, method: Method = method) -> object:
+            return method.predict(fabric, asked)
+
+        def count(answer: Callable[[Queries], object] = answer) -> float:
+            answer(queries)
+            return float(len(queries.u))
+
+        rate = _rate(count, what, fabric.name, "queries/s")
+        share = rate.value * (work.operations + products) / limit.value
+        note = f"{work.fixed:.0f} fixed and {work.in_footprint:.0f} placed nodes, {work.operations:,.0f} operations"
+        note += f", {products:,} multiply-adds of the network" if products else ""
+        yield replace(rate, note=f"{note}; {share:.0%} of arithmetic alone")
+        yield _threads_compared(what, fabric, answer, 4 * CHUNK)
 
 
 def _memory(fabric: Fabric, rows: int) -> Rate:

@@ -143,7 +143,7 @@ def made_up():
             records.append(queries.of("mse", mse, 400, standard_error=mse / 20, low=0.9 * mse, high=1.1 * mse))
             records += [queries.of("mse_measured", mse + 1e-6, 400), queries.of("truth_noise", 1e-6, 400)]
             records.append(queries.of("zero_answers", 0.3 / count, 400))
-            for name in ("colour_rrmse", *(f"rrmse_{c}" for c in COMPONENTS)):
+            for name in ("colour_rrmse", "colour_rrmse_99", *(f"rrmse_{c}" for c in COMPONENTS)):
                 records.append(queries.of(name, mse**0.5, 400))
             for scene in ("sphere", "plane"):
                 records.append(subject.model_copy(update={"scene": scene}).of("mse", 2 * mse, 900))
@@ -172,7 +172,7 @@ def three_trainings(made_up):
 
     `neumip` is trained once. Times and pictures are of the first training.
     """
-    of_trainings = ("mse", "mse_measured", "colour_rrmse", "flicker", "excess_energy", "spectrum")
+    of_trainings = ("mse", "mse_measured", "colour_rrmse", "colour_rrmse_99", "flicker", "excess_energy", "spectrum")
     records = []
     for record in made_up:
         trained = record.method in ("woven", "neumip") and record.metric not in ("time", "bytes_stored")

@@ -9,6 +9,7 @@ from reports.error import (
     colour_error,
     colour_noise,
     component_errors,
+    most_error,
     ratio,
     relative_squared_error,
     squared_error,
@@ -73,6 +74,16 @@ def test_colour_measure_is_the_prototypes():
     truth = answers(np.tile([1, 1, 2, 2], (7, 1)), np.zeros((7, 4)))
     values = truth.mean + np.array([0, 0, 0.26, 0])
     assert colour_error(values, truth, COLOUR_WEIGHTS).relative_rmse == pytest.approx(0.05, rel=1e-5)
+
+
+def test_error_of_99_per_cent_leaves_the_largest_errors_out():
+    """C off by .4 in 199 of 200 queries and by 40 in one: .2 of colour, and without the noise of .1 of colour."""
+    truth = answers(np.tile([0, 0, 2, 2], (200, 1)), np.tile([0, 0, 0.2, 0], (200, 1)))
+    off = np.where(np.arange(200) == 7, 40.0, 0.4)
+    values = truth.mean + off[:, None] * np.array([0, 0, 1, 0])
+    assert most_error(values, truth).value == pytest.approx(0.2**2 - 0.1**2, rel=1e-6)
+    assert most_error(values, truth).count == 198
+    assert colour_error(values, truth, COLOUR_WEIGHTS).value > 1.0
 
 
 def test_colour_noise_adds_in_squares():

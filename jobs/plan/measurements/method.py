@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement, Picture
-from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, bound_version
+from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, ways_versions
 from jobs.plan.measurements.truth_edge import TruthEdge
 from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.measurements.truth_picture import TruthPicture
@@ -133,8 +133,8 @@ class OnFabric(Measurement):
         return sum(width * height for width, height in map(self.picture_options.size, self.views))
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of model, benchmark and energy bound; that of the truth is in its inputs."""
-        return {"bench": versions.BENCH, "model": self.model.options.version, **bound_version(self.ways)}
+        """Return the versions of model, benchmark, energy bound and fallback; that of the truth is in its inputs."""
+        return {"bench": versions.BENCH, "model": self.model.options.version, **ways_versions(self.ways)}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""

@@ -85,19 +85,23 @@ class Trained(Part):
         return [Fallback(one, kinds, footprint) for one in self.methods(out)]
 
     def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
-        """Return trained methods with or without an energy bound, and in other runtimes."""
+        """Return trained methods with or without an energy bound, in other runtimes, and at wished errors."""
         if not self.networks:
             return []
         from pipeline.models.bounded import counterpart
+        from pipeline.models.method import EstimatesErrors
         from pipeline.models.runtimes import runs
 
         others = [counterpart(one) for one in methods if ways.bounds]
-        return others + [run for one in methods for run in runs(one, ways.runtimes)]
+        others += [run for one in methods for run in runs(one, ways.runtimes)]
+        estimating = [one for one in methods if isinstance(one, EstimatesErrors)]
+        return others + [one.within(error) for one in estimating for error in ways.wished_errors]
 
 
-def bound_version(ways: RunOptions) -> dict[str, int]:
-    """Return the version of the energy bound where networks are measured under it, else nothing."""
-    return {"bound": versions.BOUND} if ways.bounds else {}
+def ways_versions(ways: RunOptions) -> dict[str, int]:
+    """Return the versions of the energy bound and of the fallback, where networks are measured with them."""
+    found = {"bound": versions.BOUND} if ways.bounds else {}
+    return found | ({"fallback": versions.FALLBACK} if ways.wished_errors else {})
 
 
 @dataclass(frozen=True)
@@ -139,9 +143,11 @@ class ModelSubject:
         return Trained(options=self.recipe.options, networks=networks, seed=self.recipe.training.seed)
 
     def ways(self, bench: BenchOptions) -> RunOptions:
-        """Return the ways to run the networks that are measured too; other runtimes only of the first seed."""
+        """Return the ways to use the networks that are measured too; other runtimes only of the first seed."""
         ways = select(RunOptions, self.recipe.measured(bench))
-        return ways if self.is_first else ways.model_copy(update={"runtimes": ()})
+        unused = {} if self.is_first else {"runtimes": ()}
+        unused |= {} if self.recipe.options.estimates_errors else {"wished_errors": ()}
+        return ways.model_copy(update=unused)
 
 
 @dataclass(frozen=True)

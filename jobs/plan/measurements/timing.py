@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, bound_version
+from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, ways_versions
 from jobs.plan.task import Part, Progress
 from pipeline import versions
 from reports.options import RunOptions, TimingOptions, select
@@ -110,8 +110,8 @@ class Timing(Measurement):
     def versions(self) -> dict[str, int]:
         """Return the versions of the truth, which is timed too, the benchmark, the energy bound and every model."""
         models = {one.model.options.name: one.model.options.version for one in self.models}
-        bound = {key: value for one in self.models for key, value in bound_version(one.ways).items()}
-        return {"truth": versions.TRUTH, "bench": versions.BENCH, **bound, **models}
+        ways = {key: value for one in self.models for key, value in ways_versions(one.ways).items()}
+        return {"truth": versions.TRUTH, "bench": versions.BENCH, **ways, **models}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all queries, then queries by the size of their footprints."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,6 +14,7 @@ from jobs.terminal import Terminal
 from jobs.verbs.render.look import Look
 from pipeline import versions
 from pipeline.atomic import atomic_write
+from pipeline.cores import cores
 from pipeline.models.method import one_thread
 from pipeline.models.named import TRUTH
 from pipeline.scenes.loading import Loaded
@@ -45,7 +45,7 @@ class FilmMaker:
         self._bar = self._bars.add_task("rendering", total=count * size[0] * size[1])
 
     def __enter__(self) -> FilmMaker:
-        self._pool = ThreadPoolExecutor(os.cpu_count() or 1)
+        self._pool = ThreadPoolExecutor(cores())
         self._bars.start()
         return self
 

@@ -1,17 +1,17 @@
 """Lobes of a patch: the flakes' lobes at a few points of the footprint and two cosines, to draw directions from.
 
-    pdf(wi) = P_front <wi.n_s> / pi + P_back <-wi.n_s> / pi + sum_k P_k D_k(h) / (4 sigma_k(wo))
+The points are a fixed set in the footprint, the same at every call, so that the density of a sample is known exactly.
+How much of a point the viewer sees is read from a coarse grid of horizons. Each point represents its surroundings:
+where tangents differ from point to point by s, its roughness is widened to alpha^2 + (widening s / points)^2; and one
+broad lobe a family, as wide as all its tangents, has `BROAD` of its share, so that nothing between the points is
+without a sample. At a small footprint all points are alike, and the mixture is the sampler of a point
+(pipeline.analytic.importance.point) beside the cosines of the diffuse light.
 
-The points are the first of a low-discrepancy sequence in the footprint, the same at every call, so that the density of
-a sample is known exactly. Each represents its surroundings: where tangents differ from point to point by s, its
-roughness is widened to alpha^2 + (widening s / points)^2; and one broad lobe a family, as wide as all its tangents, has
-`BROAD` of its share, so that nothing between the points is without a sample. At a small footprint all points are alike,
-and the mixture is the exact sampler of a point (pipeline.analytic.importance.point) beside the cosines of the diffuse
-light.
-
-A lobe's share is its visible area, times k_s, times the light scattered once by the layer, about half of
-1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt. No shadows of the light enter: they
-change the variance, not the density.
+A lobe's share is its visible area, times k_s, times the light scattered once by the layer and not shadowed, about
+`SCATTERED` of 1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt; that of the light
+straight through is the area of gaps, and that of yarns times exp(-T Lambda). Cosines and light straight through have a
+little more, because few points may miss what the footprint has: without a sample, light would be lost. Where the light
+comes from plays no part: shares change the variance, not the density.
 """
 
 from __future__ import annotations
@@ -21,158 +21,333 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.importance.point import flake_scatter_pdf, sample_flake_scatter
-from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.cloth import ClothSide, Columns
-from pipeline.truth.footprint.place import place_pair
+from pipeline.analytic.flakes_float32 import sigma
+from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, Surface
+from pipeline.analytic.soft_horizons import above, ramp
+from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
+from pipeline.analytic.soft_nodes.nodes import (
+    BLOCK,
+    BOUND,
+    CURVE,
+    FAMILY,
+    LEVELS,
+    SHIFT,
+    X_HIGH,
+    X_LOW,
+    Y_HIGH,
+    Y_LOW,
+)
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent
+from pipeline.compiled.arrays import Float32
+from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.float32 import arcsine
+from pipeline.compiled.normal import normal_quantile
 from pipeline.truth.footprint.sequences import r2_pair
-from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
-from pipeline.truth.geometry.visibility import ray, visible
-from pipeline.truth.scattering.microflake import sigma
+from pipeline.truth.geometry.heightfield import (
+    ALPHA,
+    BETA,
+    COS_TWIST,
+    GAP,
+    INVERSE_RADIUS,
+    RADIUS,
+    SIN_TWIST,
+    WARP,
+    WEFT,
+)
+from pipeline.truth.scattering.slab_float32 import unscattered
 
-_SCATTERED: Final = 0.5  # share of the light that meets a flake and leaves without meeting a second one, roughly
+ROWS: Final = 6
+"""Rows of `Lobes.flakes`."""
+
+TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(ROWS)
+"""Tangent; alpha^2, widened; probability; that times alpha^3 / (4 pi sigma(wo)), the density at q = 1."""
+
+NEAR, FAR, STRAIGHT = range(3)
+"""Columns of `Lobes.rest`: the cosine on the viewer's side, that on the other, light straight through."""
+
+POINT_ROWS: Final = 7
+"""Rows of the scratch of `find_rows`."""
+
+SCATTERED: Final = 0.2
+"""Light that leaves after one flake and meets no other yarn, as a share of what meets a flake, roughly."""
+
 BROAD: Final = 0.2
 """Share of a family's lobes that its broad one has."""
 
-_LEAST: Final = 0.02  # share of each cosine at least: no light is without a sample
+_SINE, _PLACE, _CURVE, _LIMIT, _SEEN, _WARPNESS, _YARNNESS = range(POINT_ROWS)
+_SCATTERED, _BROAD = np.float32(SCATTERED), np.float32(BROAD)
+_ASTRAY = np.float32(0.15)  # share of the flakes' light that the cosine takes: no point finds it
+_CLEAR = np.float32(0.05)  # light straight through a yarn at least: few points may all be opaque, the footprint is not
+_LEAST = np.float32(0.02)  # share of each cosine and of light straight through at least: none is without a sample
+_HIDDEN = (np.float32(0.45), np.float32(0.1))  # shares of each and of light straight through where no point is seen
+_SHARPNESS = np.float32(20.0)  # 1 over the width of the ramp of a horizon
+_STEEPEST = np.float32(0.99999)
+_ALONE = np.float32(0.999)  # sum of squared shares from which on a family has one point
+_0, _1, _HALF, _TINY = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(1e-30)
+_INVERSE_PI, _HEIGHT = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
+_LEVELS = np.float32(LEVELS)
 
 
 class Lobes(NamedTuple):
-    """Mixtures for N queries.
+    """Mixtures for N looks; all probabilities of a look sum to 1.
 
     Attributes
     ----------
-    tangent : float64 (N, K, 3)
-        Fibre tangents; the last two lobes are the broad ones of warp and weft.
-    alpha : float64 (N, K)
-        Roughness, widened.
-    share : float64 (N, K)
-        Probability of each lobe; 0 for points that the viewer does not see.
-    cosine : float64 (N, 2)
-        Probability of the cosine on the viewer's side and of that on the other.
+    flakes : float32 (N, ROWS, K)
+        Lobes of flakes; the last two are the broad ones of warp and weft.
+    rest : float32 (N, 3)
+        Probabilities of NEAR, FAR and STRAIGHT.
     """
 
-    tangent: Float64
-    alpha: Float64
-    share: Float64
-    cosine: Float64
+    flakes: Float32
+    rest: Float32
 
 
-@allocating_kernel
-def find_lobes(
-    model: ClothSide,
-    columns: Columns,
-    count: int,
-    widening: float,
-    specular: Float64,
-    diffuse: Float64,
-    through: Float64,
-) -> Lobes:
-    """Return the mixtures of queries, whose wi does not matter, from `count` points each.
+class Look(NamedTuple):
+    """A footprint and its viewer.
 
-    `specular`, `diffuse` and `through` are the luminances of k_s, k_d and k_dt of warp and weft, (2,).
+    Attributes
+    ----------
+    x, y : float64
+        Centre, within the repeat.
+    dx, dy, rho : float32
+        Deviations along x and y, and correlation of the axes.
+    even : bool
+        Whether it covers the cloth evenly.
+    ox, oy, oz : float32
+        wo.
+    low, high, turn
+        Azimuths around wo, and where between them it lies.
     """
-    rows, front = len(columns.u), model.front
-    picks, ends = front.top.shape
-    tangent, alpha = np.zeros((rows, count + 2, 3)), np.ones((rows, count + 2))
-    share, cosine = np.zeros((rows, count + 2)), np.zeros((rows, 2))
-    families = np.full(count + 2, GAP)
-    tangent[:, :, 2] = 1.0
-    for row in range(rows):
-        wo = columns.wo[row]
-        towards = ray(wo[0], wo[1], wo[2], 0.0)
-        for k in range(count):
-            first, second = r2_pair(np.uint64(0), k)
-            x, y, weight = place_pair(
-                model.shape, columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row],
-                columns.angle[row], float(ends), float(picks), first, second,
-            )  # fmt: skip
-            family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
-            families[k] = family
-            if family == GAP:
-                continue
-            cos_o = wo[0] * nx + wo[1] * ny + wo[2] * nz
-            if cos_o <= 0.0 or not visible(front, x, y, z, side, towards):
-                continue
-            area = weight * cos_o / nz
-            tangent[row, k, 0], tangent[row, k, 1], tangent[row, k, 2] = tx, ty, tz
-            alpha[row, k] = front.yarn[family, ALPHA]
-            depth = front.thickness * sigma(wo[0], wo[1], wo[2], tx, ty, tz, alpha[row, k]) / cos_o
-            share[row, k] = area * specular[family] * _SCATTERED * (1.0 - math.exp(-depth))
-            cosine[row, 0] += area * diffuse[family]
-            cosine[row, 1] += area * through[family]
-        _widen(tangent[row], alpha[row], share[row], families, widening)
-        total = share[row].sum() + cosine[row].sum()
-        flakes = 1.0 - 2.0 * _LEAST if total > 0.0 else 0.0
-        share[row] *= flakes / max(total, 1e-300)
-        for side in range(2):
-            cosine[row, side] = cosine[row, side] * flakes / max(total, 1e-300) + (_LEAST if total > 0.0 else 0.5)
-    return Lobes(tangent, alpha, share, cosine)
+
+    x: float
+    y: float
+    dx: np.float32
+    dy: np.float32
+    rho: np.float32
+    even: bool
+    ox: np.float32
+    oy: np.float32
+    oz: np.float32
+    low: int
+    high: int
+    turn: np.float32
+
+
+def point_places(count: int) -> Float32:
+    """Return the places of points, float32 (count, 4), the first of a low-discrepancy sequence.
+
+    The first two columns are in deviations of a footprint; the others, where it covers the cloth evenly, in repeats.
+    """
+    result = np.empty((count, 4), np.float32)
+    for k in range(count):
+        pair = r2_pair(np.uint64(0), k)
+        result[k] = *(normal_quantile(number) for number in pair), *pair
+    return result
 
 
 @kernel
-def _widen(tangent: Float64, alpha: Float64, share: Float64, families: Index, widening: float) -> None:
+def find_rows(
+    cloth: Surface,
+    footprints: tuple[Float32, Float32, Float32, Float32, Float32],
+    wo: Float32,
+    places: Float32,
+    widening: np.float32,
+    points: Float32,
+    result: Lobes,
+) -> None:
+    """Write the mixtures of N looks, the viewer in front.
+
+    Parameters
+    ----------
+    cloth : Surface
+        The cloth.
+    footprints : five of float32 (N,)
+        Centre and deviations along the axes in yarn spacings, correlation of the axes.
+    wo : float32 (N, 3)
+        Directions to the viewer.
+    places : float32 (P, 4)
+        `point_places`.
+    widening : float32
+        Factor on the widening of lobes.
+    points : float32 (POINT_ROWS, P)
+        Scratch.
+    result : Lobes
+        Written; of P + 2 lobes.
+    """
+    u, v, deviation_x, deviation_y, correlation = footprints
+    ends, picks = cloth.repeat[0], cloth.repeat[1]
+    for n in range(len(u)):
+        # Reduced in double precision: single would lose the place of a far centre within the repeat.
+        x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
+        y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
+        low, high, turn = around(wo[n, 0], wo[n, 1])
+        even = min(deviation_x[n], deviation_y[n]) >= cloth.uniform
+        look = Look(
+            x, y, deviation_x[n], deviation_y[n], correlation[n], even, wo[n, 0], wo[n, 1], wo[n, 2], low, high, turn
+        )
+        lobes = result.flakes[n]
+        _place_points(cloth, look, places, points)
+        near, far, straight = _shade_points(cloth, look, points, lobes)
+        _widen(points, lobes, widening)
+        _normalise(look, lobes, near, far, straight, result.rest[n])
+
+
+@inlined_kernel
+def _place_points(cloth: Surface, look: Look, places: Float32, points: Float32) -> None:
+    """Write what each point has of its piece, and how much of it the viewer sees."""
+    size, bounds, width = cloth.size, cloth.bounds, cloth.repeat[0]
+    ends, picks, per_azimuth = np.float64(width), np.float64(cloth.repeat[1]), cloth.size * cloth.size
+    per_end, per_pick = 1.0 / ends, 1.0 / picks
+    to_low, to_high = look.low * per_azimuth, look.high * per_azimuth
+    count, last = np.float32(size), np.float32(size) - np.float32(0.01)
+    root = np.sqrt(_1 - look.rho * look.rho)
+    level, sharpness = look.oz * _LEVELS, _SHARPNESS / _LEVELS
+    for k in range(len(places)):
+        if look.even:
+            x, y = look.x + places[k, 2] * ends, look.y + places[k, 3] * picks
+        else:
+            x = look.x + look.dx * places[k, 0]
+            y = look.y + look.dy * (look.rho * places[k, 0] + root * places[k, 1])
+        x, y = x - ends * math.floor(x * per_end), y - picks * math.floor(y * per_pick)
+        # What rounds to the repeat's end is in its last cell.
+        end, pick = min(int(x), cloth.repeat[0] - 1), min(int(y), cloth.repeat[1] - 1)
+        fx, fy, cell = np.float32(x - end), np.float32(y - pick), pick * width + end
+        p, stop = cloth.piece_starts[cell], cloth.piece_starts[cell + 1] - 1
+        while p < stop and not (
+            bounds[p, X_LOW] <= fx and fx <= bounds[p, X_HIGH] and bounds[p, Y_LOW] <= fy and fy <= bounds[p, Y_HIGH]
+        ):
+            p += 1
+        family, shift = cloth.pieces[p, FAMILY], bounds[p, SHIFT]
+        sine, place = _0, _0
+        if family == WARP:
+            sine, place = (fx - _HALF) * cloth.yarn[WARP, INVERSE_RADIUS], fy - _HALF + shift
+            column = arcsine(sine) * _INVERSE_PI + _HALF
+            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
+        elif family == WEFT:
+            # Along a weft, y of its frame runs against x.
+            sine, place = (fy - _HALF) * cloth.yarn[WEFT, INVERSE_RADIUS], _HALF - fx - shift
+            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
+            row = arcsine(sine) * _INVERSE_PI + _HALF
+        else:
+            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
+            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
+        at = int(min(max(row * count, _0), last)) * size + int(min(max(column * count, _0), last))
+        at += cloth.pieces[p, BLOCK] * AZIMUTHS * per_azimuth
+        lower, upper = np.float32(cloth.grid[at + to_low]), np.float32(cloth.grid[at + to_high])
+        points[_SINE, k], points[_PLACE, k] = min(max(sine, -_STEEPEST), _STEEPEST), place
+        points[_CURVE, k], points[_LIMIT, k] = bounds[p, CURVE], bounds[p, BOUND]
+        points[_SEEN, k] = ramp(above(level, lower, upper, look.turn, sharpness))
+        points[_WARPNESS, k] = _1 if family == WARP else _0
+        points[_YARNNESS, k] = _0 if family == GAP else _1
+
+
+class _Family(NamedTuple):
+    """Numbers of the yarns of a family, and luminances of k_s, k_d and k_dt."""
+
+    sin_twist: np.float32
+    cos_twist: np.float32
+    beta: np.float32
+    radius: np.float32
+    alpha: np.float32
+    specular: np.float32
+    diffuse: np.float32
+    through: np.float32
+
+
+@inlined_fast_kernel
+def _family(cloth: Surface, family: int) -> _Family:
+    """Return the numbers of one family."""
+    yarn, light = cloth.yarn, cloth.luminance
+    return _Family(
+        yarn[family, SIN_TWIST], yarn[family, COS_TWIST], yarn[family, BETA], yarn[family, RADIUS], yarn[family, ALPHA],
+        light[SPECULAR, family], light[DIFFUSE, family], light[THROUGH, family],
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
+def _shade_points(
+    cloth: Surface, look: Look, points: Float32, lobes: Float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Write tangent, alpha^2 and share of each point; return the sums of both cosines and of light straight through."""
+    near, far, straight = _0, _0, _0
+    # Numbers of both families, one of them chosen: no branch and no load, so that vector units take the loop.
+    first, second, thickness = _family(cloth, WARP), _family(cloth, WEFT), np.float32(cloth.thickness)
+    for k in range(points.shape[1]):
+        warp, solid, sine = points[_WARPNESS, k] > _HALF, points[_YARNNESS, k] > _HALF, points[_SINE, k]
+        fibre = Fibre(
+            first.sin_twist if warp else second.sin_twist,
+            first.cos_twist if warp else second.cos_twist,
+            first.beta if warp else second.beta,
+        )
+        radius, alpha = (first.radius if warp else second.radius), (first.alpha if warp else second.alpha)
+        ox, oy = (look.ox if warp else look.oy), (look.oy if warp else -look.ox)
+        cosine = np.sqrt((_1 - sine) * (_1 + sine))
+        angles, _ = bend(sine, cosine, radius, points[_PLACE, k], points[_CURVE, k], points[_LIMIT, k])
+        nx, ny, nz = normal(angles, fibre.beta)
+        t = tangent(angles, fibre)
+        cos_o = max(ox * nx + oy * ny + look.oz * nz, _0)
+        across = sigma(ox * t.x + oy * t.y + look.oz * t.z, alpha * alpha)
+        area = points[_SEEN, k] * (cos_o / nz if solid else look.oz)
+        clear = unscattered(across, cos_o, thickness) if solid else _1
+        own = area if solid else _0
+        specular = own * (first.specular if warp else second.specular) * _SCATTERED * (_1 - clear)
+        near += own * (first.diffuse if warp else second.diffuse) + _ASTRAY * specular
+        far += own * (first.through if warp else second.through)
+        straight += area * max(clear, _CLEAR)
+        lobes[TX, k], lobes[TY, k], lobes[TZ, k] = (t.x if warp else -t.y), (t.y if warp else t.x), t.z
+        lobes[SQUARE, k] = alpha * alpha
+        lobes[SHARE, k] = specular * (_1 - _ASTRAY)
+    return near, far, straight
+
+
+@inlined_fast_kernel
+def _widen(points: Float32, lobes: Float32, widening: np.float32) -> None:
     """Widen the roughness of each family's lobes by how much its tangents differ, and add its broad lobe."""
-    count = len(share) - 2
+    count = points.shape[1]
     for family in range(2):
-        seen, x, y, z, whole, rough = 0, 0.0, 0.0, 0.0, 0.0, 1.0
+        broad, own = count + family, _1 if family == WARP else _0
+        whole, squares, x, y, z, square = _0, _0, _0, _0, _0, _0
         for k in range(count):
-            if families[k] == family and share[k] > 0.0:
-                # A tangent and its opposite are the same fibre.
-                t = tangent[k]
-                turn = 1.0 if t[0] * x + t[1] * y + t[2] * z >= 0.0 else -1.0
-                x, y, z = x + turn * t[0], y + turn * t[1], z + turn * t[2]
-                seen, whole, rough = seen + 1, whole + share[k], alpha[k]
-        if seen < 2:
+            mine = points[_WARPNESS, k] == own
+            share = lobes[SHARE, k] if mine else _0
+            whole += share
+            squares += share * share
+            x += share * lobes[TX, k]
+            y += share * lobes[TY, k]
+            z += share * lobes[TZ, k]
+            square = max(square, lobes[SQUARE, k] if mine and share > _0 else _0)
+        lobes[TX, broad], lobes[TY, broad], lobes[TZ, broad] = _1, _0, _0
+        lobes[SQUARE, broad], lobes[SHARE, broad] = _1, _0
+        inverse, length = _1 / max(whole, _TINY), np.sqrt(x * x + y * y + z * z)
+        # Points of unlike shares count as fewer.
+        fewer = squares * inverse * inverse
+        if whole <= _TINY or length <= _TINY or fewer > _ALONE:
             continue
-        length = math.sqrt(x * x + y * y + z * z)
-        apart = max(1.0 - (length / seen) ** 2, 0.0)
+        apart = max(_1 - length * length * inverse * inverse, _0)
+        added = apart * widening * widening * fewer * fewer
         for k in range(count):
-            if families[k] == family and share[k] > 0.0:
-                alpha[k] = min(math.sqrt(alpha[k] ** 2 + apart * (widening / seen) ** 2), 1.0)
-                share[k] *= 1.0 - BROAD
-        broad = count + family
-        tangent[broad] = x / length, y / length, z / length
-        alpha[broad], share[broad] = min(math.sqrt(rough * rough + apart), 1.0), BROAD * whole
+            mine = points[_WARPNESS, k] == own
+            lobes[SQUARE, k] = min(lobes[SQUARE, k] + (added if mine else _0), _1)
+            lobes[SHARE, k] *= _1 - _BROAD if mine else _1
+        lobes[TX, broad], lobes[TY, broad], lobes[TZ, broad] = x / length, y / length, z / length
+        lobes[SQUARE, broad], lobes[SHARE, broad] = min(square + apart, _1), _BROAD * whole
 
 
-@allocating_kernel
-def draw(lobes: Lobes, wo: Float64, random: Float64) -> Float64:
-    """Return a unit wi for each query, (N, 3), from three numbers in [0, 1), (N, 3)."""
-    found = np.zeros((len(wo), 3))
-    for row in range(len(wo)):
-        pick, first, second = random[row, 0], random[row, 1], random[row, 2]
-        drawn = False
-        for k in range(lobes.share.shape[1]):
-            if pick < lobes.share[row, k]:
-                t, w = lobes.tangent[row, k], wo[row]
-                found[row] = sample_flake_scatter(
-                    w[0], w[1], w[2], t[0], t[1], t[2], lobes.alpha[row, k], first, second
-                )
-                drawn = True
-                break
-            pick -= lobes.share[row, k]
-        if not drawn:
-            side = 1.0 if pick < lobes.cosine[row, 0] else -1.0
-            radius, turn = math.sqrt(first), 2.0 * math.pi * second
-            found[row, 0], found[row, 1] = radius * math.cos(turn), radius * math.sin(turn)
-            found[row, 2] = side * math.sqrt(max(1.0 - first, 1e-30))
-    return found
-
-
-@allocating_kernel
-def densities(lobes: Lobes, wi: Float64, wo: Float64) -> Float64:
-    """Return the density with which `draw` finds each unit wi, (N,), in 1/sr over the whole sphere."""
-    found = np.zeros(len(wo))
-    for row in range(len(wo)):
-        i, w = wi[row], wo[row]
-        density = (lobes.cosine[row, 0] if i[2] > 0.0 else lobes.cosine[row, 1]) * abs(i[2]) / math.pi
-        for k in range(lobes.share.shape[1]):
-            if lobes.share[row, k] > 0.0:
-                t = lobes.tangent[row, k]
-                density += lobes.share[row, k] * flake_scatter_pdf(
-                    w[0], w[1], w[2], i[0], i[1], i[2], t[0], t[1], t[2], lobes.alpha[row, k]
-                )
-        found[row] = density
-    return found
+@inlined_fast_kernel
+def _normalise(
+    look: Look, lobes: Float32, near: np.float32, far: np.float32, straight: np.float32, rest: Float32
+) -> None:
+    """Make probabilities of the shares, and write the heights of the lobes."""
+    total = near + far + straight
+    for k in range(lobes.shape[1]):
+        total += lobes[SHARE, k]
+    scale, least, least_straight = _0, _HIDDEN[0], _HIDDEN[1]
+    if total > _TINY:
+        scale, least, least_straight = (_1 - _LEAST - _LEAST - _LEAST) / total, _LEAST, _LEAST
+    for k in range(lobes.shape[1]):
+        share, square = lobes[SHARE, k] * scale, lobes[SQUARE, k]
+        along = look.ox * lobes[TX, k] + look.oy * lobes[TY, k] + look.oz * lobes[TZ, k]
+        lobes[SHARE, k] = share
+        lobes[HEIGHT, k] = share * _HEIGHT * square * np.sqrt(square) / sigma(along, square)
+    rest[NEAR], rest[FAR], rest[STRAIGHT] = near * scale + least, far * scale + least, straight * scale + least_straight

@@ -26,14 +26,15 @@ from pipeline.analytic.soft_nodes.diamond import around
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
 from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round
-from pipeline.analytic.soft_nodes.nodes import Table
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
 from pipeline.analytic.soft_nodes.scratch import Scratch, scratch_for
 from pipeline.analytic.soft_nodes.shade import SUMS
 from pipeline.analytic.soft_nodes.wide import sum_fixed
-from pipeline.compiled.arrays import Float32
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import deviations, narrow_axis
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.point import directions_of
 
 STRETCHED: Final = 1.5
 """Least ratio of the axes of a narrow footprint that places nodes along its own axes."""
@@ -47,9 +48,32 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 
 
 def query_sums(table: Table, queries: Queries) -> tuple[Float32, Float32]:
-    """Return what `sum_queries` returns for N queries about flat cloth, the viewer in front."""
-    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo)
-    return sum_queries(table, *(np.ascontiguousarray(column, np.float32) for column in columns))
+    """Return what `sum_queries` returns for N queries, the viewer in front."""
+    return sum_queries(table, *_columns(queries))
+
+
+def nodes_taken(table: Table, queries: Queries) -> Index:
+    """Return how many fixed and how many placed nodes the sums of N queries take, int64 (N, 2), whole blocks.
+
+    Of a patch that is almost hidden, the nodes of the second placement count.
+    """
+    columns, kinds = _columns(queries), int(table.kinds.sum())
+    scratch = scratch_for(table, MOST_OF_FOOTPRINT)
+    sums, gaps = np.zeros((1, kinds, SUMS), np.float32), np.zeros(1, np.float32)
+    taken = np.zeros((len(queries.u), 2), np.int64)
+    for n in range(len(taken)):
+        scratch.stops[:] = 0
+        u, v, deviation_x, deviation_y, correlation, wi, wo, bend = (column[n : n + 1] for column in columns)
+        _sum_rows(table, scratch, (u, v, deviation_x, deviation_y, correlation), wi, wo, bend, sums, gaps)
+        taken[n, 1] = (-(-scratch.stops // BLOCK_NODES)).sum() * BLOCK_NODES
+        taken[n, 0] = 0 if taken[n, 1] else table.starts[kinds] * BLOCK_NODES
+    return taken
+
+
+def _columns(queries: Queries) -> tuple[Float32, ...]:
+    """Return the columns of `sum_queries`."""
+    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo, queries.curvature)
+    return tuple(np.ascontiguousarray(column, np.float32) for column in columns)
 
 
 @allocating_kernel
@@ -62,8 +86,11 @@ def sum_queries(
     correlation: Float32,
     wi: Float32,
     wo: Float32,
+    curvature: Float32,
 ) -> tuple[Float32, Float32]:
-    """Return the sums of N queries, the viewer in front; the light is behind only if the table knows it.
+    """Return the sums of N queries, the viewer in front.
+
+    The light is behind only if the table knows it; without falls in the table, all cloth counts as flat.
 
     Parameters
     ----------
@@ -73,6 +100,8 @@ def sum_queries(
         Footprints: centre and deviations along the axes in yarn spacings, correlation of the axes.
     wi, wo : float32 (N, 3)
         Directions.
+    curvature : float32 (N,)
+        Of the cloth in the viewer's plane, 1/yarn spacings.
 
     Returns
     -------
@@ -82,7 +111,7 @@ def sum_queries(
     kinds = table.kinds[0] + table.kinds[1]
     result, gaps = np.zeros((len(u), kinds, SUMS), np.float32), np.zeros(len(u), np.float32)
     footprints = (u, v, deviation_x, deviation_y, correlation)
-    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), footprints, wi, wo, result, gaps)
+    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), footprints, wi, wo, curvature, result, gaps)
     return result, gaps
 
 
@@ -94,6 +123,7 @@ def _sum_rows(
     footprints: tuple[Float32, Float32, Float32, Float32, Float32],
     wi: Float32,
     wo: Float32,
+    curvature: Float32,
     result: Float32,
     gaps: Float32,
 ) -> None:
@@ -116,9 +146,16 @@ def _sum_rows(
             thin = shape.major > STRETCHED * shape.minor and most_nodes(shape) <= MOST
         low_i, high_i, turn_i = around(wi[n, 0], wi[n, 1])
         low_o, high_o, turn_o = around(wo[n, 0], wo[n, 1])
+        bend_i, bend_o = _0, _0
+        if curvature[n] > _0 and len(table.falls) > 0:
+            towards = directions_of(
+                np.float64(wi[n, 0]), np.float64(wi[n, 1]), np.float64(wi[n, 2]),
+                np.float64(wo[n, 0]), np.float64(wo[n, 1]), np.float64(wo[n, 2]), np.float64(curvature[n]),
+            )  # fmt: skip
+            bend_i, bend_o = np.float32(towards.light.bend), np.float32(towards.viewer.bend)
         look = Look(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
-            turn_i, low_o, high_o, turn_o,
+            turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
         if thin:
             gaps[n] = sum_ellipse(table, scratch, look, shape, result[n])

@@ -18,7 +18,7 @@ from pipeline.truth.query import Queries
 
 
 def read_behind(table: Table, queries: Queries) -> Float32:
-    """Return components and transparency of N queries about flat cloth, float32 (N, 5).
+    """Return components and transparency of N queries, float32 (N, 5); cloth is curved only if the table knows it.
 
     Parameters
     ----------

@@ -22,6 +22,7 @@ from pipeline.analytic.soft_nodes.nodes import (
     FAMILY,
     LEVELS,
     SHIFT,
+    UPPER,
     X_HIGH,
     X_LOW,
     Y_HIGH,
@@ -145,7 +146,8 @@ def _in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np
         share_x = arcsine((x - _HALF) / radius) * _INVERSE_PI + _HALF
     elif family == WEFT:
         share_y = arcsine((y - _HALF) / radius) * _INVERSE_PI + _HALF
-    return size * int(min(max(share_y * count, _0), last)) + int(min(max(share_x * count, _0), last))
+    row, column = min(max(share_y * count + UPPER, _0), last), min(max(share_x * count + UPPER, _0), last)
+    return size * int(row) + int(column)
 
 
 @kernel
@@ -233,7 +235,8 @@ def place_ellipse(
             family, first, box = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
             radius = table.yarn[family, RADIUS] if family != GAP else _1
             kind = column % of_warp if family == WARP else of_warp + row % of_weft
-            rule = min(1 + int(2.0 * half / _LENGTH), _MOST_BETWEEN)
+            # Widths of yarns are round numbers, and so may be the quotient: it must not fall below.
+            rule = min(1 + int((2.0 * half + _NEAREST) / _LENGTH), _MOST_BETWEEN)
             for i in range(rule):
                 length, at = half * _WEIGHTS[rule, i], middle + half * _PLACES[rule, i]
                 in_x, in_y = np.float32(x0 + at * dx - column), np.float32(y0 + at * dy - row)

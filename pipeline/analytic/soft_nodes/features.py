@@ -155,7 +155,7 @@ def cloth_features(table: Table) -> Float32:
 
 
 def read_queries(table: Table, queries: Queries) -> Reading:
-    """Read N queries about flat cloth, light and viewer in front.
+    """Read N queries, light and viewer in front; cloth is curved only if the table knows it.
 
     Parameters
     ----------

@@ -22,6 +22,7 @@ from pipeline.analytic.soft_nodes.nodes import (
     FAMILY,
     LEVELS,
     SHIFT,
+    UPPER,
     X_HIGH,
     X_LOW,
     Y_HIGH,
@@ -69,6 +70,8 @@ _INVERSE_ROOT = np.float32(1.0 / math.sqrt(2.0 * math.pi))
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _INVERSE_PI, _INVERSE_TURN = np.float32(1.0 / math.pi), np.float32(0.5 / math.pi)
 _VERTICAL = np.float32(0.99999)  # largest sine of v
+# The arc sine is steep at 1: a part that ends where its yarn does must end there, however a quotient is rounded.
+_OUTWARDS = np.float32(1.000001)
 _LEVELS = np.float32(LEVELS)
 
 
@@ -151,11 +154,11 @@ def place_nodes(
             sv = min(max((centre_a + _HERMITE_PLACES[k] * deviation_a) / radius, -_VERTICAL), _VERTICAL)
             cv = np.sqrt((_1 - sv) * (_1 + sv))
             line[0, k], line[1, k], line[2, k] = sv, cv, _HERMITE_WEIGHTS[k]
-            line[3, k] = min(max((arcsine(sv) * _INVERSE_PI + _HALF) * count, _0), last)
+            line[3, k] = min(max((arcsine(sv) * _INVERSE_PI + _HALF) * count + UPPER, _0), last)
             line[4, k] = _HERMITE_BOX * deviation_a / (radius * cv)
     else:
         across = nodes_for((a_high - a_low) * inverse_a, table.legendre)
-        v_low, v_high = arcsine(a_low / radius), arcsine(a_high / radius)
+        v_low, v_high = arcsine(a_low / radius * _OUTWARDS), arcsine(a_high / radius * _OUTWARDS)
         half_v, middle_v = _HALF * (v_high - v_low), _HALF * (v_high + v_low)
         area = half_v * radius * inverse_a * _INVERSE_ROOT
         for k in range(8):
@@ -164,7 +167,7 @@ def place_nodes(
             da = (radius * sv - centre_a) * inverse_a
             line[0, k], line[1, k] = sv, cv
             line[2, k] = area * _GAUSS_WEIGHTS[across, k] * cv * remaining(_HALF * da * da)
-            line[3, k] = min(max((v * _INVERSE_PI + _HALF) * count, _0), last)
+            line[3, k] = min(max((v * _INVERSE_PI + _HALF) * count + UPPER, _0), last)
             line[4, k] = half_v * _GAUSS_WEIGHTS[across, k] * _HALF
 
     # Along: place from the middle of the float, share of the footprint, cell, half a box.
@@ -173,7 +176,7 @@ def place_nodes(
         for k in range(HERMITE):
             place = centre_b + _HERMITE_PLACES[k] * deviation_b
             line[5, k], line[6, k] = place - _HALF + bounds[SHIFT], _HERMITE_WEIGHTS[k]
-            line[7, k] = min(max((place - low) / length * count, _0), last)
+            line[7, k] = min(max((place - low) / length * count + UPPER, _0), last)
             line[8, k] = _HERMITE_BOX * deviation_b
     else:
         along = nodes_for((b_high - b_low) * inverse_b, table.legendre)
@@ -184,7 +187,7 @@ def place_nodes(
             db = (place - centre_b) * inverse_b
             line[5, k] = place - _HALF + bounds[SHIFT]
             line[6, k] = area * _GAUSS_WEIGHTS[along, k] * remaining(_HALF * db * db)
-            line[7, k] = min(max((place - low) / length * count, _0), last)
+            line[7, k] = min(max((place - low) / length * count + UPPER, _0), last)
             line[8, k] = half_b * _GAUSS_WEIGHTS[along, k] * _HALF
 
     # Every pair, a line of nodes at a time.
@@ -287,11 +290,11 @@ def gap_area(
     for j in range(rows):
         place_y = middle_y + half_y * _GAUSS_PLACES[rows, j]
         dy = (place_y - at.y) * inverse_y
-        row = first + size * min(max(int((place_y - bounds[Y_LOW]) * per_y), 0), size - 1)
+        row = first + size * min(max(int((place_y - bounds[Y_LOW]) * per_y + UPPER), 0), size - 1)
         for i in range(columns):
             place_x = middle_x + half_x * _GAUSS_PLACES[columns, i]
             dx = (place_x - at.x) * inverse_x
-            cell = row + min(max(int((place_x - bounds[X_LOW]) * per_x), 0), size - 1)
+            cell = row + min(max(int((place_x - bounds[X_LOW]) * per_x + UPPER), 0), size - 1)
             low, high = np.float32(viewer.grid[cell + viewer.low]), np.float32(viewer.grid[cell + viewer.high])
             density = remaining(_HALF * (dx * dx + dy * dy))
             share = _GAUSS_WEIGHTS[rows, j] * _GAUSS_WEIGHTS[columns, i]

@@ -20,6 +20,8 @@ class Look(NamedTuple):
         wi and wo.
     low_i, high_i, turn_i, low_o, high_o, turn_o
         Azimuths around wi and wo, and where between them these lie.
+    bend_i, bend_o : float32
+        Curvatures of the cloth towards wi and wo, 1/yarn spacings.
     """
 
     x: float
@@ -40,3 +42,5 @@ class Look(NamedTuple):
     low_o: int
     high_o: int
     turn_o: np.float32
+    bend_i: np.float32
+    bend_o: np.float32

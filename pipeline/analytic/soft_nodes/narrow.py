@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.analytic.axis_densities import NARROW
+from pipeline.analytic.curved_horizons import bend_cells, bend_of
 from pipeline.analytic.soft_horizons import sharpness_of_points
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, place_ellipse, sharpness_of
@@ -74,7 +75,8 @@ def _place_round(
 ) -> np.float32:  # fmt: skip
     """Place nodes in every piece that a footprint along the axes touches; return the area seen through gaps.
 
-    The footprint ends at `reach` deviations and is cut into `parts` along each axis, which have nodes of their own.
+    The footprint ends at `reach` deviations and is cut into `parts` along each axis, which have nodes of their own. For
+    gaps, which both sides of the cloth hide, it counts as flat.
     """
     ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
     of_warp, of_weft, per_azimuth = table.kinds[0], table.kinds[1], size * size
@@ -118,6 +120,9 @@ def _shade(table: Table, scratch: Scratch, look: Look, sharp: np.float32, result
         count = fill_block(scratch.nodes[kind], scratch.cells[kind], scratch.stops[kind])
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
+        if look.bend_o > _0:
+            _shade_curved(table, scratch, look, sharp, kind, count, result)
+            continue
         if look.iz < _0:
             through = shade_footprint_behind(
                 nodes, cells, GridHorizons(scratch.behind_grid, low_i, high_i, look.turn_i), viewer, sharp, d,
@@ -132,6 +137,41 @@ def _shade(table: Table, scratch: Scratch, look: Look, sharp: np.float32, result
         )  # fmt: skip
         for q in range(SUMS):
             result[kind, q] = found[q]
+
+
+# Not in `_shade`: flat cloth is not to wait for it.
+@kernel
+def _shade_curved(
+    table: Table, scratch: Scratch, look: Look, sharp: np.float32, kind: int, count: int, result: Float32
+) -> None:  # fmt: skip
+    """Write the sums over the placed nodes of a kind of yarn, over curved cloth."""
+    family = 0 if kind < table.kinds[0] else 1
+    low_i, high_i = _offsets(table, look.low_i, look.high_i)
+    low_o, high_o = _offsets(table, look.low_o, look.high_o)
+    nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
+    horizons, order, yarn = scratch.curved_narrow, scratch.order[:count], table.yarn[family]
+    light, viewer = bend_of(look.bend_i), bend_of(look.bend_o)
+    # Lights behind are hidden by the back, which counts as flat.
+    grid = scratch.grid if look.iz > _0 else scratch.behind_grid
+    light = light if look.iz > _0 else bend_of(_0)
+    bend_cells(grid, scratch.grid_falls, cells, low_i, high_i, look.turn_i, light, horizons[:count])
+    bend_cells(
+        scratch.grid, scratch.grid_falls, cells, low_o, high_o, look.turn_o, viewer, horizons[count : 2 * count]
+    )  # fmt: skip
+    d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
+    of_light = GridHorizons(horizons, np.uint32(0), np.uint32(0), _0)
+    of_viewer = GridHorizons(horizons, np.uint32(count), np.uint32(count), _0)
+    if look.iz < _0:
+        through = shade_footprint_behind(nodes, order, of_light, of_viewer, sharp, d, yarn, thickness)
+        for q in range(len(through)):
+            result[kind, q] = through[q]
+        return
+    found = shade_footprint(
+        nodes, order, horizons, of_light.low, of_light.high, _0, of_viewer.low, of_viewer.high, _0, sharp, d, yarn,
+        thickness,
+    )  # fmt: skip
+    for q in range(SUMS):
+        result[kind, q] = found[q]
 
 
 @inlined_kernel

@@ -11,11 +11,12 @@ different pieces there are, the coarser they are, so that a table stays near a m
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.curved_horizons import CURVATURES, FALL
 from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
 from pipeline.analytic.soft_horizons import over_boxes
 from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
@@ -24,7 +25,7 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
 from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
 from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
-from pipeline.truth.cloth import cloth_side
+from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import Piece, cell_pieces
@@ -38,9 +39,15 @@ BLOCK_NODES: Final = 16
 LEVELS: Final = 255.0
 """Largest value of a grid, for a horizon straight above."""
 
+UPPER: Final = np.float32(4e-3)
+"""Cells of a grid: a place so near below the border of two belongs to the upper one. The middle of a piece is such a
+border and often a node; how a processor rounds must not decide."""
+
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
-_EVEN = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
+EVEN: Final = 0.42
+"""Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
+
 _SHARPEST = 0.02  # least spread of a horizon
 
 # Columns of `Table.groups`.
@@ -99,6 +106,9 @@ class Table(NamedTuple):
     behind_mean, behind_sharpness, behind_grid
         The same of the back of the cloth at the same places, its tangent planes included: above them the back sees
         light from behind. Of no nodes and no grids if the table was built without.
+    falls, grid_falls : float32 (curvatures, AZIMUTHS, B, BLOCK_NODES), uint8 (curvatures, …)
+        Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
+        built without.
     legendre : int
         Most nodes along each axis of a piece that a narrow footprint covers in part.
     narrow : float32
@@ -135,6 +145,8 @@ class Table(NamedTuple):
     behind_mean: Float32
     behind_sharpness: Float32
     behind_grid: npt.NDArray[np.uint8]
+    falls: Float32
+    grid_falls: npt.NDArray[np.uint8]
     legendre: int
     narrow: np.float32
 
@@ -144,11 +156,13 @@ class Table(NamedTuple):
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 
-def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL) -> Table:
+def tabulate(
+    fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False
+) -> Table:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
-    With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind.
-    `level` is one of DETAILS.
+    With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
+    with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS.
     """
     detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
@@ -159,7 +173,11 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
     samples = located.samples
     size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
     x, y, gap = _grid_places(samples, size)
-    grid = _grids(horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS), size)
+    sines = horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS)
+    grid = _grids(sines, size)
+    grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)
+    for own, curvature in zip(grid_falls, CURVATURES, strict=False):
+        own[:] = _falls(sines, horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature), curvature, size)
     behind_grid = grid[:0]
     if behind:
         slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
@@ -182,11 +200,14 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
     nodes = np.tile(LEVEL[:, None], stop)
     evenly, (mean, variance) = np.zeros(stop), _no_horizons(stop)
     behind_mean, behind_variance = _no_horizons(stop if behind else 0)
+    falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
     for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
         indices = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
         evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
         mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
+        for of_nodes, of_grid in zip(falls, grid_falls, strict=True):
+            of_nodes[:, indices], _ = _soft_horizons(group, across, along, of_grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
     axes = _by_axis(groups, rules)
@@ -196,22 +217,19 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    def in_blocks(values: Float64) -> Float32:
-        return np.ascontiguousarray(values.reshape(*values.shape[:-1], -1, BLOCK_NODES), np.float32)
-
     return Table(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         float_length=_float_lengths(front),
-        uniform=_EVEN * (max(ends, picks) if by_thread else longest_period(front)),
+        uniform=EVEN * (max(ends, picks) if by_thread else longest_period(front)),
         waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
         kinds=np.array(kinds, np.int64),
-        nodes=np.ascontiguousarray(in_blocks(nodes).transpose(1, 0, 2)),
-        evenly=in_blocks(evenly),
-        mean=in_blocks(mean),
-        sharpness=in_blocks(_sharpness(variance)),
+        nodes=np.ascontiguousarray(_in_blocks(nodes).transpose(1, 0, 2)),
+        evenly=_in_blocks(evenly),
+        mean=_in_blocks(mean),
+        sharpness=_in_blocks(_sharpness(variance)),
         groups=_group_rows(groups, first_nodes, axes),
         lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
@@ -223,16 +241,46 @@ def tabulate(fabric: Fabric, by_thread: bool = False, behind: bool = False, leve
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
-        piece_starts=np.array(located.starts, np.int64),
-        pieces=np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
-        bounds=np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+        **_piece_columns(located),
         grid=grid,
-        behind_mean=in_blocks(behind_mean),
-        behind_sharpness=in_blocks(_sharpness(behind_variance)),
+        behind_mean=_in_blocks(behind_mean),
+        behind_sharpness=_in_blocks(_sharpness(behind_variance)),
         behind_grid=behind_grid,
+        falls=_in_blocks(falls),
+        grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
     )
+
+
+def _in_blocks(values: Float64) -> Float32:
+    """Return numbers of nodes, (..., nodes), by blocks."""
+    blocks = values.shape[-1] // BLOCK_NODES
+    return np.ascontiguousarray(values.reshape(*values.shape[:-1], blocks, BLOCK_NODES), np.float32)
+
+
+class PieceGrids(NamedTuple):
+    """The pieces of a cloth and their grids of horizons alone: columns of `Table` of the same names.
+
+    Attributes
+    ----------
+    piece_starts, pieces : int64 (cells + 1,), (P, 2)
+    bounds : float32 (P, 7)
+    grid : uint8 (grids, AZIMUTHS, size, size)
+    """
+
+    piece_starts: Index
+    pieces: Index
+    bounds: Float32
+    grid: npt.NDArray[np.uint8]
+
+
+def tabulate_pieces(model: ClothSide, size: int) -> PieceGrids:
+    """Return the pieces of one side of a cloth, and grids of `size` cells along each axis."""
+    located = _locate(model.front)
+    x, y, gap = _grid_places(located.samples, size)
+    grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
+    return PieceGrids(**_piece_columns(located), grid=grid)
 
 
 class _Located(NamedTuple):
@@ -257,6 +305,15 @@ def _locate(front: HeightField) -> _Located:
             found.pieces.append(((end, pick), piece, blocks[key]))
         found.starts.append(len(found.pieces))
     return found
+
+
+def _piece_columns(located: _Located) -> dict[str, Any]:
+    """Return the columns of `Table` about pieces."""
+    return {
+        "piece_starts": np.array(located.starts, np.int64),
+        "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
+        "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+    }
 
 
 class _AxisRules(NamedTuple):
@@ -348,6 +405,11 @@ def _grids(sines: Float64, size: int) -> npt.NDArray[np.uint8]:
     """Return grids from the sines of horizons at azimuths even in the angle."""
     grids = from_even(sines).reshape(AZIMUTHS, -1, size, size).transpose(1, 0, 2, 3)
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
+
+
+def _falls(flat: Float64, bent: Float64, curvature: float, size: int) -> npt.NDArray[np.uint8]:
+    """Return grids of falls from the sines of horizons over a flat and a curved base, as shares."""
+    return _grids(np.clip((flat - bent) / (FALL * curvature), 0.0, 1.0), size)
 
 
 def _soft_horizons(

@@ -45,8 +45,14 @@ class Scratch(NamedTuple):
         Number of them.
     line, offsets : float32 (LINE_ROWS, 8), uint32 (8,)
         See `place_nodes`.
-    grid, behind_grid : uint8
+    grid, behind_grid, grid_falls : uint8
         Those of the table, flat.
+    curved : float32 (2, B, BLOCK_NODES)
+        Horizons of the fixed nodes towards light and viewer, over curved cloth.
+    curved_narrow : float32 (2 most,)
+        The same of nodes placed in the footprint, of one kind of yarn; levels.
+    order : uint32 (most,)
+        Numbers from 0 on.
     """
 
     weight: Float32
@@ -68,6 +74,10 @@ class Scratch(NamedTuple):
     offsets: npt.NDArray[np.uint32]
     grid: npt.NDArray[np.uint8]
     behind_grid: npt.NDArray[np.uint8]
+    grid_falls: npt.NDArray[np.uint8]
+    curved: Float32
+    curved_narrow: Float32
+    order: npt.NDArray[np.uint32]
 
 
 @allocating_kernel
@@ -97,4 +107,8 @@ def scratch_for(table: Table, most: int) -> Scratch:
         np.zeros(8, np.uint32),
         table.grid.reshape(table.grid.size),
         table.behind_grid.reshape(table.behind_grid.size),
+        table.grid_falls.reshape(len(table.grid_falls), table.grid.size if len(table.grid_falls) else 0),
+        np.zeros((2, fixed, BLOCK_NODES), np.float32),
+        np.zeros(2 * room, np.float32),
+        np.arange(room).astype(np.uint32),
     )

@@ -128,9 +128,12 @@ class Horizons(NamedTuple):
 
 
 class GridHorizons(NamedTuple):
-    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction."""
+    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction.
 
-    grid: npt.NDArray[np.uint8]
+    Over curved cloth each node has a cell of its own, a number in single precision.
+    """
+
+    grid: npt.NDArray[np.uint8] | Float32
     low: np.uint32
     high: np.uint32
     turn: np.float32
@@ -311,7 +314,7 @@ def shade_fixed_behind(
 def shade_footprint(
     nodes: Float32,
     cells: npt.NDArray[np.uint32],
-    grid: npt.NDArray[np.uint8],
+    grid: npt.NDArray[np.uint8] | Float32,
     low_i: np.uint32,
     high_i: np.uint32,
     turn_i: np.float32,

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.analytic.axis_densities import axis_densities
+from pipeline.analytic.curved_horizons import bend_of, bend_rows
 from pipeline.analytic.soft_nodes.footprint_nodes import REACH
 from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.nodes import Table
@@ -104,6 +105,12 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
     else:
         _mix_densities(table, scratch, look, widest)
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
+    mean, low_i, high_i, low_o, high_o = table.mean, look.low_i, look.high_i, look.low_o, look.high_o
+    if look.bend_o > _0:
+        bend_rows(mean, table.falls, low_o, high_o, look.turn_o, bend_of(look.bend_o), scratch.curved[1])
+        if look.iz > _0:
+            bend_rows(mean, table.falls, low_i, high_i, look.turn_i, bend_of(look.bend_i), scratch.curved[0])
+        mean, low_i, high_i, low_o, high_o = scratch.curved, 0, 0, 1, 1
     near_i = look.high_i if look.turn_i > _HALF else look.low_i
     near_o = look.high_o if look.turn_o > _HALF else look.low_o
     for kind in range(kinds):
@@ -116,9 +123,7 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
                 table.behind_mean[look.low_i, a:b], table.behind_mean[look.high_i, a:b],
                 table.behind_sharpness[near_i, a:b], look.turn_i,
             )  # fmt: skip
-            viewer = Horizons(
-                table.mean[look.low_o, a:b], table.mean[look.high_o, a:b], table.sharpness[near_o, a:b], look.turn_o
-            )
+            viewer = Horizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
             through = shade_fixed_behind(
                 table.nodes[a:b], shares[a:b], light, viewer, d, alpha, np.float32(table.thickness), blend
             )
@@ -126,8 +131,8 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
                 result[kind, q] = through[q]
             continue
         found = shade_fixed(
-            table.nodes[a:b], shares[a:b], table.mean[look.low_i, a:b], table.mean[look.high_i, a:b],
-            table.sharpness[near_i, a:b], look.turn_i, table.mean[look.low_o, a:b], table.mean[look.high_o, a:b],
+            table.nodes[a:b], shares[a:b], mean[low_i, a:b], mean[high_i, a:b],
+            table.sharpness[near_i, a:b], look.turn_i, mean[low_o, a:b], mean[high_o, a:b],
             table.sharpness[near_o, a:b], look.turn_o, d, alpha, np.float32(table.thickness), blend,
         )  # fmt: skip
         for q in range(SUMS):
@@ -136,6 +141,6 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
     if b == a:
         return _0
     return shade_gaps(
-        shares[a:b], table.mean[look.low_o, a:b], table.mean[look.high_o, a:b], table.sharpness[near_o, a:b],
+        shares[a:b], mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b],
         look.turn_o, look.oz,
     )  # fmt: skip

@@ -6,6 +6,9 @@ component:
 
     features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the soft nodes
 
+A second, smaller network estimates the error of this answer, and of one by the finest soft nodes (`error_network`).
+Both decide who answers a query where a largest error is wished (`adaptive`).
+
 Factors lie between 0 and 2 and begin at 1: an untrained network is the soft nodes, and colours, highlights and the
 repeat of a cloth need not be learnt. With `bound` no component exceeds the soft nodes' answer without shadows of the
 light, and diffuse light returns at most what arrives (pipeline.analytic.soft_nodes.features).
@@ -18,7 +21,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,17 +43,34 @@ from pipeline.models.method import CHUNK, Batch
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
 from pipeline.models.plain import refuse_other
+from pipeline.models.selvage.adaptive import Adaptive
+from pipeline.models.selvage.error_network import FLOOR, SLOPE, ErrorNetwork, colour_weights
 from pipeline.models.selvage.options import SelvageOptions
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-_SLOPE = 0.01
 _LARGEST = 2.0  # factor
 _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
 _LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
 _COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
+
+
+class _Read(NamedTuple):
+    """A batch as the network sees it: features, components and bounds (n, 4), those of the finest nodes, targets."""
+
+    features: Tensor
+    components: Tensor
+    bounds: Tensor
+    finest: Tensor
+    target: Tensor
+
+    def exchanged(self) -> _Read:
+        """Return the batch with x and y, warp and weft exchanged."""
+        sign = torch.from_numpy(EXCHANGED_SIGN).to(self.features.device)
+        features, *others = self
+        return _Read(features[:, EXCHANGED.tolist()] * sign, *(x[:, list(_COMPONENTS)] for x in others))
 
 
 class SelvageNetwork(nn.Module):
@@ -76,31 +96,40 @@ class SelvageNetwork(nn.Module):
         self.scale: Tensor
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
+        self.errors = ErrorNetwork(options, FEATURES)
         self._tables = [tabulate(fabric, level=options.level) for fabric in fabrics]
+        self._finest = [tabulate(fabric, level=options.finest) for fabric in fabrics]
         if fabrics:
             self._measure(fabrics)
 
     def forward(self, features: Tensor, components: Tensor, bounds: Tensor) -> Tensor:
         """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) of the soft nodes."""
-        x = (features - self.mean) * self.scale
+        x = self._normalised(features)
         for layer in self.hidden:
-            x = functional.leaky_relu(layer(x), _SLOPE)
+            x = functional.leaky_relu(layer(x), SLOPE)
         factors: Tensor = _LARGEST * torch.sigmoid(self.last(x))
         answer = components * factors
         return torch.minimum(answer, bounds) if self.options.bound else answer
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the loss of the correction, and that of the estimated errors times its weight."""
+        read = self._read(batch)
+        if self.options.exchange and random.integers(2):
+            read = read.exchanged()
+        answer = self(read.features, read.components, read.bounds)
+        colours = read.target.new_tensor(colour_weights(self.options))
+        # The estimate teaches the correction nothing.
+        with torch.no_grad():
+            colour = answer @ colours
+            both = torch.stack([colour, read.finest @ colours], dim=-1) - (read.target @ colours)[:, None]
+            errors = both / (colour + FLOOR)[:, None]
+        estimate = self.errors.loss(self._normalised(read.features), errors)
+        return self.correction_loss(answer, read.target) + self.options.error_weight * estimate
+
+    def correction_loss(self, answer: Tensor, target: Tensor) -> Tensor:
         """Return the squared errors of components and colour, over the colour: dark patches count too."""
-        options = self.options
-        features, components, bounds = self._read(batch)
-        target = batch.target.flatten(0, 1)
-        if options.exchange and random.integers(2):
-            sign = torch.from_numpy(EXCHANGED_SIGN).to(features.device)
-            features = features[:, EXCHANGED.tolist()] * sign
-            components, bounds, target = (x[:, list(_COMPONENTS)] for x in (components, bounds, target))
-        specular, diffuse = options.specular_colour, options.diffuse_colour
-        colours = target.new_tensor([specular, specular, diffuse, diffuse])
-        error = (self(features, components, bounds) - target) * colours
+        options, colours = self.options, target.new_tensor(colour_weights(self.options))
+        error = (answer - target) * colours
         squared = error.square().sum(dim=-1) + options.colour_weight * error.sum(dim=-1).square()
         loss: Tensor = (squared / (target @ colours + options.dark)).mean()
         return loss
@@ -120,14 +149,23 @@ class SelvageNetwork(nn.Module):
         layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
         return {"parameters": {"total": sum(weight.numel() for weight in self.parameters())}, "layers": layers}
 
-    def _read(self, batch: Batch) -> tuple[Tensor, ...]:
-        """Return features, components and bounds of all rows of a batch, computed on the CPU."""
+    def _normalised(self, features: Tensor) -> Tensor:
+        """Return features of mean 0 and deviation 1 over the training queries."""
+        return (features - self.mean) * self.scale
+
+    def _read(self, batch: Batch) -> _Read:
+        """Return what the nodes of all rows of a batch give, computed on the CPU."""
         found = []
         for row, fabric in enumerate(batch.fabric.tolist()):
-            columns = (getattr(batch, name)[row].numpy(force=True) for name in Queries._fields)
-            found.append(read_queries(self._tables[fabric], Queries(*columns)))
+            queries = Queries(*(getattr(batch, name)[row].numpy(force=True) for name in Queries._fields))
+            found.append(
+                (
+                    *read_queries(self._tables[fabric], queries),
+                    read_queries(self._finest[fabric], queries).components,
+                )
+            )
         parts = (torch.from_numpy(np.concatenate(columns)) for columns in zip(*found, strict=True))
-        return tuple(part.to(batch.u.device) for part in parts)
+        return _Read(*(part.to(batch.u.device) for part in (*parts, batch.target.flatten(0, 1))))
 
     def _measure(self, fabrics: Sequence[Fabric]) -> None:
         """Measure mean and spread of the features over queries of all fabrics, before and after the exchange."""
@@ -139,6 +177,14 @@ class SelvageNetwork(nn.Module):
         features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN]).astype(np.float64)
         self.mean.copy_(torch.from_numpy(features.mean(axis=0)))
         self.scale.copy_(torch.from_numpy(1.0 / (features.std(axis=0) + _LEAST_SPREAD)))
+
+
+class _Cloth(NamedTuple):
+    """A fabric's table, and the biases of the first layers of the correction and of the estimate."""
+
+    table: Table
+    bias: Tensor
+    estimate_bias: Tensor
 
 
 class Selvage:
@@ -169,7 +215,11 @@ class Selvage:
             weight = first.weight * network.scale
             self._first = weight.t().contiguous(), first.bias - weight @ network.mean
             self._others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
+            weight = network.errors.hidden.weight * network.scale
+            self._estimating = weight.t().contiguous(), network.errors.hidden.bias - weight @ network.mean
+            self._estimates = network.errors.last.weight.t().contiguous(), network.errors.last.bias.clone()
         self._of_query = self._first[0][:OF_QUERY].contiguous()
+        self._estimating_of_query = self._estimating[0][:OF_QUERY].contiguous()
         self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
@@ -186,7 +236,7 @@ class Selvage:
         Light from behind is answered by the soft nodes alone.
         """
         behind = queries.wi[:, 2] < 0.0
-        self._refuse(queries, behind=True)
+        refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
         if not behind.any():
             return self._corrected(fabric, queries)
         result = np.empty((len(behind), 4), np.float32)
@@ -204,13 +254,13 @@ class Selvage:
 
     def per_query(self, fabric: Fabric) -> PerQuery:
         """Return the network; the soft nodes are summed before it, and the bias of the fabric is its constant."""
-        table, bias = self._cloths.of(fabric)
+        cloth = self._cloths.of(fabric)
 
         def inputs(queries: Queries) -> Columns:
-            features, components, bounds = read_queries(table, queries)
+            features, components, bounds = read_queries(cloth.table, queries)
             return np.ascontiguousarray(features[:, :OF_QUERY]), components, bounds
 
-        return PerQuery(self._refuse, inputs, self._answering, (bias,))
+        return PerQuery(self._refuse, inputs, self._answering, (cloth.bias,))
 
     def with_bound(self, bound: bool) -> Selvage:
         """Return the same network, bounded in energy or not."""
@@ -222,39 +272,67 @@ class Selvage:
         """Answer from features, components and bounds of the soft nodes, and the bias of the fabric."""
         x = torch.addmm(bias, features, self._of_query)
         for weight, shift in self._others:
-            x = torch.addmm(shift, functional.leaky_relu(x, _SLOPE), weight)
+            x = torch.addmm(shift, functional.leaky_relu(x, SLOPE), weight)
         answer = _LARGEST * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
-    def _refuse(self, queries: Queries, behind: bool = False) -> None:
-        """Refuse queries of kinds that it does not know; `behind` lets light come from behind."""
-        refuse_other(queries, self.name, stretch=True, behind=behind)
+    def _refuse(self, queries: Queries) -> None:
+        """Refuse queries of kinds that the network does not know."""
+        refuse_other(queries, self.name, stretch=True)
 
-    def _corrected(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
-        """Answer by the soft nodes and the network."""
-        table, bias = self._cloths.of(fabric)
+    def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Answer N queries lit from the front, and estimate errors as those of flat cloth.
+
+        Returns
+        -------
+        float32 (N, 4), float32 (N, 2)
+            Components; relative errors of a grey cloth's colour, root mean squares, of these components and of those by
+            the finest soft nodes (`error_network`).
+        """
+        refuse_other(queries, self.name, stretch=True, curvature=True)
+        errors = np.empty((len(queries.u), 2), np.float32)
+        return self._corrected(fabric, queries, errors), errors
+
+    def within(self, error: float) -> Adaptive:
+        """Return the method that answers by more nodes where the estimated error exceeds a relative error."""
+        return Adaptive(self, self._network.options.finest, error)
+
+    def _corrected(
+        self, fabric: Fabric, queries: Queries, errors: npt.NDArray[np.float32] | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Answer by the soft nodes and the network; write estimated `errors` (N, 2), if an array is given."""
+        cloth = self._cloths.of(fabric)
+        table = self._nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK):
                 rows = slice(start, start + CHUNK)
                 features, components, bounds = read_queries(table, queries.take(rows))
-                x = torch.addmm(bias, torch.from_numpy(features)[:, :OF_QUERY], self._of_query)
+                of_query = torch.from_numpy(features)[:, :OF_QUERY]
+                x = torch.addmm(cloth.bias, of_query, self._of_query)
                 for weight, shift in self._others:
-                    x = torch.addmm(shift, functional.leaky_relu_(x, _SLOPE), weight)
+                    x = torch.addmm(shift, functional.leaky_relu_(x, SLOPE), weight)
                 x.sigmoid_().mul_(_LARGEST)
                 np.multiply(x.numpy(), components, out=result[rows])
                 if self.bound:
                     np.minimum(result[rows], bounds, out=result[rows])
+                if errors is not None:
+                    hidden = torch.addmm(cloth.estimate_bias, of_query, self._estimating_of_query)
+                    weight, shift = self._estimates
+                    logarithms = torch.addmm(shift, functional.leaky_relu_(hidden, SLOPE), weight)
+                    errors[rows] = logarithms.mul_(0.5).exp_().numpy()
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table and of the network."""
-        return self._cloths.of(fabric)[0].nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        return self._cloths.of(fabric).table.nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
 
-    def _tabulate(self, fabric: Fabric) -> tuple[Table, Tensor]:
-        """Return a fabric's table, and the bias of the first layer with all that the fabric alone decides."""
-        table, (weight, bias) = tabulate(fabric, level=self._network.options.level), self._first
-        return table, bias + torch.from_numpy(cloth_features(table)) @ weight[OF_QUERY:]
+    def _tabulate(self, fabric: Fabric) -> _Cloth:
+        """Return a fabric's table, and the biases of the first layers with all that the fabric alone decides."""
+        table = tabulate(fabric, level=self._network.options.level)
+        own = torch.from_numpy(cloth_features(table))
+        biases = (bias + own @ weight[OF_QUERY:] for weight, bias in (self._first, self._estimating))
+        return _Cloth(table, *biases)
 
 
 def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:

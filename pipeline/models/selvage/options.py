@@ -14,8 +14,9 @@ class SelvageOptions(Options):
     """Soft nodes corrected by a residual perceptron: one network for many fabrics and scales; own design."""
 
     seconds: ClassVar[tuple[float, float]] = (4e-6, 1.5e-6)
-    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind"})
+    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
     answers_outside: ClassVar[bool] = True
+    estimates_errors: ClassVar[bool] = True
     turns: ClassVar[bool] = True
 
     model: Literal["selvage"] = "selvage"
@@ -28,6 +29,12 @@ class SelvageOptions(Options):
     """Hidden layers."""
     level: Level = 2
     """Level of detail of its soft nodes."""
+    finest: Level = 8
+    """Level of detail of the soft nodes whose error is estimated beside its own."""
+    error_width: Literal[16, 32, 64] = 32
+    """Width of the hidden layer of the network that estimates errors."""
+    error_weight: Weight = 1e-5
+    """Weight of the loss of the estimated errors, which share no weights with the correction."""
     exchange: bool = True
     """Exchange warp and weft in a random half of the training steps."""
     measured_rows: int = Field(default=1024, ge=16, le=2**20)

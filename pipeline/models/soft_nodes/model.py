@@ -3,7 +3,8 @@
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
 (pipeline.analytic.soft_nodes); a query becomes one sum over them and costs from half a microsecond to two, by the level
 of detail. The error is one to three per cent of the answer for a wide footprint, and more for a narrow one. Light from
-behind and transparency need the horizons of the back too: they are tabulated at the first such query.
+behind and transparency need the horizons of the back too, and curved cloth those of some curvatures: they are
+tabulated at the first such query.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.behind import read_behind
 from pipeline.analytic.soft_nodes.detail import USUAL
 from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.analytic.soft_nodes.nodes import Table, tabulate
 from pipeline.models.method import CHUNK
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
@@ -43,6 +44,7 @@ class SoftNodes:
         self.name, self.setting = name, f"k = {level}"
         self._tables = PerFabric(lambda fabric: tabulate(fabric, level=level))
         self._behind = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level))
+        self._curved = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level, curved=True))
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -54,7 +56,7 @@ class SoftNodes:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know."""
-        refuse_other(queries, self.name, stretch=True, behind=True)
+        refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
         behind = queries.wi[:, 2] < 0.0
         if not behind.any():
             return self._front(fabric, queries)
@@ -65,7 +67,7 @@ class SoftNodes:
 
     def behind(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""
-        table, result = self._behind.of(fabric), np.empty((len(queries.u), 5), np.float32)
+        table, result = self.table_for(fabric, queries), np.empty((len(queries.u), 5), np.float32)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)
             result[rows] = read_behind(table, queries.take(rows))
@@ -75,16 +77,22 @@ class SoftNodes:
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
         return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
 
+    def table_for(self, fabric: Fabric, queries: Queries) -> Table:
+        """Return the smallest table that knows all queries; every table answers what it knows by the same bits."""
+        if (queries.curvature > 0.0).any():
+            return self._curved.of(fabric)
+        return (self._behind if (queries.wi[:, 2] < 0.0).any() else self._tables).of(fabric)
+
     def _front(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
         """Answer N queries with the light in front."""
-        table, result = self._tables.of(fabric), np.empty((len(queries.u), 4), np.float32)
+        table, result = self.table_for(fabric, queries), np.empty((len(queries.u), 4), np.float32)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)
             result[rows] = read_queries(table, queries.take(rows)).components
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of the table; with light from behind it is twice as large."""
+        """Return the bytes of the table; light from behind doubles it, curved cloth makes it five times as large."""
         return self._tables.of(fabric).nbytes
 
 

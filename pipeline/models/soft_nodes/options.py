@@ -31,5 +31,5 @@ class SoftNodesOptions(Options):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Footprints of any shape, and light from behind."""
-        return frozenset({"stretch", "behind"})
+        """Footprints of any shape, light from behind, and curved cloth."""
+        return frozenset({"stretch", "behind", "curvature"})

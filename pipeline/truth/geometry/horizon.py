@@ -1,7 +1,7 @@
 """Horizons: the least slope of a ray that leaves the cloth, for points and azimuths, tabulated once for many queries.
 
 The slope of the horizon is the greatest (h(s) - z) / s over everything that a ray crosses. Within a cell h is concave
-(heightfield), so that the slope rises and then falls.
+(heightfield), so that the slope rises and then falls. On a base that falls away by kappa s^2 / 2, h is less by that.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ def _slope_of_top(
     b: float,
     cell: Cell,
     best: float,
+    curvature: float,
 ) -> float:
     """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
 
@@ -69,14 +70,14 @@ def _slope_of_top(
 
     a = max(a, _NEAREST)
     low, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + a * dx, y + a * dy)
-    rise_a = slope_x * dx + slope_y * dy
-    low -= z
+    rise_a = slope_x * dx + slope_y * dy - curvature * a
+    low -= z + 0.5 * curvature * a * a
     fall_a = low - a * rise_a
     if fall_a >= 0.0:
         return max(best, low / a)
     high, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + b * dx, y + b * dy)
-    rise_b = slope_x * dx + slope_y * dy
-    high -= z
+    rise_b = slope_x * dx + slope_y * dy - curvature * b
+    high -= z + 0.5 * curvature * b * b
     fall_b = high - b * rise_b
     if fall_b <= 0.0:
         return max(best, high / b)
@@ -96,8 +97,8 @@ def _slope_of_top(
         theta = first + (last - first) * share
         s = middle - half * math.cos(theta)
         height, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + s * dx, y + s * dy)
-        height -= z
-        rise = slope_x * dx + slope_y * dy
+        height -= z + 0.5 * curvature * s * s
+        rise = slope_x * dx + slope_y * dy - curvature * s
         best = max(best, height / s)
         fall = (height - s * rise) * math.sin(theta)
         if fall < 0.0:
@@ -118,24 +119,32 @@ def _slope_of_strip(
     a: float,
     b: float,
     cell: Cell,
+    best: float,
+    curvature: float,
 ) -> float:
-    """Return the greatest slope to the yarn beneath between distances a and b; tested at `_STRIP_POINTS` points."""
+    """Return the greatest slope to the yarn beneath between distances a and b, or `best` if that is greater.
+
+    It is tested at `_STRIP_POINTS` points.
+    """
     end, pick, column, row = cell.end, cell.pick, cell.column, cell.row
     family = 1 - int(field.top[pick, end])
-    best = 0.0
     a, b = span_over(field, family, x, y, dx, dy, a, b, column, row)
     if b < a:
         return best
     for k in range(_STRIP_POINTS):
         s = max(a + (b - a) * k / (_STRIP_POINTS - 1.0), _NEAREST)
         height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
-        best = max(best, (height - z) / s)
+        best = max(best, (height - z) / s - 0.5 * curvature * s)
     return best
 
 
 @kernel
-def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: float, dy: float) -> float:
-    """Return the slope >= 0 above which the point (x, y, z) is visible in the azimuth (dx, dy), its own float left out.
+def horizon(
+    field: HeightField, x: float, y: float, z: float, side: int, dx: float, dy: float, curvature: float = 0.0
+) -> float:  # fmt: skip
+    """Return the slope above which the point (x, y, z) is visible in the azimuth (dx, dy), its own float left out.
+
+    It is >= 0 over a flat base.
 
     Parameters
     ----------
@@ -147,24 +156,35 @@ def horizon(field: HeightField, x: float, y: float, z: float, side: int, dx: flo
         TOP for a point on the yarn on top; else UNDER.
     dx, dy : float
         Unit azimuth.
+    curvature : float
+        Of the base along the azimuth, >= 0.
     """
     picks, ends = field.top.shape
     stride_x, stride_y = stride(dx), stride(dy)
     cell = first_cell(x, y, dx, dy, stride_x, stride_y)
     own_family, own_yarn, own_centre = float_on_top(field, cell)
-    best, distance = 0.0, 0.0
-    while distance <= _FARTHEST and field.highest - z > max(best, _FLATTEST) * distance:
+    # A ray below the first value meets the base at the cloth's lowest point.
+    best = 0.0 if curvature == 0.0 else -math.sqrt(2.0 * curvature * max(z - field.lowest, 0.0))
+    distance = 0.0
+    while distance <= _FARTHEST:
+        fallen = 0.5 * curvature * distance * distance
+        least = max(best, _FLATTEST) if curvature == 0.0 else best
+        # Over a curved base nothing is nearer to the best ray than where that turns.
+        if field.highest - z <= least * distance + fallen and best + curvature * distance >= 0.0:
+            break
         leave = min(cell.next_x, cell.next_y)
-        if field.crown[cell.pick, cell.end] - z > best * distance and leave > distance:
+        nearest = distance if curvature == 0.0 else min(max(-best / curvature, distance), leave)
+        reached = best * nearest + 0.5 * curvature * nearest * nearest
+        if field.crown[cell.pick, cell.end] - z > reached and leave > distance:
             family, yarn, centre = float_on_top(field, cell)
             is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
             enter, exit_ = span_on_top(field, cell, x, y, dx, dy, distance, leave)
             if enter > distance:
-                best = max(best, _slope_of_strip(field, x, y, z, dx, dy, distance, enter, cell))
+                best = _slope_of_strip(field, x, y, z, dx, dy, distance, enter, cell, best, curvature)
             if leave > exit_:
-                best = max(best, _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, cell))
+                best = _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, cell, best, curvature)
             if exit_ > enter and not is_own:
-                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, cell, best)
+                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, cell, best, curvature)
         distance = leave
         cell = next_cell(cell, dx, dy, stride_x, stride_y, ends, picks)
     return best
@@ -177,10 +197,12 @@ def horizons(
     y: Float64,
     azimuths: int,
     own_plane: bool,
+    curvature: float = 0.0,
 ) -> Float32:
     """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
 
-    Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. Shape (azimuths, points).
+    Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. The base has the `curvature` in
+    all azimuths. Shape (azimuths, points).
     """
     slopes = np.zeros((azimuths, len(x)), np.float32)
     for k in range(len(x)):
@@ -190,7 +212,7 @@ def horizons(
         for a in range(azimuths):
             turn = 2.0 * math.pi * a / azimuths
             dx, dy = math.cos(turn), math.sin(turn)
-            slopes[a, k] = horizon(field, x[k], y[k], z, side, dx, dy)
+            slopes[a, k] = horizon(field, x[k], y[k], z, side, dx, dy, curvature)
             if own_plane and family != GAP:
                 slopes[a, k] = max(slopes[a, k], min(-(nx * dx + ny * dy) / nz, _STEEPEST))
     return slopes
@@ -203,13 +225,15 @@ def horizon_sines(
     y: Float64,
     gap: Mask,
     azimuths: int,
+    curvature: float = 0.0,
 ) -> Float64:
     """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
 
     A view through a gap is free only if the other side of the cloth, `back` seen from -wo, does not hide it either: in
-    a gap the higher of both horizons counts. `azimuths` is even.
+    a gap the higher of both horizons counts. `azimuths` is even. The front's base has the `curvature` in all azimuths;
+    the back counts as flat.
     """
-    slopes = horizons(front, x, y, azimuths, False).astype(np.float64)
+    slopes = horizons(front, x, y, azimuths, False, curvature).astype(np.float64)
     if gap.any():
         other = horizons(back, x[gap], y[gap], azimuths, True)
         slopes[:, gap] = np.maximum(slopes[:, gap], np.roll(other, azimuths // 2, axis=0))

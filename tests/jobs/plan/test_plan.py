@@ -217,6 +217,16 @@ def test_extremes_need_the_trainings_alone_and_know_one_fabric_of_each_role(file
     assert ids(edited(files, "test = 500", "test = 600"), "bench", "extremes") == every
 
 
+def test_wished_errors_touch_methods_that_estimate_errors_alone(files):
+    plain = edited(files, "[bench]", '[[models]]\nmodel = "selvage"\n\n[bench]')
+    wished = edited(files, "frames = 4", "frames = 4\nwished_errors = [0.05]")
+    assert ids(wished, "train") == ids(plain, "train")
+    for title in ("woven on denim", "neumip on denim"):
+        assert ids(wished, "bench", title) == ids(plain, "bench", title) != []
+    for title in ("selvage on denim", "timing of all methods"):
+        assert set(ids(wished, "bench", title)).isdisjoint(ids(plain, "bench", title))
+
+
 def test_ways_to_run_are_measured_again_and_nothing_is_trained_again(files, tasks):
     after = edited(files, "frames = 4", 'frames = 4\nruntimes = ["onnx", "eager-bf16"]')
     assert ids(after, "train") == ids(tasks, "train")

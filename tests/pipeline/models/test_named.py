@@ -16,6 +16,7 @@ LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
     ("name", "found"),
     [
         ("selvage", ("selvage", "")),
+        ("selvage:.02", ("selvage", "error 2 %")),
         ("soft_nodes", ("soft_nodes", "k = 8")),
         ("soft_nodes:1", ("soft_nodes", "k = 1")),
         ("prefiltered", ("prefiltered", "")),
@@ -53,6 +54,9 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
     ("name", "says"),
     [
         ("selvege", "did you mean 'selvage'"),
+        ("selvage:2", "above 0 and below 1"),
+        ("selvage:nan", "above 0 and below 1"),
+        ("selvage:two", "above 0 and below 1"),
         ("woven", "must be trained first"),
         ("soft_nodes:3", "1, 2, 4 or 8"),
         ("prefiltered:4", "prefiltered has no settings"),

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from threading import Barrier
 
 import numpy as np
 import pyarrow as pa
@@ -11,7 +12,7 @@ import pytest
 
 import pipeline.shards.evaluate as evaluate_module
 from pipeline.shards import query_file
-from pipeline.shards.evaluate import Summary, bad_list, evaluate_file
+from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.shards.schema import QUERY_COLUMNS, STANDARD_ERRORS
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
@@ -146,6 +147,19 @@ def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
         assert (again.rows, again.bad, again.points) == (summary.rows, summary.bad, summary.points)
         assert shares == sorted(shares) and shares[-1] == 1.0
         shares.clear()
+
+
+def test_a_method_in_place_of_the_truth_answers_on_all_threads(case):
+    """Two chunks wait for one another, so that a single thread would wait for ever; rows stay in their order."""
+    together = Barrier(2)
+
+    def answer(queries):
+        together.wait(timeout=20.0)
+        return np.tile(queries.sigma[:, None], (1, 4)), queries.sigma
+
+    columns = query_columns(40)
+    case.write(columns).run(chunk=10, threads=2, other=Answerer(answer, {"model": "sigma"}))
+    np.testing.assert_array_equal(case.result()["diffuse_weft"].to_numpy(), columns["sigma"].astype(np.float32))
 
 
 def test_what_stops_a_thread_stops_everything(case):

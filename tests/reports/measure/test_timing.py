@@ -3,9 +3,9 @@ import threading
 import numpy as np
 import pytest
 
+from pipeline.cores import cores
 from pipeline.truth.query import Queries
 from reports.measure.timing import Contender, affordable, set_threads, synchronise, thread_counts, time_side_by_side
-from reports.record import cores
 
 
 def many_queries(rows):

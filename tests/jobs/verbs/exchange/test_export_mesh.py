@@ -91,8 +91,11 @@ def _srgb(linear):
         (["denim", "--mesh", "a.ply", "--vertices", "many"], "many"),
         (["denim", "--mesh", "a.ply", "--vertices", "9999"], "with fewer --vertices or --repeats"),
         (["denim", "--mesh", "file/a.ply"], "a folder that can be written is needed"),
-        (["denim"], "nothing: one of --mesh, --wif and --maps is needed"),
-        (["denim", "--mesh", "a.ply", "--wif", "a.wif"], "--mesh and --wif: one of --mesh, --wif and --maps is needed"),
+        (["denim"], "nothing: one of --mesh, --wif, --maps and --shader is needed"),
+        (
+            ["denim", "--mesh", "a.ply", "--wif", "a.wif"],
+            "--mesh and --wif: one of --mesh, --wif, --maps and --shader is needed",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, said):

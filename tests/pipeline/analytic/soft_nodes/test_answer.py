@@ -31,7 +31,7 @@ def cloth(name, **changes):
 
 def bare(table, queries):
     """Return the components with nothing hidden; the area of gaps has no other."""
-    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo)
+    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo, queries.curvature)
     found, gaps = sum_queries(table, *columns)
     assert not gaps.any()
     area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)

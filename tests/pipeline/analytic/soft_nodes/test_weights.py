@@ -45,7 +45,7 @@ def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
     narrowest = np.float32(narrow_axis(deviation_x, deviation_y, correlation))
     footprint = (np.float32(n) for n in (deviation_x, deviation_y, correlation))
     above, turn = (np.float32(n) for n in (0, 0, 1, 0, 0, 1)), np.float32(0)
-    look = Look(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn)
+    look = Look(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn, turn, turn)
     waves = table.waves, table.wave_nodes, table.evenly
     count = waves_kept(table.wave_size, narrowest)
     wave_weights(*waves, look, count, table.repeat, scratch.turns, scratch.phases, scratch.weight)

@@ -1,0 +1,186 @@
+"""`soft_nodes.json`: what is in an exported folder, for a program that has not seen this package."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict
+
+from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
+from jobs.verbs.exchange.shader.golden import COLUMNS, Golden
+from jobs.verbs.exchange.shader.tables import MOST_CELLS, MOST_NODES, Tables
+from pipeline.truth.conventions import COMPONENTS
+from weaves.fabric import Fabric
+
+FILE: Final = "soft_nodes.json"
+
+GOLDEN: Final = "golden.json"
+
+_FILES: Final = {
+    "integers": {"int32": "tables/integers.i32"},
+    "numbers": {"float32": "tables/numbers.f32"},
+    "nodes": {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"},
+    "grid": {"uint8": "tables/grid.png"},
+}
+"""Files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
+
+_CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class Place(_Model):
+    """An array in a buffer."""
+
+    offset: int
+    """First element."""
+    shape: tuple[int, ...]
+    """Its extent, row-major."""
+    meaning: str
+    """Its content."""
+
+
+class Buffer(_Model):
+    """A buffer that the shader reads."""
+
+    files: dict[str, str]
+    """Paths by type; one of them is loaded."""
+    channels: int
+    """Numbers in an element."""
+    elements: int
+    """Elements; as a texture they fill rows of `texture_width`, the last one in part."""
+    arrays: dict[str, Place]
+    """Arrays in it, after the scalars."""
+
+
+class Colours(_Model):
+    """Linear Rec. 709 colours of the components, k_s and k_d; means if threads differ in colour."""
+
+    specular_warp: tuple[float, float, float]
+    specular_weft: tuple[float, float, float]
+    diffuse_warp: tuple[float, float, float]
+    diffuse_weft: tuple[float, float, float]
+
+
+class Vectors(_Model):
+    """Content of `golden.json`."""
+
+    columns: tuple[str, ...] = COLUMNS
+    """Columns of a query."""
+    queries: list[list[float]]
+    """Queries."""
+    components: list[list[float]]
+    """Their answers."""
+    bounds: list[list[float]]
+    """The same without shadows of the light: upper bounds of the components."""
+    steady: float
+    """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
+
+
+class Descriptor(_Model):
+    """Content of `soft_nodes.json`."""
+
+    fabric: str
+    """Name of the fabric."""
+    generator: str
+    """Program and version."""
+    level: int
+    """Level of detail k."""
+    inputs: dict[str, str]
+    """Fields of a query, with their units."""
+    outputs: dict[str, str]
+    """Fields of an answer."""
+    conventions: list[str]
+    """Axes, directions, cosine and colours."""
+    components: tuple[str, ...] = COMPONENTS
+    """Order of the four components."""
+    colours: Colours
+    """Colours of the yarns."""
+    repeat: tuple[int, int]
+    """Ends and picks after which the weave repeats."""
+    limits: dict[str, int]
+    """Largest table that the shader takes."""
+    texture_width: int = TEXTURE_WIDTH
+    """Texels of a row of every texture."""
+    scalars: dict[str, int | float]
+    """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
+    buffers: dict[str, Buffer]
+    """Buffers, by the name that they have in the source."""
+    source: list[str]
+    """Files of the source."""
+    languages: dict[str, list[str]]
+    """Files that slangc made, by language."""
+    golden: str = GOLDEN
+    """Queries with their answers."""
+
+
+_INPUTS: Final = {
+    "centre": "middle of the footprint, in yarn spacings: x along the weft, y along the warp; any number",
+    "deviation": "standard deviations of the Gaussian footprint along x and y, in yarn spacings; at least 0.001",
+    "correlation": "of both axes, -1 to 1",
+    "wi": "unit vector to the light",
+    "wo": "unit vector to the viewer",
+}
+_OUTPUTS: Final = {
+    "components": "specular warp and weft, diffuse warp and weft, for unit colours, in 1/sr",
+    "bounds": "the same without shadows of the light, never below the components; diffuse ones integrate to at most 1",
+}
+_CONVENTIONS: Final = [
+    "The cloth is the plane z = 0 and is seen from z > 0. Warp yarns run along y, weft yarns along x.",
+    "Lengths are in yarn spacings. The first end and pick of the draft lie in the cell from (0, 0) to (1, 1).",
+    "wi and wo point away from the cloth. Answers are 0 if one of them is not in front (z <= 0).",
+    "The incident cosine is in the components: radiance is the integral of f L over wi, with no further cosine.",
+    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft.",
+]
+
+
+def descriptor(
+    fabric: Fabric, level: int, found: Tables, source: list[str], languages: dict[str, list[str]]
+) -> Descriptor:
+    """Return the content of `soft_nodes.json`."""
+    mean = fabric.average()
+    values = {name: getattr(found, name) for name in _FILES}
+    return Descriptor(
+        fabric=fabric.name,
+        generator=f"twillight {version('twillight')}",
+        level=level,
+        inputs=_INPUTS,
+        outputs=_OUTPUTS,
+        conventions=_CONVENTIONS,
+        colours=Colours(
+            specular_warp=mean.warp.specular_rgb,
+            specular_weft=mean.weft.specular_rgb,
+            diffuse_warp=mean.warp.diffuse_rgb,
+            diffuse_weft=mean.weft.diffuse_rgb,
+        ),
+        repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
+        limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
+        scalars=found.scalars,
+        buffers={
+            name: Buffer(
+                files=files,
+                channels=_CHANNELS[name],
+                elements=values[name].size // _CHANNELS[name],
+                arrays={
+                    key: Place(offset=array.offset, shape=array.shape, meaning=array.meaning)
+                    for key, array in found.places.get(name, {}).items()
+                },
+            )
+            for name, files in _FILES.items()
+        },
+        source=source,
+        languages=languages,
+    )
+
+
+def vectors(found: Golden) -> Vectors:
+    """Return the content of `golden.json`."""
+    return Vectors(
+        queries=found.rows.tolist(),
+        components=found.components.tolist(),
+        bounds=found.bounds.tolist(),
+        steady=found.steady,
+    )

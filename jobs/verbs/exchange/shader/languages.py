@@ -1,0 +1,152 @@
+"""Shading languages: what slangc makes of the source, and where it is found."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from weaves.errors import BadInput, WorkFailed, one_line
+
+SOURCE: Final = "slang"
+"""The language of the source, which needs no compiler."""
+
+ALL: Final = "all"
+"""Every language."""
+
+
+class Program(NamedTuple):
+    """A file that slangc makes: its name without a suffix is that of the source and of the entry point."""
+
+    file: str
+    stage: str
+    textures: bool
+
+    @property
+    def entry(self) -> str:
+        """Name of the entry point."""
+        return self.file.split(".")[0]
+
+
+class Language(NamedTuple):
+    """A language: how slangc calls it, and the files written in it."""
+
+    target: str
+    programs: tuple[Program, ...]
+
+
+def _rows(suffix: str) -> tuple[Program, ...]:
+    return (Program(f"evaluate.{suffix}", "compute", False),)
+
+
+LANGUAGES: Final = {
+    "cpp": Language("cpp", _rows("cpp")),
+    "cuda": Language("cuda", _rows("cu")),
+    "glsl": Language("glsl", _rows("comp")),
+    "glsles": Language("glsl", (Program("evaluate.frag", "fragment", True), Program("draw.frag", "fragment", True))),
+    "hlsl": Language("hlsl", _rows("hlsl")),
+    "metal": Language("metal", _rows("metal")),
+    "wgsl": Language("wgsl", _rows("wgsl")),
+}
+"""Languages that slangc makes, by the name of --language."""
+
+_ES: Final = (
+    (
+        r"#version 450\n",
+        "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
+        "precision highp isampler2D;\nprecision highp usampler2D;\n",
+    ),
+    (r"layout\(row_major\) (?:uniform|buffer);\n", ""),
+    (r"layout\(binding = \d+\)\n", ""),
+)
+"""Replacements that make GLSL ES 3.00 of GLSL 4.50: version and precision; the layout of matrices, of which there are
+none; bindings, which a program sets by name."""
+
+
+def refuse_unknown(languages: Sequence[str]) -> None:
+    """Refuse a name that is no language."""
+    for name in languages:
+        if name not in (ALL, SOURCE, *LANGUAGES):
+            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ALL))}"
+            raise BadInput("export", "--language", one_line(name, 40), allowed)
+
+
+def made(languages: Sequence[str]) -> list[str]:
+    """Return the languages that slangc must make, of names that `refuse_unknown` lets pass."""
+    return [name for name in LANGUAGES if ALL in languages or name in languages]
+
+
+def slangc() -> Path | None:
+    """Return the compiler: that of the package slangtorch, else the one on the search path; None if there is none."""
+    spec = find_spec("slangtorch")
+    if spec is not None and spec.origin is not None:
+        for name in ("slangc", "slangc.exe"):
+            if (own := Path(spec.origin).parent / "bin" / name).is_file():
+                return own
+    found = shutil.which("slangc")
+    return None if found is None else Path(found)
+
+
+def compiler_for(languages: Sequence[str]) -> Path:
+    """Return slangc; BadInput, naming the languages that need it, if it is not there."""
+    found = slangc()
+    if found is None:
+        allowed = f"slangc is needed: pip install --no-deps slangtorch; --language {SOURCE} is written without it"
+        raise BadInput("export", "--language", ", ".join(languages), allowed)
+    return found
+
+
+def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Path) -> dict[str, list[str]]:
+    """Write the files of languages, each in a folder of its name, and return their paths in `folder`.
+
+    Parameters
+    ----------
+    languages : sequence of str
+        Keys of LANGUAGES.
+    compiler : Path
+        slangc.
+    source : Path
+        Folder with the Slang source and `layout.slang`.
+    folder : Path
+        Folder to write to.
+
+    Raises
+    ------
+    WorkFailed
+        If slangc refuses the source.
+    """
+    found: dict[str, list[str]] = {}
+    for name in languages:
+        (folder / name).mkdir()
+        language = LANGUAGES[name]
+        for program in language.programs:
+            path = folder / name / program.file
+            options = ["-DTEXTURES"] if program.textures else []
+            _run([
+                str(compiler), str(source / f"{program.entry}.slang"), *options, "-target", language.target, "-entry",
+                program.entry, "-stage", program.stage, "-line-directive-mode", "none", "-o", str(path),
+            ])  # fmt: skip
+            if name == "glsles":
+                path.write_text(_as_es(path.read_text(encoding="utf-8")), encoding="utf-8")
+            found.setdefault(name, []).append(f"{name}/{program.file}")
+    return found
+
+
+def _as_es(text: str) -> str:
+    """Return GLSL 4.50 without storage buffers as GLSL ES 3.00."""
+    for pattern, other in _ES:
+        text = re.sub(pattern, other, text)
+    return text
+
+
+def _run(command: list[str]) -> None:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise WorkFailed(f"{command[0]}: {one_line(str(error), 200)}") from error
+    if done.returncode != 0:
+        raise WorkFailed(f"{command[0]}: {one_line(done.stderr or done.stdout, 300)}")

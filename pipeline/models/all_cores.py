@@ -1,0 +1,63 @@
+"""A method that answers many queries on all cores: runs of fixed length on threads of one process.
+
+Kernels and products of matrices run without the interpreter's lock. Where a run begins does not depend on the number
+of threads, and each is computed by one thread, so no bit of an answer depends on it either. A benchmark, and whatever
+has threads of its own, calls the method itself.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.cores import cores
+from pipeline.fingerprint import fingerprint
+from pipeline.models.method import CHUNK, Method, one_thread
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+
+class AllCores:
+    """A method on several threads.
+
+    Parameters
+    ----------
+    method : Method
+        Answers a run of queries on one thread, on the CPU.
+    threads : int
+        Threads; 0: one a core that this process may use.
+    """
+
+    def __init__(self, method: Method, threads: int = 0) -> None:
+        self.method, self.name, self.setting = method, method.name, method.setting
+        self._threads = threads or cores()
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return whether the method covers a fabric."""
+        return self.method.covers(fabric)
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Prepare the method."""
+        self.method.prepare(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Answer N queries in runs of `CHUNK`, float32 (N, 4); each run but the first has a seed of its own."""
+        starts = range(CHUNK, len(queries.u), CHUNK)
+
+        def answer(start: int) -> npt.NDArray[np.float32]:
+            own = int(fingerprint([seed, start]), 16)
+            return self.method.predict(fabric, queries.take(slice(start, start + CHUNK)), own)
+
+        with one_thread():
+            # Before any thread starts, the first run loads kernels and tabulates the fabric.
+            first = self.method.predict(fabric, queries.take(slice(CHUNK)), seed)
+            if not starts:
+                return first
+            with ThreadPoolExecutor(self._threads) as pool:
+                return np.concatenate([first, *pool.map(answer, starts)])
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the method's bytes: threads share its tables."""
+        return self.method.bytes_stored(fabric)

@@ -1,0 +1,150 @@
+"""The exported folder, and the sentences for what cannot be exported."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from jobs.cli import main
+from jobs.verbs.exchange.shader import export_shader as verb
+from jobs.verbs.exchange.shader import languages, tables
+from jobs.verbs.exchange.shader.languages import LANGUAGES
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.truth.conventions import COMPONENTS
+from tests.jobs.verbs.exchange.shader.conftest import missing
+from tests.jobs.verbs.exchange.shader.test_evaluate import FABRICS
+from weaves.fabric import load_fabric
+
+
+@pytest.fixture
+def twillight(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*tokens):
+        code = main(["export", *tokens])
+        return code, capsys.readouterr()
+
+    return call
+
+
+@pytest.mark.parametrize("name", FABRICS)
+def test_a_folder_has_less_than_a_megabyte(exported, name):
+    assert sum(path.stat().st_size for path in exported(name).rglob("*") if path.is_file()) < 1_000_000
+
+
+def test_tables_are_those_of_the_fabric(exported, read):
+    table, cloth = tabulate(load_fabric("crepe")), read(exported("crepe"))
+    said, nodes = cloth.said, cloth.buffers["nodes"].reshape(-1, cloth.said["scalars"]["stride"], 4)
+    assert said["components"] == list(COMPONENTS) and said["repeat"] == [16, 16] and said["level"] == 2
+    for buffer, name, expected in (
+        ("numbers", "yarn", table.yarn), ("numbers", "bounds", table.bounds), ("integers", "pieces", table.pieces)
+    ):  # fmt: skip
+        place = said["buffers"][buffer]["arrays"][name]
+        count = int(np.prod(place["shape"]))
+        values = cloth.buffers[buffer][place["offset"] : place["offset"] + count].reshape(place["shape"])
+        assert (values == expected).all()
+    assert (cloth.buffers["grid"][: table.grid.size] == table.grid.ravel()).all()
+    block, lane = 5, 3
+    node = nodes[16 * block + lane]
+    assert (node[0] == table.nodes[block, :4, lane]).all() and node[1, 3] == table.evenly[block, lane]
+    horizons = node[4:20].reshape(32, 2)
+    assert (horizons[:, 0] == table.mean[:, block, lane]).all()
+    assert (horizons[:, 1] == table.sharpness[:, block, lane]).all()
+    wave = 13
+    assert (node[20:].reshape(-1, 2)[wave] == table.wave_nodes[block, wave // 4, 2 * (wave % 4) :][:2, lane]).all()
+
+
+def test_the_source_needs_no_compiler(twillight, monkeypatch, tmp_path):
+    monkeypatch.setattr(languages, "find_spec", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    code, said = twillight("gingham", "--shader", "out", "--level", "1")
+    assert code == 0 and "slang; level 1" in said.out
+    assert json.loads((tmp_path / "out" / "soft_nodes.json").read_text())["languages"] == {}
+    code, said = twillight("gingham", "--shader", "out", "--language", "wgsl")
+    assert code == 2 and said.err.count("\n") == 1
+    assert "slangc is needed: pip install --no-deps slangtorch" in said.err
+
+
+def test_slangc_of_the_search_path_is_found(monkeypatch):
+    monkeypatch.setattr(languages, "find_spec", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: f"/opt/{name}")
+    assert str(languages.slangc()) == "/opt/slangc"
+
+
+@pytest.mark.parametrize(
+    ("tokens", "allowed"),
+    [
+        (("--shader", "x", "--language", "basic"), "must be one of slang, cpp, cuda, glsl"),
+        (("--shader", "x", "--level", "3"), "must be one of 1, 2, 4, 8"),
+        (("--wif", "x.wif", "--level", "2"), "is not for --wif"),
+        (("--mesh", "x.ply", "--language", "cpp"), "is not for --mesh"),
+        (("--mesh", "x.ply", "--shader", "x"), "one of --mesh, --wif, --maps and --shader is needed"),
+    ],
+)
+def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, allowed):
+    code, said = twillight("gingham", *tokens)
+    assert code == 2 and said.err.count("\n") == 1 and allowed in said.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, tmp_path):
+    code, said = twillight("crepe", "--shader", "x", "--level", "8")
+    assert code == 2 and "1,856 nodes" in said.err and "at most 1,024; choose a lower --level" in said.err
+    monkeypatch.setattr(tables, "MOST_HEIGHT", 16)
+    code, said = twillight("gingham", "--shader", "x")
+    assert code == 2 and "horizons" in said.err
+    monkeypatch.setattr(tables, "MOST_CELLS", 3)
+    monkeypatch.setattr(verb, "tabulate", None)  # cells are counted before any work
+    code, said = twillight("gingham", "--shader", "x")
+    assert code == 2 and "at most 3 cells" in said.err and not list(tmp_path.iterdir())
+
+
+def test_every_language_is_written(exported):
+    if lacking := missing("slangc"):
+        pytest.skip(lacking)
+    folder = exported("gingham", 2, "all")
+    said = json.loads((folder / "soft_nodes.json").read_text())["languages"]
+    assert set(said) == set(LANGUAGES)
+    for name, files in said.items():
+        for file, program in zip(files, LANGUAGES[name].programs, strict=True):
+            assert re.search(rf"\b({program.entry}|main)\(", (folder / file).read_text())
+
+
+def test_no_sine_and_no_cosine_is_called(exported):
+    for path in exported("gingham").glob("slang/*.slang"):
+        assert not re.search(r"\b(sin|cos|tan|atan2?|asin|acos|exp2?|log2?)\(", path.read_text()), path
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "options"),
+    [
+        ("glsl", "evaluate.comp", ()),
+        ("glsles", "evaluate.frag", ()),
+        ("glsles", "draw.frag", ()),
+        ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "evaluate", "-S", "comp", "-o", "/dev/null")),
+    ],
+)
+def test_glslang_accepts_what_is_written(exported, name, file, options):
+    if lacking := missing("slangc"):
+        pytest.skip(lacking)
+    if shutil.which("glslangValidator") is None:
+        pytest.skip("glslangValidator is not installed")
+    path = exported("gingham", 2, "all") / name / file
+    done = subprocess.run(["glslangValidator", *options, path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_nvcc_accepts_the_cuda_form(exported, tmp_path):
+    if lacking := missing("slangc"):
+        pytest.skip(lacking)
+    if shutil.which("nvcc") is None:
+        pytest.skip("nvcc is not installed")
+    path = exported("gingham", 2, "all") / "cuda" / "evaluate.cu"
+    done = subprocess.run(
+        ["nvcc", "--ptx", "-w", "-o", tmp_path / "evaluate.ptx", path], capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "evaluate" in (tmp_path / "evaluate.ptx").read_text(), done.stderr

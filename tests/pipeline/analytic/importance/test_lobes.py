@@ -1,0 +1,75 @@
+"""Lobes at a point: its tangent, what of it is seen, and its density, against the truth's surface and marches."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.importance.lobes import (
+    NEAR,
+    POINT_ROWS,
+    ROWS,
+    SHARE,
+    STRAIGHT,
+    TX,
+    TZ,
+    Lobes,
+    find_rows,
+    point_places,
+)
+from pipeline.analytic.importance.mixture import THROUGH, density_rows
+from pipeline.analytic.importance.point import flake_scatter_pdf
+from pipeline.analytic.importance.surface import tabulate_surface
+from pipeline.truth.cloth import cloth_side
+from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
+from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.fabric import load_fabric
+
+COUNT = 400
+
+
+def points_of(name):
+    """Return a fabric, its front, and queries about points, directions over the sphere, viewers in front."""
+    fabric, rng = load_fabric(name), np.random.default_rng(4)
+    front = cloth_side(fabric, TruthOptions()).front
+    picks, ends = front.top.shape
+    wi, wo = rng.standard_normal((2, COUNT, 3))
+    wo[:, 2] = np.abs(wo[:, 2]) + 0.3
+    u, v, tiny = rng.random(COUNT) * ends, rng.random(COUNT) * picks, np.full(COUNT, 1e-3)
+    units = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
+    return fabric, front, Queries.round(u, v, tiny, *units)
+
+
+@pytest.mark.parametrize("name", ["denim", "silk_charmeuse", "voile"])
+def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
+    """Tangents to 1e-3, gaps and densities; points within a deviation of an edge may lie beyond it."""
+    fabric, front, queries = points_of(name)
+    lobes = Lobes(np.empty((COUNT, ROWS, 3), np.float32), np.empty((COUNT, STRAIGHT + 1), np.float32))
+    footprints = (queries.u, queries.v, queries.sigma, queries.sigma, np.zeros_like(queries.sigma))
+    scratch, pdf = np.empty((POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
+    find_rows(tabulate_surface(fabric), footprints, queries.wo, point_places(1), np.float32(2.0), scratch, lobes)
+    density_rows(lobes, queries.wi, queries.wo, pdf)
+    right, seen_alike, checked = 0, 0, 0
+    for n in range(COUNT):
+        x, y, wo = float(queries.u[n]), float(queries.v[n]), queries.wo[n].astype(float)
+        family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
+        if family == GAP:
+            right += lobes.rest[n, STRAIGHT] > 0.9 or lobes.flakes[n, SHARE].sum() == 0
+            continue
+        found = lobes.flakes[n, TX : TZ + 1, 0].astype(float)
+        right += abs(found @ (tx, ty, tz)) > 1.0 - 1e-3
+        seen = wo @ (nx, ny, nz) > 0.0 and bool(visible(front, x, y, z, side, ray(*wo, 0.0)))
+        share = float(lobes.flakes[n, SHARE, 0])
+        seen_alike += seen == (share > 0.0)
+        checked += 1
+        wi, alpha = queries.wi[n].astype(float), front.yarn[family, ALPHA]
+        own, mirrored = (flake_scatter_pdf(*wo, *light, *found, alpha) for light in (wi, wi * (1.0, 1.0, -1.0)))
+        near = wi[2] > 0.0
+        wanted = share * (own + (1.0 - THROUGH) * mirrored if near else THROUGH * own)
+        wanted += lobes.rest[n, NEAR if near else NEAR + 1] * abs(wi[2]) / math.pi
+        assert pdf[n] == pytest.approx(wanted, rel=2e-3)
+    assert right >= 0.98 * COUNT
+    # A coarse grid of horizons and a ramp decide what a march decides here.
+    assert seen_alike >= 0.9 * checked

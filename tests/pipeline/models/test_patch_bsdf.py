@@ -1,0 +1,199 @@
+"""`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pipeline.models.named import named_method
+from pipeline.models.patch_bsdf import PatchBSDF
+from pipeline.truth.query import Queries
+from weaves.colour import LUMINANCE
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+LEVEL = 0.01
+ROWS, COLUMNS, NODES = 16, 32, 24  # cells in cosine and azimuth; quadrature nodes along each side of a cell
+COUNT = 100_000
+# Fabric, deviations of the footprint, angle, and the viewer's angle to the normal and azimuth: more than 90 is behind.
+CONFIGURATIONS = {
+    "front": ("polyester_lining", 0.3, 0.3, 0.0, 30.0, 20.0),
+    "along the normal": ("denim", 0.3, 0.3, 0.0, 0.0, 0.0),
+    "grazing": ("silk_charmeuse", 0.4, 0.4, 0.0, 80.0, 130.0),
+    "wide": ("silk_charmeuse", 30.0, 30.0, 0.0, 40.0, 65.0),
+    "tiny": ("polyester_lining", 0.001, 0.001, 0.0, 50.0, 250.0),
+    "ellipse": ("wool_gabardine", 0.9, 0.15, 0.7, 60.0, 300.0),
+    "voile": ("voile", 1.5, 1.5, 0.0, 20.0, 100.0),
+    "gauze": ("gauze", 0.5, 0.3, 1.2, 70.0, 10.0),
+    "behind": ("silk_charmeuse", 0.5, 0.5, 0.0, 130.0, 45.0),
+    "behind a gauze": ("gauze", 1.0, 1.0, 0.0, 105.0, 200.0),
+}
+
+
+def unit(degrees, azimuth):
+    theta, phi = math.radians(degrees), math.radians(azimuth)
+    return math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)
+
+
+def looks_of(name, count, wi=None):
+    _, major, minor, angle, theta, phi = CONFIGURATIONS[name]
+    columns = (np.full(count, value, np.float32) for value in (0.62, 0.57, major, minor, angle, 0.0))
+    u, v, sigma, sigma_minor, angle, curvature = columns
+    wo = np.tile(np.array(unit(theta, phi), np.float32), (count, 1))
+    return Queries(u, v, sigma, wo if wi is None else wi.astype(np.float32), wo, sigma_minor, angle, curvature)
+
+
+@pytest.fixture(scope="module")
+def bsdfs():
+    return {name: PatchBSDF(load_fabric(row[0])) for name, row in CONFIGURATIONS.items()}
+
+
+def directions(rows, columns):
+    """Return the middles of cells of equal solid angle, cosine by azimuth, (rows columns, 3)."""
+    z = -1.0 + 2.0 * (np.arange(rows) + 0.5) / rows
+    turn = 2.0 * math.pi * (np.arange(columns) + 0.5) / columns
+    sine = np.sqrt(1.0 - z * z)[:, None]
+    return np.stack(np.broadcast_arrays(sine * np.cos(turn), sine * np.sin(turn), z[:, None]), axis=-1).reshape(-1, 3)
+
+
+def expected_shares(bsdf, name):
+    """Integrate the density over each cell by midpoints."""
+    wi = directions(ROWS * NODES, COLUMNS * NODES)
+    pdf = bsdf.pdf(looks_of(name, len(wi), wi)).astype(np.float64)
+    cell = 4.0 * math.pi / (ROWS * COLUMNS * NODES**2)
+    return pdf.reshape(ROWS, NODES, COLUMNS, NODES).sum(axis=(1, 3)) * cell
+
+
+def test_samples_follow_their_density(bsdfs):
+    """Chi-square over the cells of the sphere and the delta lobe, those of fewer than 20 expected samples pooled.
+
+    Sidak over the configurations at LEVEL.
+    """
+    values = {}
+    for number, (name, bsdf) in enumerate(bsdfs.items()):
+        looks = looks_of(name, COUNT)
+        shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks)[0])
+        assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
+        sample = bsdf.sample(looks, np.random.default_rng(number).random((COUNT, 3)))
+        np.testing.assert_allclose(np.linalg.norm(sample.wi, axis=1), 1.0, atol=1e-6)
+        assert (sample.pdf > 0).all()
+        wi = sample.wi[~sample.straight].astype(float)
+        row = np.minimum(((wi[:, 2] + 1) / 2 * ROWS).astype(int), ROWS - 1)
+        column = (np.mod(np.arctan2(wi[:, 1], wi[:, 0]) / (2 * math.pi), 1) * COLUMNS).astype(int) % COLUMNS
+        seen = np.append(np.bincount(row * COLUMNS + column, minlength=ROWS * COLUMNS), sample.straight.sum())
+        expected = np.append(shares.ravel() * (1.0 - straight) / shares.sum(), straight) * COUNT
+        large = expected >= 20
+        observed, wanted = (np.append(v[large], v[~large].sum()) for v in (seen, expected))
+        if wanted[-1] == 0:
+            observed, wanted = observed[:-1], wanted[:-1]
+        values[name] = stats.chisquare(observed, wanted).pvalue
+    assert min(values.values()) > 1 - (1 - LEVEL) ** (1 / len(values)), values
+
+
+def test_weights_have_the_integral_of_eval_as_their_mean(bsdfs):
+    """A z-test of scattered light and of light straight through, against even directions; Sidak at LEVEL."""
+    scores, count = {}, 40_000
+    for number, (name, bsdf) in enumerate(bsdfs.items()):
+        wi = directions(160, 320)
+        even = bsdf.eval(looks_of(name, len(wi), wi)) @ LUMINANCE
+        scattered = even.mean() * 4.0 * math.pi
+        looks = looks_of(name, count)
+        through = float(bsdf.method.transparency(bsdf.fabric, looks.take(slice(1)))[0])
+        sample = bsdf.sample(looks, np.random.default_rng(100 + number).random((count, 3)))
+        weight = sample.weight @ LUMINANCE
+        assert np.isfinite(weight).all() and (weight >= 0).all()
+        for kind, own, wanted in (("", ~sample.straight, scattered), (" straight", sample.straight, through)):
+            values = np.where(own, weight, 0.0)
+            error = values.std() / math.sqrt(count)
+            scores[name + kind] = abs(values.mean() - wanted) / error if error > 0 else 0.0
+        assert scattered + through <= 1.0, name
+    limit = stats.norm.isf(0.5 * (1 - (1 - LEVEL) ** (1 / len(scores))))
+    assert max(scores.values()) < limit, (limit, scores)
+
+
+@pytest.mark.parametrize("name", ["ellipse", "gauze", "behind"])
+def test_a_sample_is_what_asking_for_it_gives(bsdfs, name):
+    bsdf, looks, random = bsdfs[name], looks_of(name, 500), np.random.default_rng(1).random((500, 3))
+    sample = bsdf.sample(looks, random)
+    scattered = ~sample.straight
+    queries = looks._replace(wi=sample.wi).take(scattered)
+    values, pdf = bsdf.eval_pdf(queries)
+    np.testing.assert_array_equal(pdf, sample.pdf[scattered])
+    np.testing.assert_array_equal(values, bsdf.eval(queries))
+    np.testing.assert_allclose(values / pdf[:, None], sample.weight[scattered])
+    np.testing.assert_array_equal(sample.wi[sample.straight], -looks.wo[sample.straight])
+    lobes = bsdf.lobes(looks)
+    again = bsdf.sample(looks, random, lobes)
+    for one, other in zip(sample, again, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_viewers_on_both_sides_are_answered_together(bsdfs):
+    bsdf, random = bsdfs["behind"], np.random.default_rng(2).random((60, 3))
+    looks = looks_of("behind", 60)
+    front = np.arange(60) % 3 == 0
+    wo = np.where(front[:, None], -looks.wo, looks.wo)
+    both = bsdf.sample(looks._replace(wo=wo), random)
+    alone = bsdf.sample(looks._replace(wo=wo).take(front), random[front])
+    np.testing.assert_array_equal(both.wi[front], alone.wi)
+    np.testing.assert_array_equal(both.pdf[front], alone.pdf)
+    alone = bsdf.sample(looks.take(~front), random[~front])
+    np.testing.assert_array_equal(both.wi[~front], alone.wi)
+
+
+def test_the_back_is_the_front_of_the_turned_cloth(bsdfs):
+    """Reflected in the fabric plane, a viewer behind sees the front of `Fabric.back()`."""
+    bsdf, looks = bsdfs["behind"], looks_of("behind", 200)
+    back = PatchBSDF(bsdf.fabric.back())
+    wi = np.random.default_rng(3).standard_normal((200, 3))
+    queries = looks._replace(wi=(wi / np.linalg.norm(wi, axis=1, keepdims=True)).astype(np.float32))
+    np.testing.assert_allclose(bsdf.pdf(queries), back.pdf(queries.turned()), rtol=1e-5)
+    np.testing.assert_allclose(bsdf.straight(looks), back.straight(looks.turned()), rtol=1e-6)
+
+
+def test_patches_that_nobody_sees_still_have_samples():
+    wo = np.tile(np.array(unit(89.8, 3.0), np.float32), (64, 1))
+    u, v, sigma = (np.full(64, value, np.float32) for value in (0.62, 0.57, 0.01))
+    bsdf = PatchBSDF(load_fabric("voile"))
+    sample = bsdf.sample(Queries.round(u, v, sigma, wo, wo), np.random.default_rng(1).random((64, 3)))
+    assert np.isfinite(sample.wi).all() and (sample.pdf > 0).all() and np.isfinite(sample.weight).all()
+
+
+def test_any_method_answers():
+    method, looks = named_method("prefiltered", "test", "method"), looks_of("front", 50)
+    bsdf = PatchBSDF(load_fabric("polyester_lining"), method)
+    queries = looks._replace(wi=np.tile(np.array(unit(20.0, 200.0), np.float32), (50, 1)))
+    other = PatchBSDF(load_fabric("polyester_lining"))
+    np.testing.assert_array_equal(bsdf.pdf(queries), other.pdf(queries))
+    assert not np.array_equal(bsdf.eval(queries), other.eval(queries))
+
+
+@pytest.mark.parametrize(
+    ("random", "message"),
+    [
+        (np.zeros((3, 3)), "shape of random"),
+        (np.zeros(6), "shape of random"),
+        ([[0.1, 0.2, 1.0], [0.1, 0.2, 0.3]], r"random\[0, 2\]"),
+        ([[0.1, 0.2, 0.3], [-0.1, 0.2, 0.3]], r"random\[1, 0\]"),
+        ([[0.1, math.nan, 0.3], [0.1, 0.2, 0.3]], r"random\[0, 1\]"),
+        ([["a", "b", "c"]], "random"),
+        ([[0.1, 0.2, 0.3], [0.1]], "random"),
+    ],
+)
+def test_numbers_that_are_not_in_the_unit_interval_are_refused(bsdfs, random, message):
+    with pytest.raises(BadInput, match=message):
+        bsdfs["front"].sample(looks_of("front", 2), random)
+
+
+def test_bad_settings_are_refused(bsdfs):
+    fabric = load_fabric("polyester_lining")
+    with pytest.raises(BadInput, match="points"):
+        PatchBSDF(fabric, points=0)
+    with pytest.raises(BadInput, match="widening"):
+        PatchBSDF(fabric, widening=math.nan)
+    with pytest.raises(BadInput, match="PatchBSDF"):
+        PatchBSDF(fabric, "no_such_method")
+    bsdf = bsdfs["front"]
+    with pytest.raises(BadInput, match="lobes"):
+        bsdf.pdf(looks_of("front", 3), bsdf.lobes(looks_of("front", 2)))
