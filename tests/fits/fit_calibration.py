@@ -1,6 +1,6 @@
 """Fit the factors of pipeline.truth.calibration: reported errors against true ones, stage by stage.
 
-Command: ``python tests/fits/fit_calibration.py [--fabrics 16] [--rows 60]``
+Command: ``python tests/fits/fit_calibration.py [--fabrics 16] [--rows 60] [--estimator auto]``
 
 Random fabrics and queries of all classes of reports.truth.calibration, of another seed than its own. For each stage and
 each triple of factors (a, c, b), the ratio rms(error) / rms(standard error) is computed for every class and estimator
@@ -66,8 +66,9 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--fabrics", type=int, default=16)
     parser.add_argument("--rows", type=int, default=60)
+    parser.add_argument("--estimator", choices=ESTIMATORS, action="append", help="all, if left out")
     arguments = parser.parse_args()
-    found = list(samples(arguments.fabrics, arguments.rows, tuple(ESTIMATORS), 1 << 15, SEED))
+    found = list(samples(arguments.fabrics, arguments.rows, tuple(arguments.estimator or ESTIMATORS), 1 << 15, SEED))
     sides = {"components": (slice(4), False), "components, behind": (slice(4), True)}
     for title, (columns, back) in {**sides, "transparency": (slice(4, 5), False)}.items():
         for stage, number in STAGES.items():
