@@ -172,6 +172,10 @@ def export(
         list[str],
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl or all, beside Slang; several."),
     ] = NOTHING,
+    kind: Annotated[
+        list[str],
+        Parameter(help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth."),
+    ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader."""
     from jobs.terminal import Terminal
@@ -186,6 +190,7 @@ def export(
     for option, value, owner in (
         ("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps),
         ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
+        ("--kind", ", ".join(kind) or None, shader),
     ):  # fmt: skip
         if value is not None and owner is None:
             raise BadInput("export", option, value, f"is not for {chosen[0]}; leave it out")
@@ -202,7 +207,7 @@ def export(
         from jobs.verbs.exchange.shader.export_shader import export_shader
         from pipeline.analytic.soft_nodes.detail import USUAL
 
-        said = export_shader(cloth, shader, USUAL if level is None else level, language)
+        said = export_shader(cloth, shader, USUAL if level is None else level, language, kind)
     else:
         from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
 

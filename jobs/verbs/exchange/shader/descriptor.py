@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from importlib.metadata import version
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
-from jobs.verbs.exchange.shader.golden import COLUMNS, Golden
+from jobs.verbs.exchange.shader.golden import COLUMNS, DENSITY, TRANSPARENCY, Golden
 from jobs.verbs.exchange.shader.tables import MOST_CELLS, MOST_NODES, Tables
+from pipeline.compiled.arrays import Float32
 from pipeline.truth.conventions import COMPONENTS
 from weaves.fabric import Fabric
 
@@ -57,12 +60,17 @@ class Buffer(_Model):
 
 
 class Colours(_Model):
-    """Linear Rec. 709 colours of the components, k_s and k_d; means if threads differ in colour."""
+    """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
+
+    Means if threads differ in colour.
+    """
 
     specular_warp: tuple[float, float, float]
     specular_weft: tuple[float, float, float]
     diffuse_warp: tuple[float, float, float]
     diffuse_weft: tuple[float, float, float]
+    transmitted_warp: tuple[float, float, float]
+    transmitted_weft: tuple[float, float, float]
 
 
 class Vectors(_Model):
@@ -72,10 +80,16 @@ class Vectors(_Model):
     """Columns of a query."""
     queries: list[list[float]]
     """Queries."""
+    groups: dict[str, tuple[int, int]]
+    """First row and end of the rows of each kind; the range of a column is that of its group."""
     components: list[list[float]]
     """Their answers."""
     bounds: list[list[float]]
-    """The same without shadows of the light: upper bounds of the components."""
+    """Upper bounds of the components."""
+    transparency: list[float]
+    """Transparency of the footprint towards the viewer."""
+    density: list[float]
+    """Density with which `sample` finds wi, 1/sr."""
     steady: float
     """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
 
@@ -105,8 +119,12 @@ class Descriptor(_Model):
     """Largest table that the shader takes."""
     texture_width: int = TEXTURE_WIDTH
     """Texels of a row of every texture."""
+    kinds: list[str]
+    """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
     scalars: dict[str, int | float]
     """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
+    back_scalars: dict[str, int | float]
+    """The next ones of both, of the back of the cloth, if the tables know it."""
     buffers: dict[str, Buffer]
     """Buffers, by the name that they have in the source."""
     source: list[str]
@@ -123,22 +141,30 @@ _INPUTS: Final = {
     "correlation": "of both axes, -1 to 1",
     "wi": "unit vector to the light",
     "wo": "unit vector to the viewer",
+    "curvature": "of the cloth in the viewer's plane, 1/yarn spacings, 0 to 1; 0 with the viewer behind",
 }
 _OUTPUTS: Final = {
     "components": "specular warp and weft, diffuse warp and weft, for unit colours, in 1/sr",
-    "bounds": "the same without shadows of the light, never below the components; diffuse ones integrate to at most 1",
+    "bounds": "with light and viewer on one side the same without shadows of the light, never below the components, of "
+    "which the diffuse ones integrate to at most 1; else the components",
 }
 _CONVENTIONS: Final = [
-    "The cloth is the plane z = 0 and is seen from z > 0. Warp yarns run along y, weft yarns along x.",
+    "The cloth is the plane z = 0, its front towards z > 0. Warp yarns run along y, weft yarns along x.",
     "Lengths are in yarn spacings. The first end and pick of the draft lie in the cell from (0, 0) to (1, 1).",
-    "wi and wo point away from the cloth. Answers are 0 if one of them is not in front (z <= 0).",
+    "wi and wo point away from the cloth. Behind it (z < 0) answers are 0 unless `kinds` has `behind`.",
     "The incident cosine is in the components: radiance is the integral of f L over wi, with no further cosine.",
-    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft.",
+    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft, with k_dt in place of k_d where "
+    "light and viewer are on different sides.",
 ]
 
 
 def descriptor(
-    fabric: Fabric, level: int, found: Tables, source: list[str], languages: dict[str, list[str]]
+    fabric: Fabric,
+    level: int,
+    found: Tables,
+    kinds: Collection[str],
+    source: list[str],
+    languages: dict[str, list[str]],
 ) -> Descriptor:
     """Return the content of `soft_nodes.json`."""
     mean = fabric.average()
@@ -155,10 +181,14 @@ def descriptor(
             specular_weft=mean.weft.specular_rgb,
             diffuse_warp=mean.warp.diffuse_rgb,
             diffuse_weft=mean.weft.diffuse_rgb,
+            transmitted_warp=mean.warp.diffuse_transmission_rgb,
+            transmitted_weft=mean.weft.diffuse_transmission_rgb,
         ),
         repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
         limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
+        kinds=sorted(kinds),
         scalars=found.scalars,
+        back_scalars=found.back_scalars,
         buffers={
             name: Buffer(
                 files=files,
@@ -179,8 +209,17 @@ def descriptor(
 def vectors(found: Golden) -> Vectors:
     """Return the content of `golden.json`."""
     return Vectors(
-        queries=found.rows.tolist(),
-        components=found.components.tolist(),
-        bounds=found.bounds.tolist(),
+        queries=_short(found.rows),
+        groups=found.groups,
+        components=_short(found.answers[:, :4]),
+        bounds=_short(found.answers[:, 4:8]),
+        transparency=_short(found.answers[:, TRANSPARENCY]),
+        density=_short(found.answers[:, DENSITY]),
         steady=found.steady,
     )
+
+
+def _short(values: Float32) -> list[Any]:
+    """Return numbers of single precision with the fewest digits that tell all of them apart."""
+    found: list[Any] = np.array([float(str(value)) for value in values.ravel()]).reshape(values.shape).tolist()
+    return found

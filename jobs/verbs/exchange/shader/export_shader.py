@@ -12,21 +12,24 @@ from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
 from jobs.verbs.exchange.shader.descriptor import FILE, GOLDEN, descriptor, vectors
 from jobs.verbs.exchange.shader.golden import golden
 from jobs.verbs.exchange.shader.languages import SOURCE, compiler_for, made, refuse_unknown, translate
+from jobs.verbs.exchange.shader.sides import tabulate_sides, wanted_kinds
 from jobs.verbs.exchange.shader.tables import Tables, layout_slang, refuse_large, tables
 from pipeline.analytic.soft_nodes.detail import DETAILS
-from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.atomic import atomic_folder
 from reports.images.texture import png_bytes
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-SOURCES: Final = ("soft_nodes.slang", "evaluate.slang", "draw.slang")
+SOURCES: Final = (
+    "soft_nodes.slang", "importance.slang", "evaluate.slang", "draw.slang", "buffers.slang", "arithmetic.slang",
+    "horizons.slang", "query.slang", "colours.slang", "shade.slang", "fixed_nodes.slang", "placed_nodes.slang",
+)  # fmt: skip
 """Files of the source; `layout.slang` is generated beside them."""
 
 _HOME = Path(__file__).parent
 
 
-def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[str]) -> str:
+def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[str], kinds: Sequence[str] = ()) -> str:
     """Write the soft nodes of a fabric for renderers, whole or not at all, and return a sentence on the folder.
 
     Parameters
@@ -39,23 +42,26 @@ def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[
         Level of detail k, one of DETAILS.
     languages : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, or ``"all"``.
+    kinds : sequence of str
+        Kinds of queries beside light and viewer in front of flat cloth: of KINDS, or ``"all"``.
 
     Raises
     ------
     BadInput
-        If a language is not known, slangc is needed and not there, the level is none, or the cloth is too large.
+        If a language or kind is not known, slangc is needed and not there, the level is none, or the cloth too large.
     WorkFailed
         If slangc refuses the source.
     """
     refuse_unknown(languages)
     if level not in DETAILS:
         raise BadInput("export", "--level", level, f"must be one of {', '.join(map(str, DETAILS))}")
+    known = wanted_kinds(kinds)
     wanted = made(languages)
     compiler = compiler_for(wanted) if wanted else None
     picks, ends = fabric.weave.warp_over.shape
     refuse_large(ends, picks)
-    table = tabulate(fabric, level=level)
-    found = tables(table)
+    sides = tabulate_sides(fabric, level, known)
+    found = tables(sides)
     with atomic_folder(folder, FILE) as here:
         source = here / SOURCE
         source.mkdir()
@@ -64,13 +70,12 @@ def export_shader(fabric: Fabric, folder: Path, level: int, languages: Sequence[
             (source / name).write_bytes((_HOME / name).read_bytes())
         files = translate(wanted, compiler, source, here) if compiler else {}
         _write_tables(found, here / "tables")
-        (here / GOLDEN).write_text(vectors(golden(table)).model_dump_json() + "\n", encoding="utf-8")
+        (here / GOLDEN).write_text(vectors(golden(sides)).model_dump_json() + "\n", encoding="utf-8")
         names = [f"{SOURCE}/{name}" for name in ("layout.slang", *SOURCES)]
-        said = descriptor(fabric, level, found, names, files)
+        said = descriptor(fabric, level, found, known, names, files)
         (here / FILE).write_text(said.model_dump_json(indent=1) + "\n", encoding="utf-8")
         size = sum(path.stat().st_size for path in here.rglob("*") if path.is_file())
-    nodes = int(found.scalars["blocks"]) * table.evenly.shape[1]
-    written = ", ".join((SOURCE, *files))
+    nodes, written = sides.front.evenly.size, ", ".join((SOURCE, *files, *sorted(known)))
     return f"{folder}: {written}; level {level}, {nodes} nodes, {size / 1e3:,.0f} kB"
 
 

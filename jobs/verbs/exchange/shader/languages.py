@@ -20,16 +20,13 @@ ALL: Final = "all"
 
 
 class Program(NamedTuple):
-    """A file that slangc makes: its name without a suffix is that of the source and of the entry point."""
+    """A file that slangc makes of a source, with its entry points."""
 
     file: str
+    source: str
+    entries: tuple[str, ...]
     stage: str
     textures: bool
-
-    @property
-    def entry(self) -> str:
-        """Name of the entry point."""
-        return self.file.split(".")[0]
 
 
 class Language(NamedTuple):
@@ -40,14 +37,20 @@ class Language(NamedTuple):
 
 
 def _rows(suffix: str) -> tuple[Program, ...]:
-    return (Program(f"evaluate.{suffix}", "compute", False),)
+    return (Program(f"evaluate.{suffix}", "evaluate.slang", ("evaluate", "scatter"), "compute", False),)
+
+
+def _single(entry: str, suffix: str, stage: str, source: str = "evaluate.slang") -> Program:
+    return Program(f"{entry}.{suffix}", source, (entry,), stage, stage == "fragment")
 
 
 LANGUAGES: Final = {
     "cpp": Language("cpp", _rows("cpp")),
     "cuda": Language("cuda", _rows("cu")),
-    "glsl": Language("glsl", _rows("comp")),
-    "glsles": Language("glsl", (Program("evaluate.frag", "fragment", True), Program("draw.frag", "fragment", True))),
+    "glsl": Language("glsl", (_single("evaluate", "comp", "compute"), _single("scatter", "comp", "compute"))),
+    "glsles": Language(
+        "glsl", (_single("evaluate", "frag", "fragment"), _single("draw", "frag", "fragment", "draw.slang"))
+    ),
     "hlsl": Language("hlsl", _rows("hlsl")),
     "metal": Language("metal", _rows("metal")),
     "wgsl": Language("wgsl", _rows("wgsl")),
@@ -124,16 +127,26 @@ def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Pa
         (folder / name).mkdir()
         language = LANGUAGES[name]
         for program in language.programs:
-            path = folder / name / program.file
-            options = ["-DTEXTURES"] if program.textures else []
-            _run([
-                str(compiler), str(source / f"{program.entry}.slang"), *options, "-target", language.target, "-entry",
-                program.entry, "-stage", program.stage, "-line-directive-mode", "none", "-o", str(path),
-            ])  # fmt: skip
-            if name == "glsles":
-                path.write_text(_as_es(path.read_text(encoding="utf-8")), encoding="utf-8")
+            compile_program(compiler, source, program, language.target, folder / name / program.file)
             found.setdefault(name, []).append(f"{name}/{program.file}")
     return found
+
+
+def compile_program(compiler: Path, source: Path, program: Program, target: str, path: Path) -> None:
+    """Write one program; what is to draw in a browser becomes GLSL ES 3.00. WorkFailed if slangc refuses it."""
+    options = ["-DTEXTURES"] if program.textures else []
+    for entry in program.entries:
+        options += ["-entry", entry, "-stage", program.stage]
+    command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
+    _run([*command, "-line-directive-mode", "none"])
+    text = path.read_text(encoding="utf-8")
+    path.write_text(_dense(_as_es(text) if program.textures else text), encoding="utf-8")
+
+
+def _dense(text: str) -> str:
+    """Return a program without indentation, comments on lines of their own and empty lines: a fifth shorter."""
+    without = re.sub(r"^[ \t]+|[ \t]+$|/\*.*?\*/", "", text, flags=re.M | re.S)
+    return re.sub(r"^(?://.*)?\n", "", without, flags=re.M)
 
 
 def _as_es(text: str) -> str:

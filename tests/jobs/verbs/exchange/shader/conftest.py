@@ -20,7 +20,7 @@ import pytest
 from PIL import Image
 
 from jobs.verbs.exchange.shader.export_shader import export_shader
-from jobs.verbs.exchange.shader.languages import slangc
+from jobs.verbs.exchange.shader.languages import Program, compile_program, slangc
 from weaves.fabric import load_fabric
 
 
@@ -36,9 +36,9 @@ def exported(tmp_path_factory):
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
-    def export(name, level=2, *languages):
-        folder = home / "-".join((name, str(level), *languages))
-        export_shader(load_fabric(name), folder, level, languages)
+    def export(name, level=2, *languages, kinds=()):
+        folder = home / "-".join((name, str(level), *languages, *kinds))
+        export_shader(load_fabric(name), folder, level, languages, kinds)
         return folder
 
     return export
@@ -64,10 +64,15 @@ def read():
             buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
         golden = json.loads((folder / said["golden"]).read_text())
         queries = np.array(golden["queries"], np.float32)
-        answers = np.concatenate([golden["components"], golden["bounds"]], axis=1)
-        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers)
+        columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
+        answers = np.column_stack([np.array(column) for column in columns])
+        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
     return read
+
+
+WIDTHS = {"evaluate": (12, 8), "scatter": (16, 16)}
+"""Columns of the rows of each entry point, and of its results."""
 
 
 class _Buffer(ctypes.Structure):
@@ -80,23 +85,26 @@ class _Groups(ctypes.Structure):
 
 @pytest.fixture(scope="session")
 def cpp(exported, tmp_path_factory):
-    """A function that evaluates queries, (N, 11), by the C++ form: components and bounds, (N, 8)."""
+    """A function that runs an entry point of the C++ form on rows: components and bounds, (N, 8), of queries, (N, 12).
+
+    `scatter` takes random numbers beside them, (N, 15), and returns the columns of a Scatter, (N, 16).
+    """
     if lacking := missing("slangc", "g++"):
         pytest.skip(lacking)
     library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
     source = exported("gingham", 2, "cpp") / "cpp" / "evaluate.cpp"
     subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
-    evaluate = ctypes.CDLL(str(library)).evaluate
+    programs = ctypes.CDLL(str(library))
 
-    def call(buffers, queries):
-        count = -(-len(queries) // 64)
-        rows, answers = np.zeros((64 * count, 11), np.float32), np.zeros((64 * count, 8), np.float32)
-        rows[: len(queries)] = queries
+    def call(buffers, queries, entry="evaluate"):
+        count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
+        rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
+        rows[: len(queries), : queries.shape[1]] = queries
         arrays = [np.ascontiguousarray(buffers[name]) for name in ("integers", "numbers", "nodes", "grid")]
         arrays += [rows, answers]
         buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
         groups = _Groups((0, 0, 0), (count, 1, 1))
-        evaluate(ctypes.byref(groups), None, ctypes.byref(buffer))
+        getattr(programs, entry)(ctypes.byref(groups), None, ctypes.byref(buffer))
         return answers[: len(queries)]
 
     return call
@@ -104,22 +112,36 @@ def cpp(exported, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def webgl(exported, tmp_path_factory):
-    """A function that evaluates the golden queries of cloths by the GLSL ES form: components and bounds, (N, 8)."""
+    """A function that runs an entry point of the GLSL ES form on the golden queries of cloths; results as for `cpp`.
+
+    For `scatter` the random numbers are 0.5.
+    """
     if lacking := missing("slangc", "chromium"):
         pytest.skip(lacking)
-    source = (exported("gingham", 2, "glsles") / "glsles" / "evaluate.frag").read_text()
+    folder = exported("gingham", 2, "glsles")
     page = Path(__file__).with_name("evaluate.html").read_text()
 
-    def call(cloths, half=False):
+    @cache
+    def source(entry):
+        if entry == "evaluate":
+            return (folder / "glsles" / "evaluate.frag").read_text()
+        path = tmp_path_factory.mktemp("glsles") / f"{entry}.frag"
+        program = Program(path.name, "evaluate.slang", (entry,), "fragment", True)
+        compile_program(slangc(), folder / "slang", program, "glsl", path)
+        return path.read_text()
+
+    def call(cloths, half=False, entry="evaluate"):
+        columns, results = WIDTHS[entry]
         jobs = []
         for cloth in cloths:
-            # Three texels a query; the twelfth number is not read.
-            columns = {**cloth.buffers, "queries": np.pad(cloth.queries, ((0, 0), (0, 1)))}
-            columns["nodes"] = columns["nodes"].astype(np.float16 if half else np.float32)
-            encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
-            jobs.append({**encoded, "count": len(cloth.queries), "half": half})
+            rows = np.full((len(cloth.queries), columns), 0.5, np.float32)
+            rows[:, : cloth.queries.shape[1]] = cloth.queries
+            values = {**cloth.buffers, "queries": rows}
+            values["nodes"] = values["nodes"].astype(np.float16 if half else np.float32)
+            encoded = {name: base64.b64encode(array.tobytes()).decode() for name, array in values.items()}
+            jobs.append({**encoded, "count": len(rows), "half": half, "texels": columns // 4, "targets": results // 4})
         written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
-        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source), 1))
+        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source(entry)), 1))
         command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
         done = subprocess.run([*command, written.as_uri()], capture_output=True, text=True, timeout=600, check=True)
         shown = re.search(r'<pre id="answers">(.*?)</pre>', done.stdout, re.DOTALL)
