@@ -122,3 +122,9 @@ def constants() -> dict[str, float | int]:
     for module, renamed in _RENAMED.items():
         found |= {name: vars(module)[own] for name, own in renamed.items()}
     return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in found.items()}  # type: ignore[arg-type]
+
+
+def shared_constants() -> dict[str, float | int]:
+    """Return the constants of common.slang."""
+    found = constants()
+    return {name: found[name] for name in ("TEXTURE_WIDTH", "TINY", *_RENAMED[float32])}

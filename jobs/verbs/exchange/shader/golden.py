@@ -7,6 +7,8 @@ STEADY, as a share of the range of its column, if the last digits of its footpri
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -68,22 +70,33 @@ def rows_of(queries: Queries) -> Float32:
     return np.column_stack(columns).astype(np.float32)
 
 
+Answering = Callable[[Queries], Float32]
+"""Components and bounds of N queries, (N, 8)."""
+
+
 def golden(table: Table, count: int = ROWS) -> Golden:
     """Return `count` golden queries of a table."""
+    return golden_of(partial(_read, table), (int(table.repeat[0]), int(table.repeat[1])), count)
+
+
+def golden_of(read: Answering, repeat: tuple[int, int], count: int = ROWS, stretched: bool = True) -> Golden:
+    """Return `count` golden queries of a model, over a repeat (ends, picks); all round if not `stretched`."""
     rng = np.random.default_rng(_SEED)
-    queries = _candidates(table, rng, 2 * count)
-    steady, answer = _steady(table, queries, rng)
+    queries = _candidates(repeat, rng, 2 * count)
+    if not stretched:
+        queries = queries._replace(sigma_minor=queries.sigma)
+    steady, answer = _steady(read, queries, rng)
     chosen = np.flatnonzero(steady)[:count]
     kept = queries.take(chosen)
     return Golden(rows_of(kept), answer[chosen, :4], answer[chosen, 4:], float(steady.mean()))
 
 
-def _candidates(table: Table, rng: np.random.Generator, count: int) -> Queries:
+def _candidates(repeat: tuple[int, int], rng: np.random.Generator, count: int) -> Queries:
     """Return queries of every kind by turns, anywhere in the repeat, light and viewer anywhere in front."""
     kinds = np.array(_KINDS)[np.arange(count) % len(_KINDS)]
     drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
     sigma, ratio = drawn[:, 0], drawn[:, 1]
-    place = rng.random((count, 2)) * table.repeat
+    place = rng.random((count, 2)) * repeat
     # Half of the ellipses lie along the yarns.
     angle = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(-0.5, 0.5, count)) * np.pi
     columns = (place[:, 0], place[:, 1], sigma, _front(rng, count), _front(rng, count), sigma / ratio, angle)
@@ -97,9 +110,9 @@ def _front(rng: np.random.Generator, count: int) -> Float32:
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
 
 
-def _steady(table: Table, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
+def _steady(read: Answering, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
     """Return which queries are steady, and components and bounds of all, (N, 8)."""
-    answer = _read(table, queries)
+    answer = read(queries)
     span = np.ptp(answer, axis=0)
     change = np.zeros(len(answer))
     for _ in range(_TRIALS):
@@ -107,7 +120,7 @@ def _steady(table: Table, queries: Queries, rng: np.random.Generator) -> tuple[M
             u=_next(queries.u, rng), v=_next(queries.v, rng), sigma=_next(queries.sigma, rng),
             sigma_minor=_next(queries.sigma_minor, rng),
         )  # fmt: skip
-        change = np.maximum(change, (np.abs(_read(table, moved) - answer) / span).max(axis=1))
+        change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
 
 

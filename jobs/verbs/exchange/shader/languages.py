@@ -18,6 +18,9 @@ SOURCE: Final = "slang"
 ALL: Final = "all"
 """Every language."""
 
+ONNX: Final = "onnx"
+"""The network of a model alone, which needs no compiler."""
+
 
 class Program(NamedTuple):
     """A file that slangc makes: its name without a suffix is that of the source and of the entry point."""
@@ -70,8 +73,8 @@ none; bindings, which a program sets by name."""
 def refuse_unknown(languages: Sequence[str]) -> None:
     """Refuse a name that is no language."""
     for name in languages:
-        if name not in (ALL, SOURCE, *LANGUAGES):
-            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ALL))}"
+        if name not in (ALL, SOURCE, ONNX, *LANGUAGES):
+            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ONNX, ALL))}"
             raise BadInput("export", "--language", one_line(name, 40), allowed)
 
 

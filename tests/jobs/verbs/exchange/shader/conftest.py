@@ -32,13 +32,13 @@ def missing(*programs):
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """A function that exports a fabric once, and returns its folder."""
+    """A function that exports a fabric once, and returns its folder; models take no level."""
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
-    def export(name, level=2, *languages):
-        folder = home / "-".join((name, str(level), *languages))
-        export_shader(load_fabric(name), folder, level, languages)
+    def export(name, level=2, *languages, model=None):
+        folder = home / "-".join((name, str(level), *languages, Path(model or "soft_nodes").name))
+        export_shader(load_fabric(name), folder, None if model else level, languages, model)
         return folder
 
     return export
@@ -48,12 +48,13 @@ def exported(tmp_path_factory):
 def read():
     """A function that reads an exported folder as a program would that has only its files."""
 
-    def read(folder, type_of_nodes="float32"):
-        said = json.loads((folder / "soft_nodes.json").read_text())
+    def read(folder, type_of_numbers="float32"):
+        (listing,) = (path for path in folder.glob("*.json") if path.name != "golden.json")
+        said = json.loads(listing.read_text())
         codes = {"int32": "<i4", "float32": "<f4", "float16": "<f2"}
         buffers = {}
         for name, buffer in said["buffers"].items():
-            kind = type_of_nodes if name == "nodes" else next(iter(buffer["files"]))
+            kind = type_of_numbers if type_of_numbers in buffer["files"] else next(iter(buffer["files"]))
             path = folder / buffer["files"][kind]
             if kind == "uint8":
                 values = np.asarray(Image.open(io.BytesIO(path.read_bytes()))).ravel()
@@ -83,8 +84,12 @@ def cpp(exported, tmp_path_factory):
     """A function that evaluates queries, (N, 11), by the C++ form: components and bounds, (N, 8)."""
     if lacking := missing("slangc", "g++"):
         pytest.skip(lacking)
-    library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
-    source = exported("gingham", 2, "cpp") / "cpp" / "evaluate.cpp"
+    return compiled(exported("gingham", 2, "cpp"), tmp_path_factory.mktemp("cpp"))
+
+
+def compiled(exported, folder):
+    """Compile the C++ form of an exported folder into another, and return the function of the fixture `cpp`."""
+    library, source = folder / "evaluate.so", exported / "cpp" / "evaluate.cpp"
     subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
     evaluate = ctypes.CDLL(str(library)).evaluate
 
@@ -92,7 +97,7 @@ def cpp(exported, tmp_path_factory):
         count = -(-len(queries) // 64)
         rows, answers = np.zeros((64 * count, 11), np.float32), np.zeros((64 * count, 8), np.float32)
         rows[: len(queries)] = queries
-        arrays = [np.ascontiguousarray(buffers[name]) for name in ("integers", "numbers", "nodes", "grid")]
+        arrays = [np.ascontiguousarray(values) for values in buffers.values()]
         arrays += [rows, answers]
         buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
         groups = _Groups((0, 0, 0), (count, 1, 1))
@@ -107,17 +112,18 @@ def webgl(exported, tmp_path_factory):
     """A function that evaluates the golden queries of cloths by the GLSL ES form: components and bounds, (N, 8)."""
     if lacking := missing("slangc", "chromium"):
         pytest.skip(lacking)
-    source = (exported("gingham", 2, "glsles") / "glsles" / "evaluate.frag").read_text()
     page = Path(__file__).with_name("evaluate.html").read_text()
 
-    def call(cloths, half=False):
+    def call(cloths, half=False, folder=None):
+        source = ((folder or exported("gingham", 2, "glsles")) / "glsles" / "evaluate.frag").read_text()
         jobs = []
         for cloth in cloths:
             # Three texels a query; the twelfth number is not read.
             columns = {**cloth.buffers, "queries": np.pad(cloth.queries, ((0, 0), (0, 1)))}
-            columns["nodes"] = columns["nodes"].astype(np.float16 if half else np.float32)
+            for name in {"nodes", "weights"} & columns.keys():
+                columns[name] = columns[name].astype(np.float16 if half else np.float32)
             encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
-            jobs.append({**encoded, "count": len(cloth.queries), "half": half})
+            jobs.append({"names": list(columns), **encoded, "count": len(cloth.queries), "half": half})
         written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
         written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source), 1))
         command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
