@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
 from jobs.verbs.exchange.shader.golden import COLUMNS, Golden
 from jobs.verbs.exchange.shader.tables import MOST_CELLS, MOST_NODES, Tables
+from pipeline.compiled.arrays import Float32
 from pipeline.truth.conventions import COMPONENTS
 from weaves.fabric import Fabric
 
@@ -226,8 +227,13 @@ def descriptor(
 def vectors(found: Golden) -> Vectors:
     """Return the content of `golden.json`."""
     return Vectors(
-        queries=found.rows.tolist(),
-        components=found.components.tolist(),
-        bounds=found.bounds.tolist(),
+        queries=_nine_digits(found.rows),
+        components=_nine_digits(found.components),
+        bounds=_nine_digits(found.bounds),
         steady=found.steady,
     )
+
+
+def _nine_digits(rows: Float32) -> list[list[float]]:
+    """Return rows of numbers of nine digits, which give the same single precision."""
+    return [[float(f"{value:.9g}") for value in row] for row in rows.tolist()]

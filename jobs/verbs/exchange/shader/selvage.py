@@ -104,8 +104,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader
         layers=described,
         onnx={
             "features": f"inputs of the correction, (N, {OF_QUERY})",
-            "components": "components of the soft nodes, (N, 4)",
-            "bounds": "bounds of the soft nodes, (N, 4)",
+            "soft_components": "components of the soft nodes, (N, 4)",
+            "soft_bounds": "bounds of the soft nodes, (N, 4)",
         },
     )
     return Shader(

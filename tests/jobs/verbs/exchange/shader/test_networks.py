@@ -25,6 +25,11 @@ from tests.jobs.verbs.exchange.shader.conftest import compiled, missing
 from tests.jobs.verbs.exchange.shader.test_evaluate import FABRICS, UNSEEN, hemisphere, worst
 from weaves.fabric import load_fabric
 
+SOME = ("crepe", "gauze", "gingham", "silk_charmeuse")
+"""Fabrics of the fast tests: the largest repeat, open cloth, the smallest repeat, long floats."""
+
+ALL = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in FABRICS]
+
 CLOTH = "gingham"
 """The fabric of the trained `neumip`."""
 
@@ -79,13 +84,13 @@ def check_answers(found, expected, allowed):
 
 
 @pytest.mark.parametrize(("kind", "allowed"), [("float32", 1e-5), ("float16", 1e-2)])
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.parametrize("name", ALL)
 def test_selvage_answers_its_golden_vectors(selvage_cpp, exported, read, name, kind, allowed):
     cloth = read(exported(name, model="selvage"), kind)
     check_answers(selvage_cpp(cloth.buffers, cloth.queries), cloth.answers, allowed)
 
 
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.parametrize("name", ALL)
 def test_golden_vectors_are_those_of_the_method(selvage, exported, read, name):
     """A network that changes nothing would pass all other tests with wrong weights."""
     cloth = read(exported(name, model="selvage"))
@@ -94,7 +99,8 @@ def test_golden_vectors_are_those_of_the_method(selvage, exported, read, name):
     same = (cloth.queries == soft.queries).all(axis=1)
     change = np.abs(cloth.answers[same, :4] - soft.answers[same, :4]) / np.ptp(soft.answers[:, :4], axis=0)
     assert np.median(change.max(axis=1)) > 1e-3
-    assert sum(path.stat().st_size for path in exported(name, model="selvage").rglob("*") if path.is_file()) < 700_000
+    size = sum(path.stat().st_size for path in exported(name, model="selvage").rglob("*") if path.is_file())
+    assert size < 1_000_000
 
 
 @pytest.mark.parametrize("name", UNSEEN)
@@ -113,12 +119,15 @@ def test_other_queries_of_selvage_are_answered(selvage, selvage_cpp, exported, r
 def test_selvage_makes_no_light(selvage_cpp, exported, read, name):
     buffers, rng = read(exported(name, model="selvage")).buffers, np.random.default_rng(6)
     wi, solid = hemisphere(64)
+    returned = []
     for deviation in (0.05, 0.4, 5.0):
         wo = hemisphere(8)[0][rng.integers(64)]
         fixed = np.tile((*rng.uniform(0.0, 8.0, 2), deviation, 0.7 * deviation, 0.3), (len(wi), 1))
         found = selvage_cpp(buffers, np.column_stack([fixed, wi, np.tile(wo, (len(wi), 1))]))
+        returned.append(solid @ found[:, 2:4].sum(axis=1))
         # The rule has 64 x 64 directions: a kink of a clipped cosine costs it some 1e-3.
-        assert 0.01 < solid @ found[:, 2:4].sum(axis=1) <= solid @ found[:, 6:8].sum(axis=1) < 1.002
+        assert returned[-1] <= solid @ found[:, 6:8].sum(axis=1) < 1.002
+    assert min(returned[1:]) > 0.01  # a small footprint may see a gap
 
 
 def test_light_and_viewer_behind_answer_nothing(selvage_cpp, neumip_cpp, neumip, exported, read):
@@ -130,9 +139,10 @@ def test_light_and_viewer_behind_answer_nothing(selvage_cpp, neumip_cpp, neumip,
         assert (found[:2] == 0.0).all() and (found[2] > 0.0).any()
 
 
+@pytest.mark.parametrize("fabrics", [SOME, pytest.param(FABRICS, marks=pytest.mark.slow)], ids=["some", "all"])
 @pytest.mark.parametrize(("half", "allowed"), [(False, 1e-4), (True, 1e-2)], ids=["float32", "float16"])
-def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allowed):
-    selvages = [read(exported(name, model="selvage")) for name in FABRICS]
+def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allowed, fabrics):
+    selvages = [read(exported(name, model="selvage")) for name in fabrics]
     folder = exported(CLOTH, 2, "cpp", "glsles", model="selvage")
     for cloth, found in zip(selvages, webgl(selvages, half, folder), strict=True):
         check_answers(found, cloth.answers, allowed)
@@ -189,13 +199,14 @@ def session(folder):
     return onnxruntime.InferenceSession(folder / "onnx" / "network.onnx", providers=["CPUExecutionProvider"])
 
 
+@pytest.mark.slow
 def test_networks_alone_run_by_onnx(exported, selvage, neumip):
     for name, model in (("denim", "selvage"), (CLOTH, neumip)):
         fabric, folder = load_fabric(name), exported(name, 2, "onnx", model=model)
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 500)
         if model == "selvage":
             method, found = selvage, read_queries(tabulate(fabric), queries)
-            inputs = dict(zip(("features", "components", "bounds"), found, strict=True))
+            inputs = dict(zip(("features", "soft_components", "soft_bounds"), found, strict=True))
             inputs["features"] = np.ascontiguousarray(inputs["features"][:, :OF_QUERY])
         else:
             (method,) = load_model(model_folder(neumip, "test", "model"))
@@ -233,8 +244,9 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, tmp
     assert "was not trained on denim" in refused(twillight, "denim", *shader, neumip)
     old = neumip_folder(tmp_path / "old", load_fabric(CLOTH), version=99, texels_per_yarn=2)
     assert "version = 99" in refused(twillight, CLOTH, *shader, old)
-    (tmp_path / "old" / "model.safetensors").write_bytes(b"\0")
-    assert "damaged" in refused(twillight, CLOTH, *shader, old)
+    damaged = neumip_folder(tmp_path / "damaged", load_fabric(CLOTH), texels_per_yarn=2)
+    (tmp_path / "damaged" / "model.safetensors").write_bytes(b"\0")
+    assert "damaged" in refused(twillight, CLOTH, *shader, damaged)
     assert "trained with level 2" in refused(twillight, CLOTH, *shader, "selvage", "--level", "4")
     assert "has no soft nodes" in refused(twillight, CLOTH, *shader, neumip, "--level", "4")
     assert "soft_nodes has no network" in refused(twillight, CLOTH, "--shader", "x", "--language", "onnx")
