@@ -33,6 +33,4 @@ def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequen
 def layers_of(network: nn.Sequential) -> list[Layer]:
     """Return copies of the layers of a perceptron."""
     linear = (layer for layer in network if isinstance(layer, nn.Linear))
-    return [
-        Layer(layer.weight.t().numpy(force=True).copy(), layer.bias.numpy(force=True).copy()) for layer in linear
-    ]
+    return [Layer(layer.weight.t().numpy(force=True).copy(), layer.bias.numpy(force=True).copy()) for layer in linear]

@@ -80,7 +80,7 @@ class Network(_Model):
     inputs: dict[str, list[str]]
     """Inputs of each network, in their order."""
     outputs: dict[str, str]
-    """What becomes of its outputs."""
+    """Meaning of the outputs of each network."""
     layers: list[Layer]
     """Layers, in the order of their computation."""
     onnx: dict[str, str]
@@ -193,9 +193,7 @@ def colours(fabric: Fabric) -> Colours:
     )
 
 
-def descriptor(
-    fabric: Fabric, level: int, found: Tables
-) -> Descriptor:
+def descriptor(fabric: Fabric, level: int, found: Tables) -> Descriptor:
     """Return the content of `soft_nodes.json`, before files are written."""
     values = {name: getattr(found, name) for name in _FILES}
     return Descriptor(

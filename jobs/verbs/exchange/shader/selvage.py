@@ -44,7 +44,11 @@ _BY_FAMILY: Final = (
 )
 _FEATURES: Final = (
     *(f"{family}: {text}" for family in ("warp", "weft") for text in _BY_FAMILY),
-    *(f"{name}.{axis}, mirrored so that (wi + wo).x and .y are not negative" for name in ("wi", "wo") for axis in "xyz"),
+    *(
+        f"{name}.{axis}, mirrored so that (wi + wo).x and .y are not negative"
+        for name in ("wi", "wo")
+        for axis in "xyz"
+    ),
     *(f"slope of the half vector along {axis}, at most 3" for axis in "xy"),
     "wi . wo",
     "seen share q of the bare area",

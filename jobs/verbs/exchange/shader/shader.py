@@ -1,4 +1,4 @@
-"""What a model writes into an exported folder."""
+"""Contents of an exported folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a descriptor says of the training of a model."""
+"""The training of a model, for a descriptor."""
 
 from __future__ import annotations
 
