@@ -175,6 +175,10 @@ def export(
         list[str],
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
     ] = NOTHING,
+    kind: Annotated[
+        list[str],
+        Parameter(help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth."),
+    ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader."""
     from jobs.terminal import Terminal
@@ -189,6 +193,7 @@ def export(
     for option, value, owner in (
         ("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps),
         ("--model", model, shader), ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
+        ("--kind", ", ".join(kind) or None, shader),
     ):  # fmt: skip
         if value is not None and owner is None:
             raise BadInput("export", option, value, f"is not for {chosen[0]}; leave it out")
@@ -204,7 +209,7 @@ def export(
     elif shader is not None:
         from jobs.verbs.exchange.shader.export_shader import export_shader
 
-        said = export_shader(cloth, shader, level, language, model)
+        said = export_shader(cloth, shader, level, language, kind, model)
     else:
         from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
 

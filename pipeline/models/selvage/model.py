@@ -273,10 +273,6 @@ class Selvage:
         first = (self._of_query, self._cloths.of(fabric).bias)
         return [Layer(weight.numpy(), bias.numpy()) for weight, bias in (first, *self._others)]
 
-    def table_of(self, fabric: Fabric) -> Table:
-        """Return the table of the soft nodes."""
-        return self._cloths.of(fabric).table
-
     @property
     def options(self) -> SelvageOptions:
         """The design."""

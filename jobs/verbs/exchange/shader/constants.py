@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from types import ModuleType
 from typing import Final
 
 import numpy as np
 
-from pipeline.analytic import axis_densities, soft_horizons
+from pipeline.analytic import axis_densities, curved_horizons, soft_horizons
+from pipeline.analytic.importance import lobes
+from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
     answer,
     diamond,
@@ -23,10 +26,12 @@ from pipeline.analytic.soft_nodes import (
     wide,
 )
 from pipeline.compiled import float32
+from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth import query
 from pipeline.truth.footprint import mixture
 from pipeline.truth.geometry import heightfield
 from pipeline.truth.scattering import slab_float32
+from weaves.colour import LUMINANCE
 
 COLUMNS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
@@ -45,6 +50,18 @@ TEXTURE_WIDTH: Final = 1024
 WAVE_ROW: Final = 4 + diamond.AZIMUTHS // 2
 """Row of a node from which on it has its waves."""
 
+FALL_ROWS: Final = diamond.AZIMUTHS // 4
+"""Rows of a node for the falls of one curvature."""
+
+LEVEL_TINY: Final = 1e-18
+"""Squared length along the fabric plane below which a direction is the normal (pipeline.truth.geometry.visibility)."""
+
+_SAMPLER: Final = inspect.signature(PatchBSDF).parameters
+POINTS: Final[int] = _SAMPLER["points"].default
+"""Points of a footprint that have a lobe each."""
+WIDENING: Final[float] = _SAMPLER["widening"].default
+"""Factor on the widening of lobes by the spread of the tangents."""
+
 _SAME: Final[dict[ModuleType, tuple[str, ...]]] = {
     heightfield: ("WARP", "WEFT", "GAP"),
     diamond: ("AZIMUTHS",),
@@ -59,6 +76,9 @@ _SAME: Final[dict[ModuleType, tuple[str, ...]]] = {
     waves: ("MOST_WAVES",),
     wide: ("RESOLVED",),
     query: ("HIDDEN_SHARE",),
+    curved_horizons: ("FALL",),
+    lobes: ("SCATTERED", "BROAD"),
+    importance_mixture: ("LEAST_COSINE",),
 }
 # What a file keeps to itself is read by name: a shader has it from there, and a new name there is an error here.
 _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
@@ -68,7 +88,12 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     soft_horizons: {"RAMP": "_RAMP", "RAMP_SLOPE": "_RAMP_SLOPE", "APART_TINY": "_TINY"},
     diamond: {"DIAMOND_TINY": "_TINY"},
-    slab_float32: {"SLAB_TINY": "_TINY"},
+    slab_float32: {"SLAB_TINY": "_TINY", "ALIKE": "_ALIKE", "GRAZING": "_GRAZING"},
+    lobes: {
+        "ASTRAY": "_ASTRAY", "CLEAR": "_CLEAR", "LEAST_SHARE": "_LEAST", "LOBE_SHARPNESS": "_SHARPNESS",
+        "LOBE_STEEPEST": "_STEEPEST", "ALONE": "_ALONE", "LOBE_TINY": "_TINY",
+    },
+    importance_mixture: {"LEFT_THROUGH": "THROUGH", "LOBE_SHORTEST": "_SHORTEST"},
     shade: {"SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "TAIL": "_TAIL"},
     footprint_nodes: {
         "HERMITE_BOX": "_HERMITE_BOX", "WHOLE": "_WHOLE", "VERTICAL": "_VERTICAL", "INVERSE_ROOT": "_INVERSE_ROOT",
@@ -94,6 +119,9 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
 def constants() -> dict[str, float | int]:
     """Return the constants of the shader, by name; those of type int are integers there."""
     line = mixture.COARSE_LINE
+    first, second, third = curved_horizons.CURVATURES
+    hidden_cosine, hidden_straight = vars(lobes)["_HIDDEN"]
+    red, green, blue = LUMINANCE
     found: dict[str, object] = {
         "TEXTURE_WIDTH": TEXTURE_WIDTH,
         "PI": math.pi,
@@ -111,6 +139,19 @@ def constants() -> dict[str, float | int]:
         "STRONGEST": line.most,
         **{f"NODE_{name}": row for row, name in enumerate(("NORMAL", "TANGENT", "ALONG", "ACROSS", "HORIZONS"))},
         "NODE_WAVES": WAVE_ROW,
+        "FALL_ROWS": FALL_ROWS,
+        "CURVATURE_0": first,
+        "CURVATURE_1": second,
+        "CURVATURE_2": third,
+        "LEVEL_TINY": LEVEL_TINY,
+        "POINTS": POINTS,
+        "LOBES": POINTS + 2,
+        "WIDENING": WIDENING,
+        "HIDDEN_COSINE": hidden_cosine,
+        "HIDDEN_STRAIGHT": hidden_straight,
+        "LUMINANCE_RED": red,
+        "LUMINANCE_GREEN": green,
+        "LUMINANCE_BLUE": blue,
     }
     for name, (module, columns) in COLUMNS.items():
         found |= {column: vars(module)[column] for column in columns}
@@ -125,6 +166,6 @@ def constants() -> dict[str, float | int]:
 
 
 def shared_constants() -> dict[str, float | int]:
-    """Return the constants of common.slang."""
-    found = constants()
-    return {name: found[name] for name in ("TEXTURE_WIDTH", "TINY", *_RENAMED[float32])}
+    """Return the constants of the source that needs no tables: arithmetic, queries and colours."""
+    found, names = constants(), ("TEXTURE_WIDTH", "TINY", "PI", "RIGHT", *_RENAMED[float32])
+    return {name: found[name] for name in (*names, *(name for name in found if name.startswith("LUMINANCE")))}

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from importlib.metadata import version
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
-from jobs.verbs.exchange.shader.golden import COLUMNS, Golden
+from jobs.verbs.exchange.shader.golden import ANSWERS, COLUMNS, DENSITY, TRANSPARENCY, Golden
 from jobs.verbs.exchange.shader.tables import MOST_CELLS, MOST_NODES, Tables
 from pipeline.compiled.arrays import Float32
 from pipeline.truth.conventions import COMPONENTS
@@ -88,12 +90,17 @@ class Network(_Model):
 
 
 class Colours(_Model):
-    """Linear Rec. 709 colours of the components, k_s and k_d; means if threads differ in colour."""
+    """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
+
+    Means if threads differ in colour.
+    """
 
     specular_warp: tuple[float, float, float]
     specular_weft: tuple[float, float, float]
     diffuse_warp: tuple[float, float, float]
     diffuse_weft: tuple[float, float, float]
+    transmitted_warp: tuple[float, float, float]
+    transmitted_weft: tuple[float, float, float]
 
 
 class Vectors(_Model):
@@ -103,10 +110,16 @@ class Vectors(_Model):
     """Columns of a query."""
     queries: list[list[float]]
     """Queries."""
+    groups: dict[str, tuple[int, int]]
+    """First row and end of the rows of each kind; the range of a column is that of its group."""
     components: list[list[float]]
     """Their answers."""
     bounds: list[list[float]]
-    """The same without shadows of the light: upper bounds of the components."""
+    """Upper bounds of the components."""
+    transparency: list[float]
+    """Transparency of the footprint towards the viewer; empty for a model that does not know it."""
+    density: list[float]
+    """Density with which `sample` finds wi, 1/sr; empty for a model without it."""
     steady: float
     """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
 
@@ -138,8 +151,12 @@ class Descriptor(_Model):
     """Largest table that the shader takes."""
     texture_width: int = TEXTURE_WIDTH
     """Texels of a row of every texture."""
+    kinds: list[str]
+    """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
     scalars: dict[str, int | float]
     """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
+    back_scalars: dict[str, int | float]
+    """The next ones of both, of the back of the cloth, if the tables know it."""
     buffers: dict[str, Buffer]
     """Buffers, by the name that they have in the source."""
     network: Network | None = None
@@ -158,21 +175,24 @@ INPUTS: Final = {
     "correlation": "of both axes, -1 to 1",
     "wi": "unit vector to the light",
     "wo": "unit vector to the viewer",
+    "curvature": "of the cloth in the viewer's plane, 1/yarn spacings, 0 to 1; 0 with the viewer behind",
 }
 """Fields of a query."""
 
 OUTPUTS: Final = {
     "components": "specular warp and weft, diffuse warp and weft, for unit colours, in 1/sr",
-    "bounds": "the same without shadows of the light, never below the components; diffuse ones integrate to at most 1",
+    "bounds": "with light and viewer on one side the same without shadows of the light, never below the components, of "
+    "which the diffuse ones integrate to at most 1; else the components",
 }
 """Fields of an answer."""
 
 CONVENTIONS: Final = [
-    "The cloth is the plane z = 0 and is seen from z > 0. Warp yarns run along y, weft yarns along x.",
+    "The cloth is the plane z = 0, its front towards z > 0. Warp yarns run along y, weft yarns along x.",
     "Lengths are in yarn spacings. The first end and pick of the draft lie in the cell from (0, 0) to (1, 1).",
-    "wi and wo point away from the cloth. Answers are 0 if one of them is not in front (z <= 0).",
+    "wi and wo point away from the cloth. Behind it (z < 0) answers are 0 unless `kinds` has `behind`.",
     "The incident cosine is in the components: radiance is the integral of f L over wi, with no further cosine.",
-    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft.",
+    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft, with k_dt in place of k_d where "
+    "light and viewer are on different sides.",
 ]
 """Axes, directions, cosine and colours."""
 
@@ -190,10 +210,17 @@ def colours(fabric: Fabric) -> Colours:
         specular_weft=mean.weft.specular_rgb,
         diffuse_warp=mean.warp.diffuse_rgb,
         diffuse_weft=mean.weft.diffuse_rgb,
+        transmitted_warp=mean.warp.diffuse_transmission_rgb,
+        transmitted_weft=mean.weft.diffuse_transmission_rgb,
     )
 
 
-def descriptor(fabric: Fabric, level: int, found: Tables) -> Descriptor:
+def descriptor(
+    fabric: Fabric,
+    level: int,
+    found: Tables,
+    kinds: Collection[str],
+) -> Descriptor:
     """Return the content of `soft_nodes.json`, before files are written."""
     values = {name: getattr(found, name) for name in _FILES}
     return Descriptor(
@@ -206,7 +233,9 @@ def descriptor(fabric: Fabric, level: int, found: Tables) -> Descriptor:
         colours=colours(fabric),
         repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
         limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
+        kinds=sorted(kinds),
         scalars=found.scalars,
+        back_scalars=found.back_scalars,
         buffers={
             name: Buffer(
                 files=files,
@@ -224,14 +253,18 @@ def descriptor(fabric: Fabric, level: int, found: Tables) -> Descriptor:
 
 def vectors(found: Golden) -> Vectors:
     """Return the content of `golden.json`."""
+    whole = found.answers.shape[1] == ANSWERS
     return Vectors(
-        queries=_nine_digits(found.rows),
-        components=_nine_digits(found.components),
-        bounds=_nine_digits(found.bounds),
+        queries=_short(found.rows),
+        groups=found.groups,
+        components=_short(found.answers[:, :4]),
+        bounds=_short(found.answers[:, 4:8]),
+        transparency=_short(found.answers[:, TRANSPARENCY]) if whole else [],
+        density=_short(found.answers[:, DENSITY]) if whole else [],
         steady=found.steady,
     )
 
 
-def _nine_digits(rows: Float32) -> list[list[float]]:
-    """Return rows of numbers of nine digits, which give the same single precision."""
-    return [[float(f"{value:.9g}") for value in row] for row in rows.tolist()]
+def _short(values: Float32) -> list[Any]:
+    """Return numbers of single precision with the nine digits that tell all of them apart."""
+    return np.array([float(f"{value:.9g}") for value in values.ravel()]).reshape(values.shape).tolist()

@@ -10,6 +10,7 @@ from jobs.verbs.exchange.shader.descriptor import GOLDEN, vectors
 from jobs.verbs.exchange.shader.languages import ALL, ONNX, SOURCE, compiler_for, made, refuse_unknown, translate
 from jobs.verbs.exchange.shader.models import shader_of
 from jobs.verbs.exchange.shader.shader import Shader
+from jobs.verbs.exchange.shader.sides import wanted_kinds
 from pipeline.atomic import atomic_folder
 from pipeline.models.runtimes import no_onnx
 from weaves.errors import BadInput
@@ -22,7 +23,12 @@ _HOME = Path(__file__).parent
 
 
 def export_shader(
-    fabric: Fabric, folder: Path, level: int | None, languages: Sequence[str], model: str | None = None
+    fabric: Fabric,
+    folder: Path,
+    level: int | None,
+    languages: Sequence[str],
+    kinds: Sequence[str] = (),
+    model: str | None = None,
 ) -> str:
     """Write a model of a fabric for renderers, whole or not at all, and return a sentence on the folder.
 
@@ -36,28 +42,32 @@ def export_shader(
         Level of detail k of the soft nodes, one of DETAILS.
     languages : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
+    kinds : sequence of str
+        Kinds of queries beside light and viewer in front of flat cloth: of KINDS, or EVERY.
     model : str, optional
         The model (`shader_of`); the soft nodes if left out.
 
     Raises
     ------
     BadInput
-        If a language is not known, slangc or a package is needed and not there, the model has no network for ONNX, or
+        If a language or kind is not known, slangc or a package is needed and not there, the model has no network for ONNX, or
         as `shader_of`.
     WorkFailed
         If slangc refuses the source.
     """
     refuse_unknown(languages)
+    known = wanted_kinds(kinds)
     wanted = made(languages)
     compiler = compiler_for(wanted) if wanted else None
-    shader = shader_of(model, fabric, level)
+    shader = shader_of(model, fabric, level, known)
     onnx = _onnx(shader, languages)
     listing = f"{shader.name}.json"
+    entries = ("evaluate", "draw", *(("scatter",) if shader.sampled else ()))
     with atomic_folder(folder, listing) as here:
         source = here / SOURCE
         source.mkdir()
         names = _write_source(shader, source)
-        files = translate(wanted, compiler, source, here) if compiler else {}
+        files = translate(wanted, compiler, source, here, entries) if compiler else {}
         contents = shader.files | ({} if onnx is None else {f"{ONNX}/network.onnx": onnx})
         for name, content in contents.items():
             (here / name).parent.mkdir(exist_ok=True)
@@ -70,7 +80,7 @@ def export_shader(
         size = sum(path.stat().st_size for path in here.rglob("*") if path.is_file())
     outside = said.network.outside if said.network else ""
     warning = f"; {fabric.name} is not like its training: {outside}" if outside else ""
-    return f"{folder}: {', '.join((SOURCE, *files))}; {shader.size}, {size / 1e3:,.0f} kB{warning}"
+    return f"{folder}: {', '.join((SOURCE, *files, *sorted(known)))}; {shader.size}, {size / 1e3:,.0f} kB{warning}"
 
 
 def _onnx(shader: Shader, languages: Sequence[str]) -> bytes | None:
@@ -88,8 +98,11 @@ def _write_source(shader: Shader, folder: Path) -> list[str]:
     """Write the source, and return its files."""
     texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
     name = shader.name
-    chosen = f'#include "{name}.slang"\n\nAnswer bsdf(Query query) {{ return {name}(query); }}\n'
-    texts |= {**shader.generated, "model.slang": f"// The model of this folder.\n\n{chosen}"}
+    lines = ["// The model of this folder.", "", f'#include "{name}.slang"']
+    if shader.sampled:
+        lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
+    lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]
+    texts |= {**shader.generated, "model.slang": "\n".join(lines)}
     for file, text in texts.items():
         (folder / file).write_text(text, encoding="utf-8")
     return [f"{SOURCE}/{file}" for file in texts]

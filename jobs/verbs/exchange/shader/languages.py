@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -23,16 +23,13 @@ ONNX: Final = "onnx"
 
 
 class Program(NamedTuple):
-    """A file that slangc makes: its name without a suffix is that of the source and of the entry point."""
+    """A file that slangc makes of a source, with its entry points."""
 
     file: str
+    source: str
+    entries: tuple[str, ...]
     stage: str
     textures: bool
-
-    @property
-    def entry(self) -> str:
-        """Name of the entry point."""
-        return self.file.split(".")[0]
 
 
 class Language(NamedTuple):
@@ -43,14 +40,20 @@ class Language(NamedTuple):
 
 
 def _rows(suffix: str) -> tuple[Program, ...]:
-    return (Program(f"evaluate.{suffix}", "compute", False),)
+    return (Program(f"evaluate.{suffix}", "evaluate.slang", ("evaluate", "scatter"), "compute", False),)
+
+
+def _single(entry: str, suffix: str, stage: str, source: str = "evaluate.slang") -> Program:
+    return Program(f"{entry}.{suffix}", source, (entry,), stage, stage == "fragment")
 
 
 LANGUAGES: Final = {
     "cpp": Language("cpp", _rows("cpp")),
     "cuda": Language("cuda", _rows("cu")),
-    "glsl": Language("glsl", _rows("comp")),
-    "glsles": Language("glsl", (Program("evaluate.frag", "fragment", True), Program("draw.frag", "fragment", True))),
+    "glsl": Language("glsl", (_single("evaluate", "comp", "compute"), _single("scatter", "comp", "compute"))),
+    "glsles": Language(
+        "glsl", (_single("evaluate", "frag", "fragment"), _single("draw", "frag", "fragment", "draw.slang"))
+    ),
     "hlsl": Language("hlsl", _rows("hlsl")),
     "metal": Language("metal", _rows("metal")),
     "wgsl": Language("wgsl", _rows("wgsl")),
@@ -103,7 +106,9 @@ def compiler_for(languages: Sequence[str]) -> Path:
     return found
 
 
-def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Path) -> dict[str, list[str]]:
+def translate(
+    languages: Sequence[str], compiler: Path, source: Path, folder: Path, entries: Collection[str]
+) -> dict[str, list[str]]:
     """Write the files of languages, each in a folder of its name, and return their paths in `folder`.
 
     Parameters
@@ -116,6 +121,8 @@ def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Pa
         Folder with the Slang source and `layout.slang`.
     folder : Path
         Folder to write to.
+    entries : collection of str
+        Entry points that the source has.
 
     Raises
     ------
@@ -127,16 +134,23 @@ def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Pa
         (folder / name).mkdir()
         language = LANGUAGES[name]
         for program in language.programs:
-            path = folder / name / program.file
-            options = ["-DTEXTURES"] if program.textures else []
-            _run([
-                str(compiler), str(source / f"{program.entry}.slang"), *options, "-target", language.target, "-entry",
-                program.entry, "-stage", program.stage, "-line-directive-mode", "none", "-o", str(path),
-            ])  # fmt: skip
-            if name == "glsles":
-                path.write_text(_as_es(path.read_text(encoding="utf-8")), encoding="utf-8")
+            present = program._replace(entries=tuple(entry for entry in program.entries if entry in entries))
+            if not present.entries:
+                continue
+            compile_program(compiler, source, present, language.target, folder / name / program.file)
             found.setdefault(name, []).append(f"{name}/{program.file}")
     return found
+
+
+def compile_program(compiler: Path, source: Path, program: Program, target: str, path: Path) -> None:
+    """Write one program; what is to draw in a browser becomes GLSL ES 3.00. WorkFailed if slangc refuses it."""
+    options = ["-DTEXTURES"] if program.textures else []
+    for entry in program.entries:
+        options += ["-entry", entry, "-stage", program.stage]
+    command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
+    _run([*command, "-line-directive-mode", "none"])
+    if program.textures:
+        path.write_text(_as_es(path.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def _as_es(text: str) -> str:

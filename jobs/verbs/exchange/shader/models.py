@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from jobs.verbs.exchange.shader import neumip, selvage, soft_nodes
 from jobs.verbs.exchange.shader.neumip import neumip_shader
 from jobs.verbs.exchange.shader.selvage import selvage_shader
@@ -14,7 +16,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 
-def shader_of(model: str | None, fabric: Fabric, level: int | None) -> Shader:
+def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return a model of a fabric, ready to be written.
 
     Parameters
@@ -26,19 +28,21 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None) -> Shader:
         The cloth.
     level : int, optional
         Level of detail of the soft nodes.
+    kinds : collection of str
+        Of KINDS.
 
     Raises
     ------
     BadInput
         If there is no such model, its files are damaged or of another version, it was not trained on the fabric, it has
-        no shader, or has no such level.
+        no shader, or has no such level or kinds.
     """
     if model is None or model == soft_nodes.NAME:
-        return soft_nodes_shader(fabric, level)
+        return soft_nodes_shader(fabric, level, kinds)
     method = covering_model(model, fabric, "export", "--model")
     if isinstance(method, Selvage):
-        return selvage_shader(method, fabric, level)
+        return selvage_shader(method, fabric, level, kinds)
     if isinstance(method, Neumip):
-        return neumip_shader(method, fabric, level)
+        return neumip_shader(method, fabric, level, kinds)
     allowed = f"has no shader; {soft_nodes.NAME}, {selvage.NAME} and the folder of a trained {neumip.NAME} have one"
     raise BadInput("export", "--model", model, allowed)

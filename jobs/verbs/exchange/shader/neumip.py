@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import partial
 from typing import Final
 
@@ -18,7 +19,7 @@ from jobs.verbs.exchange.shader.descriptor import (
     colours,
     generator,
 )
-from jobs.verbs.exchange.shader.golden import golden_of
+from jobs.verbs.exchange.shader.golden import GROUPS, golden_of
 from jobs.verbs.exchange.shader.shader import Shader
 from jobs.verbs.exchange.shader.tables import constants_slang
 from jobs.verbs.exchange.shader.training_domain import trained_ranges, why_outside
@@ -35,7 +36,7 @@ from weaves.fabric import Fabric
 NAME: Final = "neumip"
 """Name of the model."""
 
-SOURCES: Final = ("common.slang", "perceptron.slang", "neumip.slang")
+SOURCES: Final = ("arithmetic.slang", "query.slang", "colours.slang", "perceptron.slang", "neumip.slang")
 """Files of the source."""
 
 _ONNX: Final = {
@@ -47,11 +48,17 @@ _ONNX: Final = {
 }
 
 
-def neumip_shader(method: Neumip, fabric: Fabric, level: int | None) -> Shader:
-    """Return the model for its fabric; BadInput if a level is wished, or its textures are too large."""
+def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
+    """Return the model for its fabric; BadInput if a level or kinds are wished, or its textures are too large."""
+    if kinds:
+        raise BadInput(
+            "export", "--kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only"
+        )
     if level is not None:
         raise BadInput("export", "--level", level, f"leave it out: {method.name} has no soft nodes")
     parts, weights = method.parts(fabric), Weights()
+    yarns = colours(fabric)
+    weights.add("colours", np.array([*yarns.model_dump().values()], np.float32)[:4], "k_s and k_d of warp and weft")
     constants, layers = _pack(parts, fabric.weave.repeat, weights)
     channels = [f"feature {n}" for n in range(parts.options.channels)]
     channels += ["0"] * (-len(channels) % 4)
@@ -62,11 +69,13 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None) -> Shader:
         level=None,
         inputs=INPUTS,
         outputs=OUTPUTS | {"bounds": "the components: the network knows no bound of energy"},
-        conventions=[*CONVENTIONS, "An ellipse counts as the circle of its area."],
-        colours=colours(fabric),
+        conventions=[*CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
+        colours=yarns,
         repeat=fabric.weave.repeat,
         limits={"elements": MOST_ELEMENTS},
+        kinds=[],
         scalars={},
+        back_scalars={},
         buffers={"weights": weights.buffer()},
         network=Network(
             name=method.name,
@@ -93,8 +102,9 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None) -> Shader:
         },
         weights.files(),
         said,
-        golden_of(partial(_answers, method, fabric), fabric.weave.repeat, stretched=False),
+        golden_of({"front": GROUPS["front"]}, fabric.weave.repeat, partial(_answers, method, fabric), stretched=False),
         f"{weights.count:,} elements",
+        False,
         partial(as_onnx, method, fabric, tuple(_ONNX)),
     )
 
@@ -115,6 +125,7 @@ def _pack(parts: Parts, repeat: tuple[int, int], weights: Weights) -> tuple[dict
     if parts.depth is not None:
         weights.add("depth", parts.depth, "texels of the depth that shifts a place, at the finest level")
     constants: dict[str, bool | int | float] = {
+        "COLOURS": weights.places["colours"].offset,
         "ENDS": ends,
         "PICKS": picks,
         "CHANNEL_QUADS": quads(options.channels),

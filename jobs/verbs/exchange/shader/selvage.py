@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import partial
 from typing import Final
 
 import numpy as np
 
 from jobs.verbs.exchange.shader.descriptor import Network, descriptor
-from jobs.verbs.exchange.shader.golden import golden_of
+from jobs.verbs.exchange.shader.golden import golden, read_sides
 from jobs.verbs.exchange.shader.shader import Shader
+from jobs.verbs.exchange.shader.sides import Sides, tabulate_sides
 from jobs.verbs.exchange.shader.soft_nodes import SOURCES as OF_SOFT_NODES
 from jobs.verbs.exchange.shader.soft_nodes import refuse_large_repeat, size_of, table_files
 from jobs.verbs.exchange.shader.tables import constants_slang, layout_slang, tables
 from jobs.verbs.exchange.shader.training_domain import trained_ranges, why_outside
 from jobs.verbs.exchange.shader.weights import Weights, quads
 from pipeline.analytic.soft_nodes import features
-from pipeline.analytic.soft_nodes.features import OF_QUERY, read_queries
+from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.error_network import SLOPE
@@ -59,7 +61,7 @@ _FEATURES: Final = (
 )
 
 
-def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader:
+def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return the model for a fabric.
 
     Parameters
@@ -70,6 +72,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader
         The cloth.
     level : int, optional
         Level of detail of the soft nodes: that of the training.
+    kinds : collection of str
+        Of KINDS.
 
     Raises
     ------
@@ -80,9 +84,9 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader
     if level not in (None, trained):
         raise BadInput("export", "--level", level, f"leave it out: {method.name} was trained with level {trained}")
     refuse_large_repeat(fabric)
-    table = method.table_of(fabric)
-    found, weights, layers = tables(table), Weights(), method.layers(fabric)
-    twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
+    sides = tabulate_sides(fabric, trained, kinds)
+    found, weights, layers = tables(sides), Weights(), method.layers(fabric)
+    twists = np.arcsin(np.clip(sides.front.yarn[:, SIN_TWIST], -1.0, 1.0))
     weights.add("twists", twists[None], "twists of warp and weft, radians")
     first = weights.count
     described = weights.add_perceptron("correction", layers, f"leaky ReLU of slope {SLOPE}", "2 / (1 + exp(-x))")
@@ -98,7 +102,7 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader
         **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
         "ALMOST_HIDDEN": float(own["_HIDDEN"]),
     }
-    said = descriptor(fabric, trained, found)
+    said = descriptor(fabric, trained, found, kinds)
     about = Network(
         name=method.name,
         trained_on=trained_ranges(method.domain),
@@ -120,13 +124,17 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None) -> Shader
         said.model_copy(
             update={"model": NAME, "network": about, "buffers": {**said.buffers, "weights": weights.buffer()}}
         ),
-        golden_of(partial(_answers, method, fabric), fabric.weave.repeat),
-        size_of(trained, table),
+        golden(sides, partial(_answers, method, fabric, sides)),
+        size_of(trained, sides),
+        True,
         partial(as_onnx, method, fabric, tuple(about.onnx)),
     )
 
 
-def _answers(method: Selvage, fabric: Fabric, queries: Queries) -> Float32:
-    """Return components and bounds, (N, 8)."""
-    bounds = read_queries(method.table_of(fabric), queries).bounds
-    return np.concatenate([method.predict(fabric, queries), bounds], axis=1)
+def _answers(method: Selvage, fabric: Fabric, sides: Sides, queries: Queries) -> Float32:
+    """Return the soft nodes' answers, with corrected components in front, (N, ANSWERS)."""
+    result = read_sides(sides, queries)
+    front = (queries.wi[:, 2] > 0.0) & (queries.wo[:, 2] > 0.0)
+    if front.any():
+        result[front, :4] = method.predict(fabric, queries.take(front))
+    return result

@@ -28,6 +28,8 @@ class Shader(NamedTuple):
         Queries with their answers.
     size : str
         Words on its size, for a sentence.
+    sampled : bool
+        Whether directions can be drawn.
     onnx : callable or None
         Returns its network as an ONNX model; None if it has none.
     """
@@ -39,4 +41,5 @@ class Shader(NamedTuple):
     said: Descriptor
     golden: Golden
     size: str
+    sampled: bool
     onnx: Callable[[], bytes] | None = None

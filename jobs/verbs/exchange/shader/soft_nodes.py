@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
@@ -10,9 +11,9 @@ from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
 from jobs.verbs.exchange.shader.descriptor import descriptor
 from jobs.verbs.exchange.shader.golden import golden
 from jobs.verbs.exchange.shader.shader import Shader
+from jobs.verbs.exchange.shader.sides import Sides, tabulate_sides
 from jobs.verbs.exchange.shader.tables import Tables, layout_slang, refuse_large, tables
 from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
-from pipeline.analytic.soft_nodes.nodes import Table, tabulate
 from reports.images.texture import png_bytes
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -20,11 +21,14 @@ from weaves.fabric import Fabric
 NAME: Final = "soft_nodes"
 """Name of the model."""
 
-SOURCES: Final = ("common.slang", "soft_nodes.slang")
+SOURCES: Final = (
+    "soft_nodes.slang", "importance.slang", "buffers.slang", "arithmetic.slang", "horizons.slang", "query.slang",
+    "look.slang", "colours.slang", "shade.slang", "fixed_nodes.slang", "placed_nodes.slang",
+)  # fmt: skip
 """Files of the source."""
 
 
-def soft_nodes_shader(fabric: Fabric, level: int | None) -> Shader:
+def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return the soft nodes of a fabric.
 
     Parameters
@@ -33,6 +37,8 @@ def soft_nodes_shader(fabric: Fabric, level: int | None) -> Shader:
         The cloth.
     level : int, optional
         Level of detail k, one of DETAILS; the usual one if left out.
+    kinds : collection of str
+        Of KINDS.
 
     Raises
     ------
@@ -43,16 +49,17 @@ def soft_nodes_shader(fabric: Fabric, level: int | None) -> Shader:
     if level not in DETAILS:
         raise BadInput("export", "--level", level, f"must be one of {', '.join(map(str, DETAILS))}")
     refuse_large_repeat(fabric)
-    table = tabulate(fabric, level=level)
-    found = tables(table)
+    sides = tabulate_sides(fabric, level, kinds)
+    found = tables(sides)
     return Shader(
         NAME,
         SOURCES,
         {"layout.slang": layout_slang(found)},
         table_files(found),
-        descriptor(fabric, level, found),
-        golden(table),
-        size_of(level, table),
+        descriptor(fabric, level, found, kinds),
+        golden(sides),
+        size_of(level, sides),
+        True,
     )
 
 
@@ -62,9 +69,9 @@ def refuse_large_repeat(fabric: Fabric) -> None:
     refuse_large(ends, picks)
 
 
-def size_of(level: int, table: Table) -> str:
-    """Return words on the size of a table."""
-    return f"level {level}, {table.evenly.size} nodes"
+def size_of(level: int, sides: Sides) -> str:
+    """Return words on the size of the tables."""
+    return f"level {level}, {sides.front.evenly.size} nodes"
 
 
 def table_files(found: Tables) -> dict[str, bytes]:

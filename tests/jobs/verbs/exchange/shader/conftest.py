@@ -20,7 +20,7 @@ import pytest
 from PIL import Image
 
 from jobs.verbs.exchange.shader.export_shader import export_shader
-from jobs.verbs.exchange.shader.languages import slangc
+from jobs.verbs.exchange.shader.languages import Program, compile_program, slangc
 from weaves.fabric import load_fabric
 
 
@@ -36,9 +36,9 @@ def exported(tmp_path_factory):
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
-    def export(name, level=2, *languages, model=None):
-        folder = home / "-".join((name, str(level), *languages, Path(model or "soft_nodes").name))
-        export_shader(load_fabric(name), folder, None if model else level, languages, model)
+    def export(name, level=2, *languages, kinds=(), model=None):
+        folder = home / "-".join((name, str(level), *languages, *kinds, Path(model or "soft_nodes").name))
+        export_shader(load_fabric(name), folder, None if model else level, languages, kinds, model)
         return folder
 
     return export
@@ -65,10 +65,15 @@ def read():
             buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
         golden = json.loads((folder / said["golden"]).read_text())
         queries = np.array(golden["queries"], np.float32)
-        answers = np.concatenate([golden["components"], golden["bounds"]], axis=1)
-        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers)
+        columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
+        answers = np.column_stack([np.array(column) for column in columns if column])
+        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
     return read
+
+
+WIDTHS = {"evaluate": (12, 8), "scatter": (16, 16)}
+"""Columns of the rows of each entry point, and of its results."""
 
 
 class _Buffer(ctypes.Structure):
@@ -81,7 +86,10 @@ class _Groups(ctypes.Structure):
 
 @pytest.fixture(scope="session")
 def cpp(exported, tmp_path_factory):
-    """A function that evaluates queries, (N, 11), by the C++ form: components and bounds, (N, 8)."""
+    """A function that runs an entry point of the C++ form on rows: components and bounds, (N, 8), of queries, (N, 12).
+
+    `scatter` takes random numbers beside them, (N, 15), and returns the columns of a Scatter, (N, 16).
+    """
     if lacking := missing("slangc", "g++"):
         pytest.skip(lacking)
     return compiled(exported("gingham", 2, "cpp"), tmp_path_factory.mktemp("cpp"))
@@ -91,17 +99,17 @@ def compiled(exported, folder):
     """Compile the C++ form of an exported folder into another, and return the function of the fixture `cpp`."""
     library, source = folder / "evaluate.so", exported / "cpp" / "evaluate.cpp"
     subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
-    evaluate = ctypes.CDLL(str(library)).evaluate
+    programs = ctypes.CDLL(str(library))
 
-    def call(buffers, queries):
-        count = -(-len(queries) // 64)
-        rows, answers = np.zeros((64 * count, 11), np.float32), np.zeros((64 * count, 8), np.float32)
-        rows[: len(queries)] = queries
+    def call(buffers, queries, entry="evaluate"):
+        count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
+        rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
+        rows[: len(queries), : queries.shape[1]] = queries
         arrays = [np.ascontiguousarray(values) for values in buffers.values()]
         arrays += [rows, answers]
         buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
         groups = _Groups((0, 0, 0), (count, 1, 1))
-        evaluate(ctypes.byref(groups), None, ctypes.byref(buffer))
+        getattr(programs, entry)(ctypes.byref(groups), None, ctypes.byref(buffer))
         return answers[: len(queries)]
 
     return call
@@ -109,23 +117,46 @@ def compiled(exported, folder):
 
 @pytest.fixture(scope="session")
 def webgl(exported, tmp_path_factory):
-    """A function that evaluates the golden queries of cloths by the GLSL ES form: components and bounds, (N, 8)."""
+    """A function that runs an entry point of the GLSL ES form on the golden queries of cloths; results as for `cpp`.
+
+    For `scatter` the random numbers are 0.5.
+    """
     if lacking := missing("slangc", "chromium"):
         pytest.skip(lacking)
     page = Path(__file__).with_name("evaluate.html").read_text()
 
-    def call(cloths, half=False, folder=None):
-        source = ((folder or exported("gingham", 2, "glsles")) / "glsles" / "evaluate.frag").read_text()
+    @cache
+    def source(entry, folder):
+        if entry == "evaluate":
+            return (folder / "glsles" / "evaluate.frag").read_text()
+        path = tmp_path_factory.mktemp("glsles") / f"{entry}.frag"
+        program = Program(path.name, "evaluate.slang", (entry,), "fragment", True)
+        compile_program(slangc(), folder / "slang", program, "glsl", path)
+        return path.read_text()
+
+    def call(cloths, half=False, entry="evaluate", folder=None):
+        text = source(entry, folder or exported("gingham", 2, "glsles"))
+        columns, results = WIDTHS[entry]
         jobs = []
         for cloth in cloths:
-            # Three texels a query; the twelfth number is not read.
-            columns = {**cloth.buffers, "queries": np.pad(cloth.queries, ((0, 0), (0, 1)))}
-            for name in {"nodes", "weights"} & columns.keys():
-                columns[name] = columns[name].astype(np.float16 if half else np.float32)
-            encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
-            jobs.append({"names": list(columns), **encoded, "count": len(cloth.queries), "half": half})
+            rows = np.full((len(cloth.queries), columns), 0.5, np.float32)
+            rows[:, : cloth.queries.shape[1]] = cloth.queries
+            values = {**cloth.buffers, "queries": rows}
+            for name in {"nodes", "weights"} & values.keys():
+                values[name] = values[name].astype(np.float16 if half else np.float32)
+            encoded = {name: base64.b64encode(array.tobytes()).decode() for name, array in values.items()}
+            jobs.append(
+                {
+                    "names": list(values),
+                    **encoded,
+                    "count": len(rows),
+                    "half": half,
+                    "texels": columns // 4,
+                    "targets": results // 4,
+                }
+            )
         written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
-        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source), 1))
+        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(text), 1))
         command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
         done = subprocess.run([*command, written.as_uri()], capture_output=True, text=True, timeout=600, check=True)
         shown = re.search(r'<pre id="answers">(.*?)</pre>', done.stdout, re.DOTALL)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jobs.verbs.exchange.shader.golden import DENSITY, TRANSPARENCY
 from tests.jobs.verbs.exchange.shader.conftest import missing
 
 PAGE = Path(__file__).parents[5] / "docs" / "shader.md"
@@ -35,9 +36,9 @@ def test_the_quad_draws_what_the_shader_answers(exported, read, cpp, tmp_path, b
     cloth, side = read(exported("denim")), 8.0 / 256.0
     ray = np.stack([(np.arange(256) - 127.5) * side, np.full(256, -27.5 * side), np.full(256, -40.0)], axis=-1)
     wo = -ray / np.linalg.norm(ray, axis=1, keepdims=True)
-    rows = np.zeros((256, 11))
-    rows[:, :2], rows[:, 2:4], rows[:, 5:8], rows[:, 8:] = 4.0 + ray[:, :2], 0.5 * side, (0.48, 0.36, 0.8), wo
-    colours = np.array(list(cloth.said["colours"].values()))
+    rows = np.zeros((256, 12))
+    rows[:, :2], rows[:, 2:4], rows[:, 5:8], rows[:, 8:11] = 4.0 + ray[:, :2], 0.5 * side, (0.48, 0.36, 0.8), wo
+    colours = np.array(list(cloth.said["colours"].values()))[:4]
     colour = np.minimum(3.0 * cpp(cloth.buffers, rows)[:, :4] @ colours, 1.0)
     expected = 255.0 * np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * colour ** (1 / 2.4) - 0.055)
     # Places are rounded in another order, which moves a few of them into the next cell of a grid.
@@ -49,7 +50,7 @@ def test_the_node_answers_the_golden_queries(exported, read, tmp_path):
         pytest.skip(lacking)
     if not Path("/usr/include/stb/stb_image.h").exists():
         pytest.skip("stb_image.h is not installed")
-    folder, program = exported("denim", 2, "cpp"), tmp_path / "node"
+    folder, program = exported("denim", 2, "cpp", kinds=("behind",)), tmp_path / "node"
     (tmp_path / "node.cpp").write_text(example("cpp"))
     command = ["g++", "-O2", "-w", tmp_path / "node.cpp", folder / "cpp" / "evaluate.cpp", "-o", program]
     subprocess.run(command, check=True)
@@ -57,6 +58,12 @@ def test_the_node_answers_the_golden_queries(exported, read, tmp_path):
     rows = "\n".join(" ".join(f"{value:.9g}" for value in row) for row in cloth.queries)
     done = subprocess.run([program, folder], input=rows, capture_output=True, text=True, check=True)
     found = np.array([line.split() for line in done.stdout.splitlines()], float)
-    colours = np.array([[1, 1, 1], [1, 1, 1], [0.1, 0.2, 0.5], [0.6, 0.6, 0.6]])
-    expected = cloth.answers[:, :4] @ colours
-    assert np.abs(found - expected).max() < 1e-5 * np.ptp(expected)
+    colours = np.array(list(cloth.said["colours"].values()))
+    through = cloth.queries[:, 7] * cloth.queries[:, 10] < 0.0
+    values = np.where(
+        through[:, None], cloth.answers[:, :4] @ colours[[0, 1, 4, 5]], cloth.answers[:, :4] @ colours[:4]
+    )  # fmt: skip
+    expected = np.column_stack([values, cloth.answers[:, [DENSITY, TRANSPARENCY]]])
+    for start, stop in cloth.groups.values():
+        span = np.ptp(expected[start:stop], axis=0)
+        assert (np.abs(found - expected)[start:stop] < 1e-5 * span).all()

@@ -78,9 +78,11 @@ def test_slangc_of_the_search_path_is_found(monkeypatch):
     ("tokens", "allowed"),
     [
         (("--shader", "x", "--language", "basic"), "must be one of slang, cpp, cuda, glsl"),
+        (("--shader", "x", "--kind", "wet"), "must be one of behind, curvature, all"),
         (("--shader", "x", "--level", "3"), "must be one of 1, 2, 4, 8"),
         (("--wif", "x.wif", "--level", "2"), "is not for --wif"),
         (("--mesh", "x.ply", "--language", "cpp"), "is not for --mesh"),
+        (("--maps", "x", "--kind", "all"), "is not for --maps"),
         (("--mesh", "x.ply", "--shader", "x"), "one of --mesh, --wif, --maps and --shader is needed"),
     ],
 )
@@ -97,7 +99,7 @@ def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, t
     code, said = twillight("gingham", "--shader", "x")
     assert code == 2 and "horizons" in said.err
     monkeypatch.setattr(tables, "MOST_CELLS", 3)
-    monkeypatch.setattr(soft_nodes, "tabulate", None)  # cells are counted before any work
+    monkeypatch.setattr(soft_nodes, "tabulate_sides", None)  # cells are counted before any work
     code, said = twillight("gingham", "--shader", "x")
     assert code == 2 and "at most 3 cells" in said.err and not list(tmp_path.iterdir())
 
@@ -110,7 +112,8 @@ def test_every_language_is_written(exported):
     assert set(said) == set(LANGUAGES)
     for name, files in said.items():
         for file, program in zip(files, LANGUAGES[name].programs, strict=True):
-            assert re.search(rf"\b({program.entry}|main)\(", (folder / file).read_text())
+            for entry in program.entries:
+                assert re.search(rf"\b({entry}|main)\(", (folder / file).read_text())
 
 
 def test_no_sine_and_no_cosine_is_called(exported):
@@ -122,9 +125,11 @@ def test_no_sine_and_no_cosine_is_called(exported):
     ("name", "file", "options"),
     [
         ("glsl", "evaluate.comp", ()),
+        ("glsl", "scatter.comp", ()),
         ("glsles", "evaluate.frag", ()),
         ("glsles", "draw.frag", ()),
         ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "evaluate", "-S", "comp", "-o", "/dev/null")),
+        ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "scatter", "-S", "comp", "-o", "/dev/null")),
     ],
 )
 def test_glslang_accepts_what_is_written(exported, name, file, options):

@@ -22,7 +22,7 @@ from pipeline.models.registry import load_model, model_folder
 from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from tests.jobs.verbs.exchange.shader.conftest import compiled, missing
-from tests.jobs.verbs.exchange.shader.test_evaluate import FABRICS, UNSEEN, hemisphere, worst
+from tests.jobs.verbs.exchange.shader.test_evaluate import FABRICS, UNSEEN, hemisphere
 from weaves.fabric import load_fabric
 
 SOME = ("crepe", "gauze", "gingham", "silk_charmeuse")
@@ -77,6 +77,11 @@ def neumip_cpp(exported, neumip, tmp_path_factory):
     return compiled(exported(CLOTH, 2, "cpp", "glsles", model=neumip), tmp_path_factory.mktemp("neumip"))
 
 
+def worst(found, expected):
+    """Return the largest difference, as a share of the range of its column."""
+    return (np.abs(found - expected) / np.ptp(expected, axis=0)).max()
+
+
 def check_answers(found, expected, allowed):
     """Compare answers (N, 8), which are positive, with components at most their bounds."""
     assert worst(found, expected) < allowed
@@ -87,7 +92,7 @@ def check_answers(found, expected, allowed):
 @pytest.mark.parametrize("name", ALL)
 def test_selvage_answers_its_golden_vectors(selvage_cpp, exported, read, name, kind, allowed):
     cloth = read(exported(name, model="selvage"), kind)
-    check_answers(selvage_cpp(cloth.buffers, cloth.queries), cloth.answers, allowed)
+    check_answers(selvage_cpp(cloth.buffers, cloth.queries), cloth.answers[:, :8], allowed)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -144,17 +149,17 @@ def test_light_and_viewer_behind_answer_nothing(selvage_cpp, neumip_cpp, neumip,
 def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allowed, fabrics):
     selvages = [read(exported(name, model="selvage")) for name in fabrics]
     folder = exported(CLOTH, 2, "cpp", "glsles", model="selvage")
-    for cloth, found in zip(selvages, webgl(selvages, half, folder), strict=True):
-        check_answers(found, cloth.answers, allowed)
+    for cloth, found in zip(selvages, webgl(selvages, half, folder=folder), strict=True):
+        check_answers(found, cloth.answers[:, :8], allowed)
     cloth = read(exported(CLOTH, model=neumip))
-    (found,) = webgl([cloth], half, exported(CLOTH, 2, "cpp", "glsles", model=neumip))
-    check_answers(found, cloth.answers, allowed)
+    (found,) = webgl([cloth], half, folder=exported(CLOTH, 2, "cpp", "glsles", model=neumip))
+    check_answers(found, cloth.answers[:, :8], allowed)
 
 
 @pytest.mark.parametrize(("kind", "allowed"), [("float32", 1e-5), ("float16", 1e-2)])
 def test_neumip_answers_its_golden_vectors(neumip_cpp, neumip, exported, read, kind, allowed):
     cloth = read(exported(CLOTH, model=neumip), kind)
-    check_answers(neumip_cpp(cloth.buffers, cloth.queries), cloth.answers, allowed)
+    check_answers(neumip_cpp(cloth.buffers, cloth.queries), cloth.answers[:, :8], allowed)
     assert (cloth.answers[:, :4] > 0.0).mean() > 0.5 and np.ptp(cloth.answers, axis=0).min() > 0.05
 
 
