@@ -114,7 +114,7 @@ def test_diffuse_components_make_no_light(cpp, exported, read, name):
 
 
 def test_light_and_viewer_behind_answer_nothing_without_their_tables(cpp, exported, read):
-    cloth = read(exported("gingham"))
+    cloth = read(exported("gauze"))
     rows = cloth.queries[:4].copy()
     rows[0, 7], rows[1, 10], rows[2, [7, 10]] = -rows[0, 7], -rows[1, 10], (-rows[2, 7], -rows[2, 10])
     found, scattered = cpp(cloth.buffers, rows), cpp(cloth.buffers, rows, "scatter")
