@@ -50,8 +50,8 @@ def export_shader(
     Raises
     ------
     BadInput
-        If a language or kind is not known, slangc or a package is needed and not there, the model has no network for ONNX, or
-        as `shader_of`.
+        If a language or kind is not known, slangc or a package is needed and not there, the model has no network for
+        ONNX, or as `shader_of`.
     WorkFailed
         If slangc refuses the source.
     """
