@@ -167,10 +167,13 @@ def export(
     vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
     repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
     size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
+    model: Annotated[
+        str | None, Parameter(help="Of a shader: soft_nodes (default), selvage, or the folder of a trained neumip.")
+    ] = None,
     level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None,
     language: Annotated[
         list[str],
-        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl or all, beside Slang; several."),
+        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
     ] = NOTHING,
     kind: Annotated[
         list[str],
@@ -189,7 +192,7 @@ def export(
         raise BadInput("export", "", " and ".join(chosen) or "nothing", allowed)
     for option, value, owner in (
         ("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps),
-        ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
+        ("--model", model, shader), ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
         ("--kind", ", ".join(kind) or None, shader),
     ):  # fmt: skip
         if value is not None and owner is None:
@@ -205,9 +208,8 @@ def export(
         said = write_draft(cloth, wif)
     elif shader is not None:
         from jobs.verbs.exchange.shader.export_shader import export_shader
-        from pipeline.analytic.soft_nodes.detail import USUAL
 
-        said = export_shader(cloth, shader, USUAL if level is None else level, language, kind)
+        said = export_shader(cloth, shader, level, language, kind, model)
     else:
         from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
 

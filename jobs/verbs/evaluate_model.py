@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.models.registry import load_model, model_folder
+from pipeline.models.registry import covering_model, model_folder
 from pipeline.shards.evaluate import Answerer
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -40,10 +40,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     BadInput
         If there is no such model, its files are damaged, or it does not cover the fabric.
     """
-    folder = model_folder(model, "evaluate", "--model")
-    (method,) = load_model(folder)
-    if not method.covers(fabric):
-        raise BadInput("evaluate", "--model", model, f"this model was not trained on {fabric.name}")
+    method = covering_model(model, fabric, "evaluate", "--model")
     domain = getattr(method, "domain", None)
     if domain is not None and not extrapolate:
         domain.refuse_fabric(fabric, method.name)
@@ -54,6 +51,7 @@ def answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         shares = through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
         return method.predict(fabric, queries), shares
 
+    folder = model_folder(model, "evaluate", "--model")
     about = {"model": method.name, "card": read_text(folder / "card.json", 8 * MIB, "a model card")}
     if domain is None:
         return Answerer(answer, about)

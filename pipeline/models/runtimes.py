@@ -124,16 +124,20 @@ def _onnx(quantised: bool) -> Runtime:
 
         return _Program(run, len(plain) - len(model))
 
-    return Runtime(_no_onnx, load)
+    return Runtime(no_onnx, load)
 
 
-def _no_onnx() -> str:
+def no_onnx() -> str:
+    """Return why this machine cannot export and run ONNX models; empty if it can."""
     lacking = [name for name in ("onnx", "onnxruntime", "onnxscript") if importlib.util.find_spec(name) is None]
     return f"not installed: {', '.join(lacking)}" if lacking else ""
 
 
-def exported(module: nn.Module, example: Sequence[Tensor], rows: int) -> bytes:
-    """Return a module as an ONNX model whose inputs are named x0, x1, …; the first `rows` of them have any length."""
+def exported(module: nn.Module, example: Sequence[Tensor], rows: int, names: Sequence[str] = ()) -> bytes:
+    """Return a module as an ONNX model; the first `rows` inputs have any length.
+
+    Inputs are named x0, x1, … if no names are given, the output `components`.
+    """
     free = torch.export.Dim("rows", min=2)
     shapes = tuple({0: free} if place < rows else None for place in range(len(example)))
     with TemporaryDirectory() as folder, _quiet(), torch.no_grad():
@@ -142,7 +146,7 @@ def exported(module: nn.Module, example: Sequence[Tensor], rows: int) -> bytes:
             module,
             tuple(example),
             path,
-            input_names=[f"x{place}" for place in range(len(example))],
+            input_names=list(names) or [f"x{place}" for place in range(len(example))],
             output_names=["components"],
             dynamic_shapes=(shapes,),
             dynamo=True,
@@ -150,6 +154,35 @@ def exported(module: nn.Module, example: Sequence[Tensor], rows: int) -> bytes:
             verbose=False,
         )
         return path.read_bytes()
+
+
+def as_onnx(method: Portable, fabric: Fabric, names: Sequence[str]) -> bytes:
+    """Return the part of a method that runs for every query of a fabric as an ONNX model.
+
+    Parameters
+    ----------
+    method : Portable
+        The method.
+    fabric : Fabric
+        A fabric that it covers; what it is encoded as is a constant of the model.
+    names : sequence of str
+        Names of the inputs of N rows. Those that the answers do not depend on are no inputs of the model.
+    """
+    import onnx
+
+    part = method.per_query(fabric)
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, _STREAM, 0, _COMPARED)
+    inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
+    constants = [f"constant{place}" for place in range(len(part.constants))]
+    model = exported(part.module, [*inputs, *part.constants], len(inputs), [*names, *constants])
+    if not constants:
+        return model
+    whole = onnx.load_from_string(model)
+    for name, values in zip(constants, part.constants, strict=True):
+        (entry,) = (entry for entry in whole.graph.input if entry.name == name)
+        whole.graph.input.remove(entry)
+        whole.graph.initializer.append(onnx.numpy_helper.from_array(values.numpy(), name))
+    return bytes(whole.SerializeToString())
 
 
 def _quantised(model: bytes) -> bytes:

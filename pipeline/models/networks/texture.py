@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import torch
 from torch import Tensor, nn
@@ -16,8 +17,11 @@ from torch.nn import functional
 
 _FEATURE_SCALE = 0.1  # standard deviation of the first features
 _NO_BLUR = 0.25  # standard deviation, in texels, below which a blur is skipped
-_DEPTH_SCALE = 0.1
-_STEEPEST = 0.6  # smallest wo.z that parallax is computed with
+DEPTH_SCALE: Final = 0.1
+"""Shift of a learnt depth of 1, in mean sides of the repeat."""
+
+STEEPEST: Final = 0.6
+"""Smallest wo.z that parallax is computed with."""
 
 
 def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
@@ -42,7 +46,7 @@ def shifted(output: Tensor, u: Tensor, v: Tensor, wo: Tensor, repeat: tuple[int,
 
     The shift is 0.1 output wo.xy / max(wo.z, 0.6), in mean sides of the repeat; `output` (n, 1) is the learnt depth.
     """
-    shift = _DEPTH_SCALE * output * wo[:, :2] / wo[:, 2:].clamp_min(_STEEPEST)
+    shift = DEPTH_SCALE * output * wo[:, :2] / wo[:, 2:].clamp_min(STEEPEST)
     ends, picks = repeat
     side = math.sqrt(ends * picks)
     return u + shift[:, 0] * (side / ends), v + shift[:, 1] * (side / picks)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from torch import Tensor, nn
 
 from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
 from pipeline.models.networks.losses import to_components, to_network, weighted_error
-from pipeline.models.networks.perceptron import perceptron
+from pipeline.models.networks.perceptron import Layer, layers_of, perceptron
 from pipeline.models.networks.texture import level_shapes, random_pyramid, read_pyramid, shifted
 from pipeline.models.networks.texture_network import TextureNetwork
 from pipeline.models.neumip.options import NeumipOptions
@@ -36,7 +36,8 @@ from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-_LAYERS = 3  # hidden ones of both perceptrons
+LAYERS: Final = 3
+"""Hidden layers of both perceptrons."""
 
 
 class NeumipNetwork(TextureNetwork):
@@ -58,12 +59,12 @@ class NeumipNetwork(TextureNetwork):
         self.options, self.repeat = options, repeat
         self.shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)  # (rows, columns), finest first
         self.levels = random_pyramid(options.channels, self.shapes)
-        self.decoder = perceptron(options.channels + 4, options.hidden, _LAYERS, 4)
+        self.decoder = perceptron(options.channels + 4, options.hidden, LAYERS, 4)
         self.depth = None
         self.offset: nn.Sequential | None = None
         if options.offset:
             self.depth = nn.Parameter(torch.zeros(options.channels, *self.shapes[0]))
-            self.offset = perceptron(options.channels + 2, options.hidden, _LAYERS, 1)
+            self.offset = perceptron(options.channels + 2, options.hidden, LAYERS, 1)
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); u, v (n,) are shares of the repeat, sigma is in yarn spacings."""
@@ -94,6 +95,30 @@ class NeumipNetwork(TextureNetwork):
         return read_pyramid(list(self.levels), u, v, sigma, self.options.texels_per_yarn, self.blur)
 
 
+class Parts(NamedTuple):
+    """A network for programs without torch.
+
+    Attributes
+    ----------
+    options : NeumipOptions
+        The design.
+    levels : list of float32 (rows, columns, channels)
+        Textures of the pyramid, finest first; texel (0, 0) is at the smallest v and u.
+    depth : float32 (rows, columns, channels) or None
+        Offset texture, if the design has one.
+    offset : list of Layer
+        From texture and wo.xy to the depth; none without it.
+    decoder : list of Layer
+        From features, wi.xy and wo.xy to the components in network space.
+    """
+
+    options: NeumipOptions
+    levels: list[npt.NDArray[np.float32]]
+    depth: npt.NDArray[np.float32] | None
+    offset: list[Layer]
+    decoder: list[Layer]
+
+
 class Neumip(OneMaterial[NeumipNetwork]):
     """Trained textures, one network for each fabric."""
 
@@ -109,9 +134,25 @@ class Neumip(OneMaterial[NeumipNetwork]):
         module = Answering(network, partial(_components, network))
         return PerQuery(self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), module)
 
+    def parts(self, fabric: Fabric) -> Parts:
+        """Return the fabric's textures and layers."""
+        network = self.network_of(fabric)
+        return Parts(
+            network.options,
+            [_texels(texture) for texture in network.levels],
+            None if network.depth is None else _texels(network.depth),
+            [] if network.offset is None else layers_of(network.offset),
+            layers_of(network.decoder),
+        )
+
     def _refuse(self, queries: Queries) -> None:
         if self.domain is not None:
             self.domain.refuse(queries, self.name)
+
+
+def _texels(texture: Tensor) -> npt.NDArray[np.float32]:
+    """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
+    return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
 
 
 def _components(network: NeumipNetwork, *columns: Tensor) -> Tensor:

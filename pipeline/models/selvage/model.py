@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,7 @@ from pipeline.analytic.soft_nodes.features import (
 from pipeline.analytic.soft_nodes.nodes import Table, tabulate
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import CHUNK, Batch
+from pipeline.models.networks.perceptron import Layer
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, Columns, PerQuery
 from pipeline.models.plain import refuse_other
@@ -51,7 +52,9 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-_LARGEST = 2.0  # factor
+LARGEST: Final = 2.0
+"""Largest factor."""
+
 _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
 _LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
 _COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
@@ -107,7 +110,7 @@ class SelvageNetwork(nn.Module):
         x = self._normalised(features)
         for layer in self.hidden:
             x = functional.leaky_relu(layer(x), SLOPE)
-        factors: Tensor = _LARGEST * torch.sigmoid(self.last(x))
+        factors: Tensor = LARGEST * torch.sigmoid(self.last(x))
         answer = components * factors
         return torch.minimum(answer, bounds) if self.options.bound else answer
 
@@ -262,6 +265,19 @@ class Selvage:
 
         return PerQuery(self._refuse, inputs, self._answering, (cloth.bias,))
 
+    def layers(self, fabric: Fabric) -> list[Layer]:
+        """Return the correction, from OF_QUERY features to the arguments of four sigmoids.
+
+        The first weights include the normalisation, the first biases all that the fabric alone decides.
+        """
+        first = (self._of_query, self._cloths.of(fabric).bias)
+        return [Layer(weight.numpy(), bias.numpy()) for weight, bias in (first, *self._others)]
+
+    @property
+    def options(self) -> SelvageOptions:
+        """The design."""
+        return self._network.options
+
     def with_bound(self, bound: bool) -> Selvage:
         """Return the same network, bounded in energy or not."""
         other = Selvage(self._network, self.domain)
@@ -273,7 +289,7 @@ class Selvage:
         x = torch.addmm(bias, features, self._of_query)
         for weight, shift in self._others:
             x = torch.addmm(shift, functional.leaky_relu(x, SLOPE), weight)
-        answer = _LARGEST * torch.sigmoid(x.float()) * components
+        answer = LARGEST * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
     def _refuse(self, queries: Queries) -> None:
@@ -312,7 +328,7 @@ class Selvage:
                 x = torch.addmm(cloth.bias, of_query, self._of_query)
                 for weight, shift in self._others:
                     x = torch.addmm(shift, functional.leaky_relu_(x, SLOPE), weight)
-                x.sigmoid_().mul_(_LARGEST)
+                x.sigmoid_().mul_(LARGEST)
                 np.multiply(x.numpy(), components, out=result[rows])
                 if self.bound:
                     np.minimum(result[rows], bounds, out=result[rows])

@@ -1,7 +1,8 @@
-"""`twillight export --shader`: soft nodes as one source for every shading language, with tables of a cloth.
+"""`twillight export --shader`: models as one source for every shading language, with tables of a cloth.
 
-soft_nodes.slang is the BSDF, made of query, horizons, shade, fixed_nodes and placed_nodes; importance.slang draws
-directions; colours.slang applies colours; evaluate.slang and draw.slang are entry points. sides tabulates both sides
-of a cloth; constants and tables generate `layout.slang` and the buffers; languages runs slangc; golden makes queries
-with their answers; descriptor says what is in the folder; export_shader writes it.
+soft_nodes.slang is made of query, look, horizons, shade, fixed_nodes and placed_nodes; selvage.slang and neumip.slang
+add perceptron; importance draws directions; colours applies colours; evaluate and draw are entry points. soft_nodes.py,
+selvage and neumip return what a model writes, models chooses among them; sides, tables, weights and constants make
+buffers and constants. languages runs slangc; golden makes queries with their answers; descriptor says what is in the
+folder, training_domain of what it learnt; export_shader writes it.
 """

@@ -163,3 +163,9 @@ def constants() -> dict[str, float | int]:
     for module, renamed in _RENAMED.items():
         found |= {name: vars(module)[own] for name, own in renamed.items()}
     return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in found.items()}  # type: ignore[arg-type]
+
+
+def shared_constants() -> dict[str, float | int]:
+    """Return the constants of the source that needs no tables: arithmetic, queries and colours."""
+    found, names = constants(), ("TEXTURE_WIDTH", "TINY", "PI", "RIGHT", *_RENAMED[float32])
+    return {name: found[name] for name in (*names, *(name for name in found if name.startswith("LUMINANCE")))}

@@ -1,4 +1,4 @@
-"""`soft_nodes.json`: what is in an exported folder, for a program that has not seen this package."""
+"""`soft_nodes.json`, or that of another model: an exported folder, for a program that has not seen this package."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from jobs.verbs.exchange.shader.constants import TEXTURE_WIDTH
-from jobs.verbs.exchange.shader.golden import COLUMNS, DENSITY, TRANSPARENCY, Golden
+from jobs.verbs.exchange.shader.golden import ANSWERS, COLUMNS, DENSITY, TRANSPARENCY, Golden
 from jobs.verbs.exchange.shader.tables import MOST_CELLS, MOST_NODES, Tables
 from pipeline.compiled.arrays import Float32
 from pipeline.truth.conventions import COMPONENTS
 from weaves.fabric import Fabric
-
-FILE: Final = "soft_nodes.json"
 
 GOLDEN: Final = "golden.json"
 
@@ -59,6 +57,38 @@ class Buffer(_Model):
     """Arrays in it, after the scalars."""
 
 
+class Layer(_Model):
+    """A layer: outputs = activation(biases + inputs times weights)."""
+
+    network: str
+    """Network that it belongs to; its layers follow each other."""
+    biases: Place
+    """Biases, filled up with zeros to whole elements."""
+    weights: Place
+    """Weights (inputs, outputs), row-major: row i has those from input i; filled up with zeros."""
+    activation: str
+    """Function of each output."""
+
+
+class Network(_Model):
+    """The networks of a model, in the buffer `weights`. Offsets are in elements, shapes in numbers."""
+
+    name: str
+    """Name of the trained model."""
+    trained_on: dict[str, tuple[float, float]]
+    """Ranges of what it was trained on: footprints and yarns."""
+    outside: str
+    """Why the fabric lies outside these ranges; empty if it does not."""
+    inputs: dict[str, list[str]]
+    """Inputs of each network, in their order."""
+    outputs: dict[str, str]
+    """Meaning of the outputs of each network."""
+    layers: list[Layer]
+    """Layers, in the order of their computation."""
+    onnx: dict[str, str]
+    """Inputs of the ONNX form, each of N rows; its output is `components`, (N, 4)."""
+
+
 class Colours(_Model):
     """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
 
@@ -87,9 +117,9 @@ class Vectors(_Model):
     bounds: list[list[float]]
     """Upper bounds of the components."""
     transparency: list[float]
-    """Transparency of the footprint towards the viewer."""
+    """Transparency of the footprint towards the viewer; empty for a model that does not know it."""
     density: list[float]
-    """Density with which `sample` finds wi, 1/sr."""
+    """Density with which `sample` finds wi, 1/sr; empty for a model without it."""
     steady: float
     """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
 
@@ -97,12 +127,14 @@ class Vectors(_Model):
 class Descriptor(_Model):
     """Content of `soft_nodes.json`."""
 
+    model: str = "soft_nodes"
+    """The method."""
     fabric: str
     """Name of the fabric."""
     generator: str
     """Program and version."""
-    level: int
-    """Level of detail k."""
+    level: int | None
+    """Level of detail k of the soft nodes; none if the model has none."""
     inputs: dict[str, str]
     """Fields of a query, with their units."""
     outputs: dict[str, str]
@@ -127,15 +159,17 @@ class Descriptor(_Model):
     """The next ones of both, of the back of the cloth, if the tables know it."""
     buffers: dict[str, Buffer]
     """Buffers, by the name that they have in the source."""
-    source: list[str]
+    network: Network | None = None
+    """Networks, of a model that has some."""
+    source: list[str] = []
     """Files of the source."""
-    languages: dict[str, list[str]]
+    languages: dict[str, list[str]] = {}
     """Files that slangc made, by language."""
     golden: str = GOLDEN
     """Queries with their answers."""
 
 
-_INPUTS: Final = {
+INPUTS: Final = {
     "centre": "middle of the footprint, in yarn spacings: x along the weft, y along the warp; any number",
     "deviation": "standard deviations of the Gaussian footprint along x and y, in yarn spacings; at least 0.001",
     "correlation": "of both axes, -1 to 1",
@@ -143,12 +177,16 @@ _INPUTS: Final = {
     "wo": "unit vector to the viewer",
     "curvature": "of the cloth in the viewer's plane, 1/yarn spacings, 0 to 1; 0 with the viewer behind",
 }
-_OUTPUTS: Final = {
+"""Fields of a query."""
+
+OUTPUTS: Final = {
     "components": "specular warp and weft, diffuse warp and weft, for unit colours, in 1/sr",
     "bounds": "with light and viewer on one side the same without shadows of the light, never below the components, of "
     "which the diffuse ones integrate to at most 1; else the components",
 }
-_CONVENTIONS: Final = [
+"""Fields of an answer."""
+
+CONVENTIONS: Final = [
     "The cloth is the plane z = 0, its front towards z > 0. Warp yarns run along y, weft yarns along x.",
     "Lengths are in yarn spacings. The first end and pick of the draft lie in the cell from (0, 0) to (1, 1).",
     "wi and wo point away from the cloth. Behind it (z < 0) answers are 0 unless `kinds` has `behind`.",
@@ -156,6 +194,25 @@ _CONVENTIONS: Final = [
     "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft, with k_dt in place of k_d where "
     "light and viewer are on different sides.",
 ]
+"""Axes, directions, cosine and colours."""
+
+
+def generator() -> str:
+    """Return program and version."""
+    return f"twillight {version('twillight')}"
+
+
+def colours(fabric: Fabric) -> Colours:
+    """Return the colours of the yarns."""
+    mean = fabric.average()
+    return Colours(
+        specular_warp=mean.warp.specular_rgb,
+        specular_weft=mean.weft.specular_rgb,
+        diffuse_warp=mean.warp.diffuse_rgb,
+        diffuse_weft=mean.weft.diffuse_rgb,
+        transmitted_warp=mean.warp.diffuse_transmission_rgb,
+        transmitted_weft=mean.weft.diffuse_transmission_rgb,
+    )
 
 
 def descriptor(
@@ -163,27 +220,17 @@ def descriptor(
     level: int,
     found: Tables,
     kinds: Collection[str],
-    source: list[str],
-    languages: dict[str, list[str]],
 ) -> Descriptor:
-    """Return the content of `soft_nodes.json`."""
-    mean = fabric.average()
+    """Return the content of `soft_nodes.json`, before files are written."""
     values = {name: getattr(found, name) for name in _FILES}
     return Descriptor(
         fabric=fabric.name,
-        generator=f"twillight {version('twillight')}",
+        generator=generator(),
         level=level,
-        inputs=_INPUTS,
-        outputs=_OUTPUTS,
-        conventions=_CONVENTIONS,
-        colours=Colours(
-            specular_warp=mean.warp.specular_rgb,
-            specular_weft=mean.weft.specular_rgb,
-            diffuse_warp=mean.warp.diffuse_rgb,
-            diffuse_weft=mean.weft.diffuse_rgb,
-            transmitted_warp=mean.warp.diffuse_transmission_rgb,
-            transmitted_weft=mean.weft.diffuse_transmission_rgb,
-        ),
+        inputs=INPUTS,
+        outputs=OUTPUTS,
+        conventions=CONVENTIONS,
+        colours=colours(fabric),
         repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
         limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
         kinds=sorted(kinds),
@@ -201,20 +248,19 @@ def descriptor(
             )
             for name, files in _FILES.items()
         },
-        source=source,
-        languages=languages,
     )
 
 
 def vectors(found: Golden) -> Vectors:
     """Return the content of `golden.json`."""
+    whole = found.answers.shape[1] == ANSWERS
     return Vectors(
         queries=_short(found.rows),
         groups=found.groups,
         components=_short(found.answers[:, :4]),
         bounds=_short(found.answers[:, 4:8]),
-        transparency=_short(found.answers[:, TRANSPARENCY]),
-        density=_short(found.answers[:, DENSITY]),
+        transparency=_short(found.answers[:, TRANSPARENCY]) if whole else [],
+        density=_short(found.answers[:, DENSITY]) if whole else [],
         steady=found.steady,
     )
 

@@ -7,6 +7,8 @@ STEADY, as a share of the range of its column, if the last digits of its footpri
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -80,8 +82,8 @@ class Golden(NamedTuple):
     ----------
     rows : float32 (N, 12)
         COLUMNS.
-    answers : float32 (N, ANSWERS)
-        Components; bounds; transparency; density of wi in the mixture of the lobes, 1/sr.
+    answers : float32 (N, ANSWERS) or (N, 8)
+        Components; bounds; of models that know them transparency, and density of wi in the mixture of the lobes, 1/sr.
     groups : dict
         First row and end of the rows of each of GROUPS.
     steady : float
@@ -100,24 +102,38 @@ def rows_of(queries: Queries) -> Float32:
     return np.column_stack(columns).astype(np.float32)
 
 
-def golden(sides: Sides) -> Golden:
-    """Return golden queries of a cloth, of all kinds that it knows."""
-    rng = np.random.default_rng(_SEED)
+Answering = Callable[[Queries], Float32]
+"""Answers of N queries, all viewers on one side: components and bounds (N, 8), or all ANSWERS."""
+
+
+def golden(sides: Sides, read: Answering | None = None) -> Golden:
+    """Return golden queries of a cloth, of all kinds that it knows; `read` answers them, or the soft nodes do."""
     known = {CURVATURE: len(sides.front.falls) > 0, BEHIND: sides.back is not None}
-    rows, answers, groups, share, stop = [], [], {}, [], 0
-    for name, group in GROUPS.items():
-        behind = min(group.light, group.viewer) < 0.0
-        if (group.curved and not known[CURVATURE]) or (behind and not known[BEHIND]):
-            continue
-        queries = _candidates(sides.front, group, rng)
-        steady, answer = _steady(sides, queries, rng)
+    groups = {
+        name: group
+        for name, group in GROUPS.items()
+        if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
+    }
+    ends, picks = sides.front.repeat
+    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides))
+
+
+def golden_of(groups: Mapping[str, Group], repeat: tuple[int, int], read: Answering, stretched: bool = True) -> Golden:
+    """Return golden queries over a repeat (ends, picks), footprints all round if not `stretched`."""
+    rng = np.random.default_rng(_SEED)
+    rows, answers, places, share, stop = [], [], {}, [], 0
+    for name, group in groups.items():
+        queries = _candidates(repeat, group, rng)
+        if not stretched:
+            queries = queries._replace(sigma_minor=queries.sigma)
+        steady, answer = _steady(read, queries, rng)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
         answers.append(answer[chosen])
-        groups[name] = stop, stop + len(chosen)
+        places[name] = stop, stop + len(chosen)
         stop += len(chosen)
         share.append(float(steady.mean()))
-    return Golden(np.concatenate(rows), np.concatenate(answers), groups, float(np.mean(share)))
+    return Golden(np.concatenate(rows), np.concatenate(answers), places, float(np.mean(share)))
 
 
 def read_sides(sides: Sides, queries: Queries) -> Float32:
@@ -174,13 +190,13 @@ def lobes_of(sides: Sides, looks: Queries) -> Lobes:
     return result
 
 
-def _candidates(table: Table, group: Group, rng: np.random.Generator) -> Queries:
+def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator) -> Queries:
     """Return twice as many queries as a group has, footprints of every kind by turns, anywhere in the repeat."""
     count = 2 * group.rows
     kinds = np.array(_FOOTPRINTS)[np.arange(count) % len(_FOOTPRINTS)]
     drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
     sigma, ratio = drawn[:, 0], drawn[:, 1]
-    place = rng.random((count, 2)) * table.repeat
+    place = rng.random((count, 2)) * repeat
     # Half of the ellipses lie along the yarns.
     angle = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(-0.5, 0.5, count)) * np.pi
     wi, wo = (_front(rng, count) * np.array([1.0, 1.0, side]) for side in (group.light, group.viewer))
@@ -198,9 +214,9 @@ def _front(rng: np.random.Generator, count: int) -> Float32:
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
 
 
-def _steady(sides: Sides, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
+def _steady(read: Answering, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
     """Return which queries are steady, and the answers of all, (N, ANSWERS)."""
-    answer = read_sides(sides, queries)
+    answer = read(queries)
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
     for _ in range(_TRIALS):
@@ -208,7 +224,7 @@ def _steady(sides: Sides, queries: Queries, rng: np.random.Generator) -> tuple[M
             u=_next(queries.u, rng), v=_next(queries.v, rng), sigma=_next(queries.sigma, rng),
             sigma_minor=_next(queries.sigma_minor, rng),
         )  # fmt: skip
-        change = np.maximum(change, (np.abs(read_sides(sides, moved) - answer) / span).max(axis=1))
+        change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -17,6 +17,9 @@ SOURCE: Final = "slang"
 
 ALL: Final = "all"
 """Every language."""
+
+ONNX: Final = "onnx"
+"""The network of a model alone, which needs no compiler."""
 
 
 class Program(NamedTuple):
@@ -73,8 +76,8 @@ none; bindings, which a program sets by name."""
 def refuse_unknown(languages: Sequence[str]) -> None:
     """Refuse a name that is no language."""
     for name in languages:
-        if name not in (ALL, SOURCE, *LANGUAGES):
-            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ALL))}"
+        if name not in (ALL, SOURCE, ONNX, *LANGUAGES):
+            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ONNX, ALL))}"
             raise BadInput("export", "--language", one_line(name, 40), allowed)
 
 
@@ -103,7 +106,9 @@ def compiler_for(languages: Sequence[str]) -> Path:
     return found
 
 
-def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Path) -> dict[str, list[str]]:
+def translate(
+    languages: Sequence[str], compiler: Path, source: Path, folder: Path, entries: Collection[str]
+) -> dict[str, list[str]]:
     """Write the files of languages, each in a folder of its name, and return their paths in `folder`.
 
     Parameters
@@ -116,6 +121,8 @@ def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Pa
         Folder with the Slang source and `layout.slang`.
     folder : Path
         Folder to write to.
+    entries : collection of str
+        Entry points that the source has.
 
     Raises
     ------
@@ -127,7 +134,10 @@ def translate(languages: Sequence[str], compiler: Path, source: Path, folder: Pa
         (folder / name).mkdir()
         language = LANGUAGES[name]
         for program in language.programs:
-            compile_program(compiler, source, program, language.target, folder / name / program.file)
+            present = program._replace(entries=tuple(entry for entry in program.entries if entry in entries))
+            if not present.entries:
+                continue
+            compile_program(compiler, source, present, language.target, folder / name / program.file)
             found.setdefault(name, []).append(f"{name}/{program.file}")
     return found
 

@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -233,14 +233,23 @@ def _refuse_large_tables(found: Sequence[_Side]) -> None:
         raise BadInput("export", "--shader", f"{size:,} horizons", allowed)
 
 
-def layout_slang(found: Tables) -> str:
-    """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the function that reads it."""
-    lines = ["// Generated from pipeline.analytic.soft_nodes; do not edit.", ""]
-    for name, value in constants().items():
-        kind, text = ("int", str(value)) if isinstance(value, int) else ("float", f"{value:.9g}")
+def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> str:
+    """Return a file of the source with constants, whose types are those of the values."""
+    lines = [f"// Generated from {origin}; do not edit.", "", "#pragma once", ""]
+    for name, value in values.items():
+        if isinstance(value, bool):
+            kind, text = "bool", str(value).lower()
+        else:
+            kind, text = ("int", str(value)) if isinstance(value, int) else ("float", f"{value:.9g}")
         if kind == "float" and not any(mark in text for mark in ".e"):
             text += ".0"
         lines.append(f"static const {kind} {name} = {text};")
+    return "\n".join([*lines, ""])
+
+
+def layout_slang(found: Tables) -> str:
+    """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
+    lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
     kinds = {name: "int" if isinstance(value, int) else "float" for name, value in found.scalars.items()}
     lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]

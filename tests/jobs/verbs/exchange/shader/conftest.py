@@ -32,13 +32,13 @@ def missing(*programs):
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """A function that exports a fabric once, and returns its folder."""
+    """A function that exports a fabric once, and returns its folder; models take no level."""
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
-    def export(name, level=2, *languages, kinds=()):
-        folder = home / "-".join((name, str(level), *languages, *kinds))
-        export_shader(load_fabric(name), folder, level, languages, kinds)
+    def export(name, level=2, *languages, kinds=(), model=None):
+        folder = home / "-".join((name, str(level), *languages, *kinds, Path(model or "soft_nodes").name))
+        export_shader(load_fabric(name), folder, None if model else level, languages, kinds, model)
         return folder
 
     return export
@@ -48,12 +48,13 @@ def exported(tmp_path_factory):
 def read():
     """A function that reads an exported folder as a program would that has only its files."""
 
-    def read(folder, type_of_nodes="float32"):
-        said = json.loads((folder / "soft_nodes.json").read_text())
+    def read(folder, type_of_numbers="float32"):
+        (listing,) = (path for path in folder.glob("*.json") if path.name != "golden.json")
+        said = json.loads(listing.read_text())
         codes = {"int32": "<i4", "float32": "<f4", "float16": "<f2"}
         buffers = {}
         for name, buffer in said["buffers"].items():
-            kind = type_of_nodes if name == "nodes" else next(iter(buffer["files"]))
+            kind = type_of_numbers if type_of_numbers in buffer["files"] else next(iter(buffer["files"]))
             path = folder / buffer["files"][kind]
             if kind == "uint8":
                 values = np.asarray(Image.open(io.BytesIO(path.read_bytes()))).ravel()
@@ -65,7 +66,7 @@ def read():
         golden = json.loads((folder / said["golden"]).read_text())
         queries = np.array(golden["queries"], np.float32)
         columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
-        answers = np.column_stack([np.array(column) for column in columns])
+        answers = np.column_stack([np.array(column) for column in columns if column])
         return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
     return read
@@ -91,8 +92,12 @@ def cpp(exported, tmp_path_factory):
     """
     if lacking := missing("slangc", "g++"):
         pytest.skip(lacking)
-    library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
-    source = exported("gingham", 2, "cpp") / "cpp" / "evaluate.cpp"
+    return compiled(exported("gingham", 2, "cpp"), tmp_path_factory.mktemp("cpp"))
+
+
+def compiled(exported, folder):
+    """Compile the C++ form of an exported folder into another, and return the function of the fixture `cpp`."""
+    library, source = folder / "evaluate.so", exported / "cpp" / "evaluate.cpp"
     subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
     programs = ctypes.CDLL(str(library))
 
@@ -100,7 +105,7 @@ def cpp(exported, tmp_path_factory):
         count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
         rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
         rows[: len(queries), : queries.shape[1]] = queries
-        arrays = [np.ascontiguousarray(buffers[name]) for name in ("integers", "numbers", "nodes", "grid")]
+        arrays = [np.ascontiguousarray(values) for values in buffers.values()]
         arrays += [rows, answers]
         buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
         groups = _Groups((0, 0, 0), (count, 1, 1))
@@ -118,11 +123,10 @@ def webgl(exported, tmp_path_factory):
     """
     if lacking := missing("slangc", "chromium"):
         pytest.skip(lacking)
-    folder = exported("gingham", 2, "glsles")
     page = Path(__file__).with_name("evaluate.html").read_text()
 
     @cache
-    def source(entry):
+    def source(entry, folder):
         if entry == "evaluate":
             return (folder / "glsles" / "evaluate.frag").read_text()
         path = tmp_path_factory.mktemp("glsles") / f"{entry}.frag"
@@ -130,18 +134,29 @@ def webgl(exported, tmp_path_factory):
         compile_program(slangc(), folder / "slang", program, "glsl", path)
         return path.read_text()
 
-    def call(cloths, half=False, entry="evaluate"):
+    def call(cloths, half=False, entry="evaluate", folder=None):
+        text = source(entry, folder or exported("gingham", 2, "glsles"))
         columns, results = WIDTHS[entry]
         jobs = []
         for cloth in cloths:
             rows = np.full((len(cloth.queries), columns), 0.5, np.float32)
             rows[:, : cloth.queries.shape[1]] = cloth.queries
             values = {**cloth.buffers, "queries": rows}
-            values["nodes"] = values["nodes"].astype(np.float16 if half else np.float32)
+            for name in {"nodes", "weights"} & values.keys():
+                values[name] = values[name].astype(np.float16 if half else np.float32)
             encoded = {name: base64.b64encode(array.tobytes()).decode() for name, array in values.items()}
-            jobs.append({**encoded, "count": len(rows), "half": half, "texels": columns // 4, "targets": results // 4})
+            jobs.append(
+                {
+                    "names": list(values),
+                    **encoded,
+                    "count": len(rows),
+                    "half": half,
+                    "texels": columns // 4,
+                    "targets": results // 4,
+                }
+            )
         written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
-        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source(entry)), 1))
+        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(text), 1))
         command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
         done = subprocess.run([*command, written.as_uri()], capture_output=True, text=True, timeout=600, check=True)
         shown = re.search(r'<pre id="answers">(.*?)</pre>', done.stdout, re.DOTALL)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from jobs.cli import main
-from jobs.verbs.exchange.shader import export_shader as verb
-from jobs.verbs.exchange.shader import languages, tables
+from jobs.verbs.exchange.shader import languages, soft_nodes, tables
 from jobs.verbs.exchange.shader.languages import LANGUAGES
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.truth.conventions import COMPONENTS
@@ -113,7 +112,7 @@ def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, t
     code, said = twillight("gingham", "--shader", "x")
     assert code == 2 and "horizons" in said.err
     monkeypatch.setattr(tables, "MOST_CELLS", 3)
-    monkeypatch.setattr(verb, "tabulate_sides", None)  # cells are counted before any work
+    monkeypatch.setattr(soft_nodes, "tabulate_sides", None)  # cells are counted before any work
     code, said = twillight("gingham", "--shader", "x")
     assert code == 2 and "at most 3 cells" in said.err and not list(tmp_path.iterdir())
 

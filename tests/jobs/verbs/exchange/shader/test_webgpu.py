@@ -14,15 +14,16 @@ from tests.jobs.verbs.exchange.shader.test_evaluate import worst
 OPTIONS = ("--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan")
 
 
-def test_golden_vectors_are_answered(exported, read, tmp_path, browse):
+@pytest.mark.parametrize("model", [None, pytest.param("selvage", marks=pytest.mark.slow)])
+def test_golden_vectors_are_answered(exported, read, tmp_path, browse, model):
     if lacking := missing("slangc", "chromium"):
         pytest.skip(lacking)
-    shutil.copy(exported("gingham", 2, "wgsl") / "wgsl" / "evaluate.wgsl", tmp_path)
+    shutil.copy(exported("gingham", 2, "wgsl", model=model) / "wgsl" / "evaluate.wgsl", tmp_path)
     shutil.copy(Path(__file__).with_name("evaluate_wgsl.html"), tmp_path)
-    cloth = read(exported("voile"))
+    cloth = read(exported("voile", model=model))
     columns = {**cloth.buffers, "queries": cloth.queries}
     encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
-    (tmp_path / "job.json").write_text(json.dumps({**encoded, "count": len(cloth.queries)}))
+    (tmp_path / "job.json").write_text(json.dumps({"names": list(columns), **encoded, "count": len(cloth.queries)}))
     said = browse("evaluate_wgsl.html", *OPTIONS)
     if b"requestDevice" in said or b"null" in said:
         pytest.skip(f"this browser has no WebGPU: {said.decode()}")
