@@ -145,7 +145,11 @@ def test_light_and_viewer_behind_answer_nothing(selvage_cpp, neumip_cpp, neumip,
 
 
 @pytest.mark.parametrize("fabrics", [SOME, pytest.param(FABRICS, marks=pytest.mark.slow)], ids=["some", "all"])
-@pytest.mark.parametrize(("half", "allowed"), [(False, 1e-4), (True, 1e-2)], ids=["float32", "float16"])
+@pytest.mark.parametrize(
+    ("half", "allowed"),
+    [(False, 1e-4), pytest.param(True, 1e-2, marks=pytest.mark.slow)],
+    ids=["float32", "float16"],
+)
 def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allowed, fabrics):
     selvages = [read(exported(name, model="selvage")) for name in fabrics]
     folder = exported(CLOTH, 2, "cpp", "glsles", model="selvage")
