@@ -266,6 +266,6 @@ def vectors(found: Golden) -> Vectors:
 
 
 def _short(values: Float32) -> list[Any]:
-    """Return numbers of single precision with the fewest digits that tell all of them apart."""
-    found: list[Any] = np.array([float(str(value)) for value in values.ravel()]).reshape(values.shape).tolist()
+    """Return numbers of nine digits, which tell all numbers of single precision apart."""
+    found: list[Any] = np.array([float(f"{value:.9g}") for value in values.ravel()]).reshape(values.shape).tolist()
     return found

@@ -109,14 +109,14 @@ def tables(sides: Sides) -> Tables:
     _refuse_large_tables(found)
     shared = {"colours": sides.colours, "point_places": point_places(POINTS)}
     first = found[0]
-    own = len(first.integers) + len(_PLACED) + len(first.of_integers) + len(first.of_numbers) + len(shared)
+    own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
     integers, numbers = _Buffer(own * len(found)), _Buffer(len(first.numbers) * len(found))
     of_shared = numbers.add(shared)
     heads: list[dict[str, int | float]] = []
     node = grid = 0
     for prefix, side in zip(("", "back_"), found, strict=False):
         offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
-        heads.append({**side.integers, **dict(zip(_PLACED, (node, grid), strict=True)), **offsets, **side.numbers})
+        heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
     return Tables(
         integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
@@ -129,7 +129,7 @@ def tables(sides: Sides) -> Tables:
     )
 
 
-_PLACED: Final = ("first_node", "first_grid")
+_STARTS: Final = ("first_node", "first_grid")
 """Scalars of where the nodes and the grids of a side begin."""
 
 
