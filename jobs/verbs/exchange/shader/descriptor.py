@@ -266,6 +266,8 @@ def vectors(found: Golden) -> Vectors:
 
 
 def _short(values: Float32) -> list[Any]:
-    """Return numbers of nine digits, which tell all numbers of single precision apart."""
-    found: list[Any] = np.array([float(f"{value:.9g}") for value in values.ravel()]).reshape(values.shape).tolist()
+    """Return numbers of single precision with the fewest digits that tell all of them apart."""
+    # `str` keeps to NumPy's print options, which other packages change.
+    numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
+    found: list[Any] = np.array(numbers).reshape(values.shape).tolist()
     return found

@@ -54,7 +54,8 @@ LANGUAGES: Final = {
     "glsles": Language(
         "glsl", (_single("evaluate", "frag", "fragment"), _single("draw", "frag", "fragment", "draw.slang"))
     ),
-    "hlsl": Language("hlsl", _rows("hlsl")),
+    # slangc writes a file of HLSL for each entry point.
+    "hlsl": Language("hlsl", (_single("evaluate", "hlsl", "compute"), _single("scatter", "hlsl", "compute"))),
     "metal": Language("metal", _rows("metal")),
     "wgsl": Language("wgsl", _rows("wgsl")),
 }

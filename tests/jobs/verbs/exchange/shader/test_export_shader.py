@@ -142,7 +142,7 @@ def test_no_sine_and_no_cosine_is_called(exported):
         ("glsles", "evaluate.frag", ()),
         ("glsles", "draw.frag", ()),
         ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "evaluate", "-S", "comp", "-o", "/dev/null")),
-        ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "scatter", "-S", "comp", "-o", "/dev/null")),
+        ("hlsl", "scatter.hlsl", ("-V", "-D", "-e", "scatter", "-S", "comp", "-o", "/dev/null")),
     ],
 )
 def test_glslang_accepts_what_is_written(exported, name, file, options):
