@@ -117,6 +117,7 @@ def learnt(tmp_path_factory):
     return folder, command
 
 
+@pytest.mark.slow
 def test_the_text_is_enough_for_a_network(learnt):
     folder, command = learnt
     page = folder / "out" / "report" / "learnt"
@@ -133,6 +134,7 @@ def test_the_text_is_enough_for_a_network(learnt):
     assert "nothing to do" in run(command, folder).stdout
 
 
+@pytest.mark.slow
 def test_a_network_that_fails_leaves_the_others_their_trainings(learnt):
     """One hangs in its loss, one raises; each is one sentence, and the sound network has what it had."""
     folder, _ = learnt
