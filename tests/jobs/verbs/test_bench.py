@@ -12,12 +12,14 @@ from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from jobs.verbs.bench import BENCHES, RECORDS, STABILITY, TRUTH, measured_alone
 from reports.record import read_records
-from reports.truth import accuracy, bias, effort, stability, throughput
+from reports.truth import accuracy, bias, calibration, effort, footprint_colours, stability, throughput
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias
+from reports.truth.calibration import Calibration
 from reports.truth.effort import Effort
 from reports.truth.finding import RECORDS as FINDINGS
 from reports.truth.finding import judge
+from reports.truth.footprint_colours import ColourLoss
 
 
 @pytest.mark.parametrize("name", ["stability", "truth"])
@@ -36,7 +38,17 @@ def test_the_truth_is_measured_shown_and_recorded(tmp_path, capsys, monkeypatch)
     accuracies = [Accuracy("owen, 64 points", "denim", 0.05, 0.04, 0.03, 64.0, 5000.0, 3.0, 1e-4, 10)]
     biases = [Bias("denim", "light behind", "diffuse_weft", -0.001, 0.0002, 10)]
     efforts = [Effort("table alone", "denim", 0.8, 4000.0, 2e-5, 10), Effort("sampled", "denim", 0.2, 9e3, 2e-3, 10)]
-    for module, found in ((throughput, rates), (accuracy, accuracies), (bias, biases), (effort, efforts)):
+    calibrations = [Calibration("auto", "solid", 0.98, 0.002, 0.9, 1.06, 1.01, 0.003, 2000)]
+    losses = [ColourLoss("denim", "1.0", 0.02, -0.001, 1e-6, 1e-3, 10)]
+    measured = {
+        throughput: rates,
+        accuracy: accuracies,
+        calibration: calibrations,
+        bias: biases,
+        effort: efforts,
+        footprint_colours: losses,
+    }
+    for module, found in measured.items():
         monkeypatch.setattr(module, "measure", lambda found=found: iter(found))
     assert main(["bench", "truth", "--out", str(tmp_path)]) == 0
     text = " ".join(capsys.readouterr().out.split())
@@ -45,8 +57,10 @@ def test_the_truth_is_measured_shown_and_recorded(tmp_path, capsys, monkeypatch)
     assert "−0.10 ± 0.02 % ✓" in text
     records = read_records([tmp_path / TRUTH])
     assert accuracy.RECORDS.from_records(records) == accuracies
+    assert calibration.RECORDS.from_records(records) == calibrations
     assert bias.RECORDS.from_records(records) == biases
     assert effort.RECORDS.from_records(records) == efforts
+    assert footprint_colours.RECORDS.from_records(records) == losses
     assert [record.value for record in records if record.metric == "rate"] == [1.0e6]
 
 
