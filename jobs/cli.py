@@ -335,7 +335,7 @@ def bench(
         str,
         Parameter(
             help="Recipe, or a measurement of the truth: `stability` (rounding), `truth` (speed and errors), "
-            "`sampler` (variance saved)."
+            "`sampler` (variance saved), `mitsuba` (path-traced frames)."
         ),
     ],
     *,

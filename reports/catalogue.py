@@ -337,6 +337,28 @@ METRICS: Final[dict[str, MetricRow]] = {
             table="sampler",
             of_machine=True,
         ),
+        # Path-traced frames in Mitsuba.
+        MetricRow(
+            "traced_error",
+            "error of a path-traced frame",
+            "Mean squared error of linear RGB over a frame in Mitsuba, over the squared mean of the frame; the setting "
+            "is the samples a pixel.",
+            format="scientific",
+        ),
+        MetricRow(
+            "traced_time",
+            "time of a path-traced frame",
+            "Seconds of one processor for that frame.",
+            unit="s/frame",
+            of_machine=True,
+        ),
+        MetricRow(
+            "traced_gain",
+            "× lower than one point in equal time",
+            "Error of frames with one random point a sample in equal time over this error.",
+            better="higher",
+            of_machine=True,
+        ),
     )
 }
 """All metrics by name."""

@@ -1,4 +1,4 @@
-"""`twillight bench`: measurements of the truth without a recipe, `stability`, `truth` and `sampler`.
+"""`twillight bench`: measurements without a recipe: `stability`, `truth`, `sampler` and `mitsuba`.
 
 Their Records lie beside those of the recipes, and the next page shows them.
 """
@@ -30,7 +30,10 @@ TRUTH: Final = "records/truth.json"
 SAMPLER: Final = "records/sampler.json"
 """File of the Records of `bench sampler`."""
 
-RECORDS: Final = (STABILITY, TRUTH, SAMPLER)
+MITSUBA: Final = "records/mitsuba.json"
+"""File of the Records of `bench mitsuba`."""
+
+RECORDS: Final = (STABILITY, TRUTH, SAMPLER, MITSUBA)
 """Files of Records that every page shows, if they exist."""
 
 
@@ -143,6 +146,26 @@ def sampler(out: Path) -> None:
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
 
 
+def mitsuba(out: Path) -> None:
+    """Measure error and time of path-traced frames; print and write the Records."""
+    from jobs.terminal import Terminal
+    from reports.record import this_machine, write_records
+    from reports.tables import truth_rows
+    from reports.truth import path_traced
+
+    console = Terminal()
+    with console.status("frames in Mitsuba") as status:
+        found = []
+        for one in path_traced.measure():
+            found.append(one)
+            status.update(f"frames in Mitsuba: {one.fabric}, {one.method}, {one.samples} samples")
+    path = out / MITSUBA
+    records = path_traced.RECORDS.to_records(found)
+    write_records(path, records, this_machine(1))
+    console.print(_columns(("scene", *truth_rows.TRACED), truth_rows.traced_rows(found)))
+    console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
+
+
 def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
     """Show rows of cells, each table after an empty line."""
     from rich.padding import Padding
@@ -150,7 +173,7 @@ def _columns(names: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableT
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
     for name in names:
-        text = name == names[0] or name in ("fabric", "rate", "note", "light", "how")
+        text = name == names[0] or name in ("fabric", "rate", "note", "light", "how", "method")
         table.add_column(name, justify="left" if text else "right")
     for row in rows:
         table.add_row(*row)
@@ -175,5 +198,10 @@ def _table(findings: Sequence[Finding]) -> RenderableType:
     return table
 
 
-BENCHES: Final[dict[str, Callable[[Path], None]]] = {"stability": stability, "truth": truth, "sampler": sampler}
+BENCHES: Final[dict[str, Callable[[Path], None]]] = {
+    "stability": stability,
+    "truth": truth,
+    "sampler": sampler,
+    "mitsuba": mitsuba,
+}
 """Measurements by name; no recipe has such a name."""

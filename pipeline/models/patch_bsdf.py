@@ -23,6 +23,7 @@ from pipeline.analytic.importance.surface import Surface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
+from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.shade import coloured
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import Queries
@@ -71,8 +72,8 @@ class PatchBSDF:
     ----------
     fabric : Fabric
         The cloth, with its colours.
-    method : str or Fallback
-        Who answers: a name as on the command line (`pipeline.models.named`), or a method with its fallback.
+    method : str, Fallback or TruthAnswers
+        Who answers: a name as on the command line (`pipeline.models.named`), a method with its fallback, or the truth.
     points : int
         Points of the footprint that have a lobe each, at least 1; 1 has its exact lobe.
     widening : float
@@ -97,7 +98,9 @@ class PatchBSDF:
     True
     """
 
-    def __init__(self, fabric: Fabric, method: str | Fallback = USUAL, points: int = 8, widening: float = 2.0) -> None:
+    def __init__(
+        self, fabric: Fabric, method: str | Fallback | TruthAnswers = USUAL, points: int = 8, widening: float = 2.0
+    ) -> None:
         if points < 1:
             raise BadInput("PatchBSDF", "points", points, "must be 1 or more")
         if not 0.0 <= widening < np.inf:

@@ -81,8 +81,8 @@ class GBuffer:
         wo = self.wo.astype(np.float32)
         rest = (self.sigma_minor, self.angle, self.curvature)
         return Queries(
-            _reduce(self.u, repeat[0]),
-            _reduce(self.v, repeat[1]),
+            reduced(self.u, repeat[0]),
+            reduced(self.v, repeat[1]),
             self.sigma.astype(np.float32),
             wo,
             wo,
@@ -90,7 +90,7 @@ class GBuffer:
         )
 
 
-def _reduce(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:
+def reduced(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:
     """Reduce modulo the repeat in float64; what float32 rounds up to the period becomes 0."""
-    reduced = np.mod(coordinate, period).astype(np.float32)
-    return np.where(reduced >= period, np.float32(0), reduced).astype(np.float32)
+    result = np.mod(coordinate, period).astype(np.float32)
+    return np.where(result >= period, np.float32(0), result).astype(np.float32)

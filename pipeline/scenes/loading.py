@@ -144,7 +144,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         if key.startswith(PREFIX):
             worn.setdefault(key.removeprefix(PREFIX), []).append(number)
             wearing.setdefault(key, []).append(shape)
-            if shape.is_mesh() and not _has_uv(mi, shape):
+            if shape.is_mesh() and not has_uv(mi, shape):
                 raise BadInput(
                     where, "shape", shape.id() or shape.class_name(), "a shape that wears a fabric needs uv coordinates"
                 )
@@ -203,7 +203,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
     return world
 
 
-def _has_uv(mi: Any, mesh: Any) -> bool:
+def has_uv(mi: Any, mesh: Any) -> bool:
     """Return whether a mesh has uv coordinates that vary in both directions."""
     if not mesh.has_vertex_texcoords():
         return False

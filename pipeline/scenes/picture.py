@@ -72,6 +72,10 @@ class TruthAnswers:
         answers = estimate(fabric, queries, self._options, seed)
         return np.concatenate([answers.mean, answers.transparency[:, None]], axis=1)
 
+    def predict(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Return the components of N queries, (N, 4)."""
+        return self.rows(fabric, queries, seed)[:, :4]
+
     def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
         """Return the transparency of N footprints, (N,)."""
         return estimate(fabric, looks, self._options, seed).transparency

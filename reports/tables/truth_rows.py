@@ -14,6 +14,7 @@ from reports.truth.calibration import Calibration
 from reports.truth.effort import Effort
 from reports.truth.finding import Finding
 from reports.truth.footprint_colours import ColourLoss
+from reports.truth.path_traced import Traced
 from reports.truth.sampling import SETTINGS, Saving
 
 COMPONENT_TITLES: Final = ("S warp", "S weft", "C warp", "C weft")
@@ -138,6 +139,25 @@ def sampler_rows(found: Sequence[Saving]) -> list[list[str]]:
             f"{times(one.variance_saved)} · {times(one.saved_in_time)} · {one.sample_time:,.0f} ns"
         )
     return [[plain(fabric), *(cells.get(name, NONE) for name in SAMPLERS)] for fabric, cells in lines.items()]
+
+
+TRACED: Final = ("method", "samples", "error", "seconds", "× lower in equal time")
+"""Columns of `traced_rows` after the scene."""
+
+
+def traced_rows(found: Sequence[Traced]) -> list[list[str]]:
+    """Return the rows of the table of path-traced frames: scene, then `TRACED`."""
+    return [
+        [
+            plain(one.fabric),
+            one.method,
+            one.samples,
+            f"{one.error:.1e}",
+            f"{one.seconds:.2f}",
+            NONE if missing(one.gain) else times(one.gain),
+        ]
+        for one in found
+    ]
 
 
 EFFORT: Final = ("how", "queries", "points", "µs a query", "time")

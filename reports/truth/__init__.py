@@ -1,1 +1,1 @@
-"""Measurements of the ground truth itself: accuracy, bias, effort, throughput, sampling, stability."""
+"""Measurements of the ground truth itself: accuracy, bias, effort, throughput, sampling, stability, frames."""

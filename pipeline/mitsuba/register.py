@@ -1,0 +1,66 @@
+"""The plugins entered into Mitsuba, for the variant that is set and for each that is set later."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Final
+
+from pipeline.mitsuba import bsdf, integrator
+from pipeline.scenes.variant import llvm_works
+from weaves.errors import BadInput
+
+HOW: Final = (
+    "Mitsuba finds no LLVM library of version 16 or newer, so it computes one ray at a time, which is slow: "
+    "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
+)
+"""How to install LLVM."""
+
+_registered: set[str] = set()
+
+
+def register() -> Any:
+    """Enter the plugins into Mitsuba, and return the module.
+
+    Without a variant, `best_variant` is set.
+
+    Raises
+    ------
+    BadInput
+        If the variant that is set has other colours than RGB.
+    """
+    import mitsuba as mi
+
+    if mi.variant() is None:
+        mi.set_variant(best_variant())
+    if not _rgb(mi.variant()):
+        raise BadInput("mitsuba", "variant", mi.variant(), "must have RGB colours, such as llvm_ad_rgb or scalar_rgb")
+    if not _registered:
+        mi.detail.add_variant_callback(lambda old, new: _enter(mi))
+    _enter(mi)
+    return mi
+
+
+def best_variant() -> str:
+    """Return llvm_ad_rgb where it works, which a fresh process tries first; else scalar_rgb, with a warning."""
+    if llvm_works():
+        return "llvm_ad_rgb"
+    warnings.warn(HOW, stacklevel=4)
+    return "scalar_rgb"
+
+
+def _rgb(variant: str) -> bool:
+    """Return whether colours are three numbers, without polarisation."""
+    return variant.removesuffix("_double").endswith("_rgb")
+
+
+def _enter(mi: Any) -> None:
+    """Enter the plugins for the variant that is set, once."""
+    import drjit as dr
+
+    variant = mi.variant()
+    if variant in _registered or not _rgb(variant):
+        return
+    _registered.add(variant)
+    worn, path = bsdf.bsdf_class(mi, dr), integrator.integrator_class(mi, dr)
+    mi.register_bsdf(bsdf.NAME, worn)
+    mi.register_integrator(integrator.NAME, path)

@@ -1,0 +1,150 @@
+"""Error and time of path-traced frames in Mitsuba: soft nodes against one random point a sample.
+
+Frames of shipped scenes by the integrator `twillight_path`; everything but the method that answers is the same. Error
+is the mean squared error of linear RGB over the frame against frames in which the ground truth answers, over the
+squared mean of these. Two such frames r, s of other random numbers stand for the truth: (x - r)(x - s) has the squared
+error of x as its mean, whatever their own noise is. Time is the processor's, of all threads.
+
+One point a sample at its limit is not the truth: a ratio of one point has no masking (pipeline.models.point_sampled).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.mitsuba.dress import dress
+from pipeline.mitsuba.register import register
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.loading import Loaded, load
+from pipeline.scenes.options import SceneOptions
+from reports.truth.row_records import RowRecords
+
+SCENES: Final = ("plane", "sphere", "drape")
+"""Scenes of which frames are rendered."""
+
+OURS: Final = "soft_nodes:2"
+"""The method whose gain is stated."""
+
+OTHER: Final = "point_sampled:1"
+"""One random point a sample."""
+
+REFERENCE: Final = "truth"
+"""Who answers in the frames that stand for the truth."""
+
+SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
+"""Samples a pixel of each method."""
+
+_SIZE, _REFERENCE_SAMPLES, _FRAMES = 64, 64, 4
+_DEPTH = 4
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Traced:
+    """One method in one scene with one number of samples."""
+
+    method: str
+    """Who answered."""
+    fabric: str
+    """The scene."""
+    samples: str
+    """Samples a pixel, as text: it is part of the setting."""
+    error: float
+    """Mean squared error of linear RGB over the squared mean of the frame."""
+    seconds: float
+    """Seconds of a processor for a frame."""
+    count: int
+    """Frames."""
+    gain: float = math.nan
+    """Error of one point a sample in equal time over this error; NaN for one point a sample itself."""
+
+
+RECORDS: Final = RowRecords(
+    Traced,
+    {"error": "traced_error", "seconds": "traced_time", "gain": "traced_gain"},
+    setting=("samples",),
+    method_field="method",
+)
+"""Frames as Records."""
+
+
+def measure(
+    scenes: Sequence[str] = SCENES,
+    size: int = _SIZE,
+    samples: Mapping[str, Sequence[int]] = SAMPLES,
+    reference: tuple[str, int] = (REFERENCE, _REFERENCE_SAMPLES),
+    frames: int = _FRAMES,
+) -> Iterator[Traced]:
+    """Measure every method in every scene.
+
+    Parameters
+    ----------
+    scenes : sequence of str
+        Names of scenes.
+    size : int
+        Side of a frame in pixels.
+    samples : mapping
+        Numbers of samples a pixel, by method; the last method is `OTHER`.
+    reference : (str, int)
+        The method that stands for the truth, and its samples.
+    frames : int
+        Frames of other random numbers; error and time are their means.
+    """
+    for name in scenes:
+        truths = [_Scene(name, reference[0], size).frame(reference[1], 1000 + k)[0] for k in range(2)]
+        scale = float(np.mean(truths)) ** 2
+        found: list[Traced] = []
+        for method, counts in reversed(samples.items()):
+            scene = _Scene(name, method, size)
+            scene.frame(1, 0)  # loads and tabulates
+            for count in counts:
+                made = [scene.frame(count, seed) for seed in range(1, frames + 1)]
+                errors = [float(np.mean((frame - truths[0]) * (frame - truths[1]))) / scale for frame, _ in made]
+                error, seconds = float(np.mean(errors)), float(np.median([seconds for _, seconds in made]))
+                others = [one for one in found if one.method == OTHER]
+                gain = _error_in(seconds, others) / error if method != OTHER else math.nan
+                found.append(Traced(method, name, str(count), error, seconds, frames, gain))
+        yield from found
+
+
+class _Scene:
+    """A shipped scene whose cloth one method answers for."""
+
+    def __init__(self, name: str, method: str, size: int) -> None:
+        self._loaded: Loaded = load(load_scene(name), SceneOptions())
+        self._world, self._mi = dress(self._loaded, method), register()
+        camera, mi = self._loaded.camera, self._mi
+        film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32"}
+        self._sensor = mi.load_dict(
+            {
+                "type": "perspective",
+                **camera.settings,
+                "to_world": mi.ScalarTransform4f(camera.to_world),
+                "film": {**film, "rfilter": {"type": "box"}},
+            }
+        )
+        self._integrator = mi.load_dict({"type": "twillight_path", "max_depth": _DEPTH})
+
+    def frame(self, samples: int, seed: int) -> tuple[Floats, float]:
+        """Return a frame, (size, size, 3), and the processor's seconds."""
+        begun = time.process_time()
+        picture: Any = self._mi.render(
+            self._world, sensor=self._sensor, integrator=self._integrator, spp=samples, seed=seed
+        )
+        pixels = np.asarray(picture, np.float64)[..., :3]
+        return pixels, time.process_time() - begun
+
+
+def _error_in(seconds: float, found: Sequence[Traced]) -> float:
+    """Return the error in a time: between two numbers of samples by a power law, beyond them that of the nearest."""
+    times, errors = (np.array([getattr(one, name) for one in found]) for name in ("seconds", "error"))
+    order = np.argsort(times)
+    return float(np.exp(np.interp(math.log(seconds), np.log(times[order]), np.log(errors[order]))))

@@ -1,0 +1,190 @@
+"""The integrator `twillight_path`: footprints, energy, and light transport against Mitsuba's own path tracer."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.mitsuba.evaluated import evaluated
+from pipeline.mitsuba.footprint import PIXEL, Footprints
+from pipeline.mitsuba.integrator import ray_deviation
+from pipeline.mitsuba.path import MOST_SCATTER, _Cone
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.shipped import SHIPPED
+from pipeline.scenes.variant import llvm_works
+from weaves.errors import BadInput
+
+NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+
+
+def floor(mi, side=1.0, height=0.0):
+    """Return a square floor seen from above; u, v run from 0 to 1."""
+    to_world = mi.ScalarTransform4f().translate([0, 0, height]).scale(side)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "diffuse"}}
+
+
+def sensor(mi, size=8, samples=4, rfilter="box"):
+    return {
+        "type": "perspective",
+        "fov": 30,
+        "to_world": mi.ScalarTransform4f().look_at([0, -1, 4], [0, 0, 0], [0, 1, 0]),
+        "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": rfilter}},
+        "sampler": {"type": "independent", "sample_count": samples},
+    }
+
+
+def path(mi, kind="twillight_path", **properties):
+    return mi.load_dict({"type": kind, **properties})
+
+
+def jacobian(si):
+    return np.stack([np.asarray(change, np.float64).reshape(2) for change in (si.duv_dx, si.duv_dy)], axis=-1)[None]
+
+
+@pytest.mark.parametrize(("rfilter", "samples"), [("box", 1), ("box", 64), ("gaussian", 4), ("tent", 4)])
+def test_filter_and_footprint_together_are_one_pixel(scalar, rfilter, samples):
+    """Variances: box 1/12, tent 1/6, Mitsuba's Gaussian .25 but for its tails."""
+    spread = {"box": 1 / 12, "tent": 1 / 6, "gaussian": 0.25}[rfilter]
+    found = ray_deviation(scalar.load_dict({"type": rfilter}), samples)
+    wanted = math.sqrt(max(PIXEL**2 - spread, PIXEL**2 / max(samples, 4)))
+    assert found == pytest.approx(wanted, rel=1e-3)
+
+
+def test_first_footprints_are_those_of_the_gbuffer(scalar):
+    """Rays through the middles of pixels of the scene `drape`; both know places in single precision."""
+    import drjit as dr
+
+    loaded = load(SHIPPED["drape"], SceneOptions(variant="scalar_rgb", curvature="none"))
+    size = (24, 18)
+    gbuffer = render(loaded, size=size).gbuffers["wool_gabardine"]
+    camera = loaded.camera.sensor(scalar, size)
+    for index in range(0, len(gbuffer.pixel), 17):
+        row, column = divmod(int(gbuffer.pixel[index]), size[0])
+        place = [(column + 0.5) / size[0], (row + 0.5) / size[1]]
+        ray, _ = camera.sample_ray_differential(0.0, 0.5, place, [0.5, 0.5])
+        si = loaded.world.ray_intersect(ray)
+        _Cone(scalar, dr).meet(ray, si)
+        found = Footprints.of(jacobian(si) * 80.0)
+        wanted = (gbuffer.sigma[index], gbuffer.sigma_minor[index])
+        np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=2e-2)
+
+
+def test_a_bounce_widens_the_footprint(scalar):
+    """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1.
+
+    Its cone is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3).
+    """
+    import drjit as dr
+
+    mi = scalar
+    scene = mi.load_dict({"type": "scene", "floor": floor(mi), "ceiling": floor(mi, height=2.0)})
+    bottom = mi.load_dict({"type": "scene", "floor": floor(mi)})
+    ray = mi.RayDifferential3f(mi.Point3f(0.1, 0.2, 4.0), mi.Vector3f(0, 0, -1))
+    ray.o_x = ray.o_y = ray.o
+    ray.d_x, ray.d_y, ray.has_differentials = mi.Vector3f(0.01, 0, -1), mi.Vector3f(0, 0.01, -1), True
+    cone = _Cone(mi, dr)
+    si = bottom.ray_intersect(ray)
+    cone.meet(ray, si)
+    np.testing.assert_allclose(Footprints.of(jacobian(si)).sigma[0], PIXEL * 0.04 / 2.0, rtol=1e-4)
+    for delta, widened in ((True, 0.0), (False, 2.0 / math.sqrt(4.0 * math.pi * 3.0))):
+        cone = _Cone(mi, dr)
+        cone.meet(ray, si)
+        cone.scatter(mi.Float(3.0), delta)
+        up = mi.RayDifferential3f(si.spawn_ray(mi.Vector3f(0, 0, 1)))
+        met = scene.ray_intersect(up)
+        cone.meet(up, met)
+        wanted = math.hypot(PIXEL * 0.06, widened) / 2.0
+        found = Footprints.of(jacobian(met))
+        np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=1e-3)
+
+
+def test_a_rare_direction_widens_no_more_than_an_even_one(scalar):
+    import drjit as dr
+
+    cone = _Cone(scalar, dr)
+    cone.meet(scalar.RayDifferential3f(), dr.zeros(scalar.SurfaceInteraction3f))
+    cone.scatter(1e-9, False)
+    assert cone.state[-1] == pytest.approx(math.sqrt(MOST_SCATTER))
+
+
+def test_light_transport_is_that_of_mitsubas_path_tracer(mi):
+    """Two diffuse floors, a point light and an even sky: means of 8 pictures each, a z-test at .1 %."""
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "floor": floor(mi, 2.0),
+            "shelf": floor(mi, 0.5, 0.6),
+            "sky": {"type": "constant", "radiance": 0.3},
+            "lamp": {"type": "point", "position": [1.0, 1.0, 2.0], "intensity": 3.0},
+            "sensor": sensor(mi),
+        }
+    )
+    means, errors = [], []
+    # In evaluated loops `path` of Mitsuba 3.9.1 loses light.
+    theirs = "path" if mi.variant().startswith("scalar") else "prb"
+    for kind, samples in (("twillight_path", 4), (theirs, 256)):
+        tracer = path(mi, kind, max_depth=4)
+        with evaluated():  # cloth of other tests may still be in memory
+            pictures = [mi.render(scene, integrator=tracer, spp=samples, seed=k) for k in range(8)]
+        found = [float(np.asarray(picture).mean()) for picture in pictures]
+        means.append(np.mean(found))
+        errors.append(np.std(found, ddof=1) / math.sqrt(8))
+    assert abs(means[0] - means[1]) < 4.8 * math.hypot(*errors)  # t of 7 degrees of freedom at .1 %, two-sided
+    assert errors[0] < 0.1 * means[0]
+
+
+def test_hidden_lights_are_hidden(scalar):
+    scene = scalar.load_dict({"type": "scene", "sky": {"type": "constant"}, "sensor": sensor(scalar, 2)})
+    shown, hidden = (
+        np.asarray(scalar.render(scene, integrator=path(scalar, hide_emitters=hide), spp=1)) for hide in (False, True)
+    )
+    assert (shown[..., :3] == 1.0).all() and (hidden[..., :3] == 0.0).all()
+
+
+@NEEDS_LLVM
+@pytest.mark.parametrize("kind", ["prb", "direct"])
+def test_mitsubas_own_integrators_show_cloth_where_they_are_evaluated(llvm, kind):
+    """Direct light alone, with a footprint that all know, and the same random numbers: the same picture."""
+    cloth = {**floor(llvm, 0.8), "bsdf": {"type": "twillight", "fabric": "denim", "yarns": 10.0, "sigma": 0.5}}
+    lamp = {"type": "point", "position": [1.0, 1.0, 2.0], "intensity": 3.0}
+    scene = llvm.load_dict({"type": "scene", "cloth": cloth, "lamp": lamp, "sensor": sensor(llvm)})
+    other = path(llvm, kind, **({"max_depth": 2} if kind == "prb" else {}))
+    with pytest.raises(RuntimeError) as caught:
+        llvm.render(scene, integrator=other, spp=1)
+    assert "with twillight_mitsuba.evaluated():" in str(caught.value.__cause__)
+    ours = np.asarray(llvm.render(scene, integrator=path(llvm, max_depth=2), spp=4))[..., :3]
+    with evaluated():
+        theirs = np.asarray(llvm.render(scene, integrator=other, spp=4))[..., :3]
+    assert ours.mean() > 0.001
+    np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["denim", "gauze"])
+def test_cloth_in_an_even_sky_makes_no_light(mi, name):
+    """Radiance is at most that of the sky: scattered light below 1, and what comes through gaps adds up to it."""
+    cloth = {**floor(mi, 0.8), "bsdf": {"type": "twillight", "fabric": name, "yarns": 10.0}}
+    scene = mi.load_dict({"type": "scene", "cloth": cloth, "sky": {"type": "constant"}, "sensor": sensor(mi, 4, 8)})
+    seen = np.asarray(mi.render(scene, integrator=path(mi, max_depth=3), spp=8))[..., :3].mean()
+    assert 0.1 < seen < 1.0
+
+
+def test_a_mesh_without_uv_is_one_sentence(scalar):
+    mi = scalar
+    settings = mi.Properties()
+    settings["bsdf"] = mi.load_dict({"type": "twillight", "fabric": "denim"})
+    mesh = mi.Mesh("bare", vertex_count=3, face_count=1, props=settings)
+    found = mi.traverse(mesh)
+    found["vertex_positions"], found["faces"] = [0, 0, 0, 1, 0, 0, 0, 1, 0], [0, 1, 2]
+    found.update()
+    scene = mi.load_dict({"type": "scene", "mesh": mesh, "sky": {"type": "constant"}, "sensor": sensor(mi)})
+    with pytest.raises(BadInput, match=r"needs uv coordinates"):
+        mi.render(scene, integrator=path(mi), spp=1)
+
+
+def test_bad_properties_end_in_one_sentence(scalar):
+    with pytest.raises(RuntimeError) as caught:
+        path(scalar, max_dept=3)
+    last = str(caught.value).strip().splitlines()[-1]
+    assert last.startswith("BadInput: ") and "did you mean 'max_depth'" in last

@@ -1,0 +1,43 @@
+"""Error against time of path-traced frames: numbers of a tiny frame, Records, and equal times in closed form."""
+
+import math
+
+import pytest
+
+from pipeline.scenes.variant import mitsuba
+from reports.truth import path_traced
+from reports.truth.path_traced import OTHER, OURS, RECORDS, Traced, measure
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Return a frame of 4 by 4 pixels; a reference of the same method, so that its own error is noise alone."""
+    import mitsuba as mi
+
+    before = mi.variant()
+    mitsuba()
+    yield list(measure(("sphere",), 4, {OURS: (1,), OTHER: (1, 2)}, (OURS, 4), 2))
+    if before is not None:
+        mi.set_variant(before)
+
+
+@pytest.mark.slow
+def test_every_method_has_an_error_and_a_time(found):
+    assert [(one.method, one.samples) for one in found] == [(OTHER, "1"), (OTHER, "2"), (OURS, "1")]
+    for one in found:
+        assert math.isfinite(one.error) and one.seconds > 0 and one.count == 2
+        assert math.isnan(one.gain) == (one.method == OTHER)
+
+
+@pytest.mark.slow
+def test_rows_are_kept_by_their_records(found):
+    back = RECORDS.from_records(RECORDS.to_records(found))
+    assert [(one.method, one.fabric, one.samples, one.error) for one in back] == [
+        (one.method, one.fabric, one.samples, one.error) for one in found
+    ]
+
+
+def test_errors_between_two_times_follow_a_power_law():
+    """1 and 4 seconds with errors 8 and 2: 4 at 2 seconds; beyond both, that of the nearest."""
+    rows = [Traced(OTHER, "x", str(n), error, n, 1) for n, error in ((4.0, 2.0), (1.0, 8.0))]
+    assert [path_traced._error_in(t, rows) for t in (0.5, 2.0, 9.0)] == pytest.approx([8.0, 4.0, 2.0])

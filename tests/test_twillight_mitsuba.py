@@ -1,0 +1,66 @@
+"""The page docs/mitsuba.md: its example is run as it stands, or with few small pixels where there is no LLVM.
+
+With TWILLIGHT_WRITE_PICTURES=1 (`make pictures`) the picture is written to `docs/pictures`, not compared.
+"""
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from pipeline.mitsuba.options import ClothOptions
+from pipeline.scenes.variant import llvm_works, mitsuba
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "mitsuba.md").read_text(encoding="utf-8")
+KEPT = ROOT / "docs" / "pictures" / "cloth.png"
+
+
+@pytest.fixture
+def example(tmp_path, monkeypatch):
+    """Return a function that runs the example of the page and returns its picture."""
+    (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
+    import mitsuba as mi
+
+    before = mi.variant()
+    mitsuba()  # the import would choose the same variant, and warn of the scalar one
+    monkeypatch.chdir(tmp_path)
+
+    def run(**changed):
+        text = code
+        for old, new in changed.values():
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        exec(compile(text, "mitsuba.md", "exec"), {})
+        return matplotlib.image.imread(tmp_path / "cloth.png")[..., :3].astype(float)
+
+    yield run
+    if before is not None:
+        mi.set_variant(before)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+def test_the_example_word_for_word(example, tmp_path):
+    """The picture of the page but for its noise: 64 samples of other random numbers are as far away."""
+    picture = example()
+    if os.environ.get("TWILLIGHT_WRITE_PICTURES"):
+        shutil.copyfile(tmp_path / "cloth.png", KEPT)
+    kept = matplotlib.image.imread(KEPT)[..., :3].astype(float)
+    assert picture.shape == kept.shape and np.abs(picture - kept).mean() < 4 / 255
+
+
+def test_the_example_with_small_pixels(example):
+    picture = example(size=('"width": 384, "height": 256', '"width": 12, "height": 8'), samples=("spp=64", "spp=1"))
+    assert picture.shape == (8, 12, 3) and 0.2 < picture.mean() < 0.9
+    assert picture.std() > 0.05
+
+
+def test_the_page_has_every_property():
+    (table,) = re.findall(r"\| property \|.*?\n\n", PAGE, re.S)
+    named = re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in table.splitlines()[2:] if "|" in row))
+    assert set(named) == set(ClothOptions.model_fields)
