@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float64, Index, Mask
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.mitsuba.columns import Columns
 from pipeline.mitsuba.options import ClothOptions
 from pipeline.mitsuba.worn import Hits, Worn
@@ -39,7 +39,6 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
         (flags.DiffuseTransmission, flags.GlossyTransmission),
         (flags.Null,),
     )
-    scalar = mi.variant().startswith("scalar")
     types = np.array([int(kind[-1]) for kind in kinds])
 
     def enabled(ctx: Any, component: Index) -> Mask:
@@ -59,19 +58,19 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             """Return the BSDF times the cosine to wo."""
-            return self._asked(ctx, si, wo, active, values=True, density=False)[0]
+            return self._evaluated(ctx, si, wo, active, values=True, density=False)[0]
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             """Return the density with which `sample` draws wo, 1/sr."""
-            return self._asked(ctx, si, wo, active, values=False, density=True)[1]
+            return self._evaluated(ctx, si, wo, active, values=False, density=True)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             """Return `eval` and `pdf`."""
-            return self._asked(ctx, si, wo, active, values=True, density=True)
+            return self._evaluated(ctx, si, wo, active, values=True, density=True)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             """Draw a direction; return it and the BSDF times its cosine, over its density."""
-            columns, rows, hits = self._hits(si, active, sample1, sample2)
+            columns, rows, hits = _hits(mi, dr, si, active, sample1, sample2)
             random = np.column_stack([columns.number(sample1), columns.vector(sample2)])[rows]
             wo, pdf, straight, weight = self._worn.sample(hits, random) if len(rows) else _NOTHING
             component = np.where(straight, STRAIGHT, _component(hits, wo))
@@ -86,7 +85,7 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
             """Return the share of light that goes straight through."""
-            columns, rows, hits = self._hits(si, active)
+            columns, rows, hits = _hits(mi, dr, si, active)
             share = self._worn.transparency(hits) if len(rows) else np.empty(0)
             return columns.to_mitsuba(mi.Spectrum, np.repeat(share[:, None], 3, axis=1), rows)
 
@@ -94,8 +93,8 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
             """Return the properties as text."""
             return f"{NAME}[{self._worn.options}]"
 
-        def _asked(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
-            columns, rows, hits = self._hits(si, active, wo)
+        def _evaluated(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
+            columns, rows, hits = _hits(mi, dr, si, active, wo)
             light = columns.vector(wo)[rows]
             rgb, pdf = np.zeros((len(rows), 3)), np.zeros(len(rows))
             if len(rows):
@@ -106,38 +105,40 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
                     pdf = np.where(kept, self._worn.pdf(hits, light), 0.0)
             return columns.to_mitsuba(mi.Spectrum, rgb, rows), columns.to_mitsuba(mi.Float, pdf, rows)
 
-        def _hits(self, si: Any, active: Any, *others: Any) -> tuple[Columns, Index, Hits]:
-            """Return the active rows with a viewer on either side, and what they meet."""
-            if not scalar and dr.flag(dr.JitFlag.SymbolicScope):
-                allowed = "render inside `with twillight_mitsuba.evaluated():`"
-                raise BadInput(f"bsdf {NAME}", "", "a recorded loop", allowed)
-            normal, du = si.sh_frame.n, si.dp_du
-            handed = dr.dot(dr.cross(du, si.dp_dv), normal)
-            names = (si.uv, si.wi, si.to_local(si.n), si.duv_dx, si.duv_dy)
-            numbers = (handed, si.t, dr.norm(du))
-            if not scalar:
-                dr.eval(names, numbers, active)
-            columns = Columns(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
-            rows = columns.active(active)
-            uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
-            handed, distance, length = (columns.number(value)[rows] for value in numbers)
-            seen, traced = np.abs(viewer[:, 2]) > 0.0, np.isfinite(distance) & (length > 0.0)
-            hits = Hits(
-                uv,
-                viewer,
-                outward,
-                np.where(handed < 0.0, -1.0, 1.0),
-                np.stack([duv_dx, duv_dy], axis=-1),
-                np.where(traced, distance, 0.0) / np.where(traced, length, 1.0),
-            )
-            return columns, rows[seen], Hits(*(column[seen] for column in hits))
-
     return Twillight
 
 
 _NOTHING: Any = (np.empty((0, 3)), np.empty(0), np.empty(0, np.bool_), np.empty((0, 3)))
 
 
-def _component(hits: Hits, light: Float64) -> Index:
+def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[Columns, Index, Hits]:
+    """Return the active rows with a viewer on either side, and what they meet; `others` have the same length."""
+    scalar = mi.variant().startswith("scalar")
+    if not scalar and dr.flag(dr.JitFlag.SymbolicScope):
+        allowed = "render inside `with twillight_mitsuba.evaluated():`"
+        raise BadInput(f"bsdf {NAME}", "", "a recorded loop", allowed)
+    normal, du = si.sh_frame.n, si.dp_du
+    handed = dr.dot(dr.cross(du, si.dp_dv), normal)
+    names = (si.uv, si.wi, si.to_local(si.n), si.duv_dx, si.duv_dy)
+    numbers = (handed, si.t, dr.norm(du))
+    if not scalar:
+        dr.eval(names, numbers, active)
+    columns = Columns(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
+    rows = columns.active(active)
+    uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
+    handed, distance, length = (columns.number(value)[rows] for value in numbers)
+    seen, traced = np.abs(viewer[:, 2]) > 0.0, np.isfinite(distance) & (length > 0.0)
+    hits = Hits(
+        uv,
+        viewer,
+        outward,
+        np.where(handed < 0.0, -1.0, 1.0),
+        np.stack([duv_dx, duv_dy], axis=-1),
+        np.where(traced, distance, 0.0) / np.where(traced, length, 1.0),
+    )
+    return columns, rows[seen], Hits(*(column[seen] for column in hits))
+
+
+def _component(hits: Hits, light: Float64 | Float32) -> Index:
     """Return the component of each light, (N,)."""
     return np.where(hits.viewer[:, 2] * light[:, 2] < 0.0, TRANSMISSION, REFLECTION)

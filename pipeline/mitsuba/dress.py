@@ -19,7 +19,7 @@ def dress(loaded: Loaded, method: str = USUAL) -> Any:
     loaded : Loaded
         The scene; it is changed.
     method : str
-        Who answers.
+        The method that evaluates the cloth (`pipeline.models.named`).
     """
     mi = register()
     worn = {}

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32, Float64
+from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.options import SceneOptions
 
 PIXEL: Final = SceneOptions().pixel_sigma
@@ -32,7 +32,7 @@ class Footprints(NamedTuple):
     @classmethod
     def of(cls, jacobian: Float64) -> Footprints:
         """Return the footprints of N pixels, from d(uv in yarns)/d(pixel), (N, 2, 2)."""
-        lost = ~np.isfinite(jacobian).all(axis=(1, 2))
+        lost = np.asarray(~np.isfinite(jacobian).all(axis=(1, 2)))
         j = np.where(lost[:, None, None], np.eye(2) * (LARGEST / PIXEL), jacobian)
         j = np.clip(j, -1e12, 1e12)
         # Eigenvalues of J J^T in closed form; the smaller one from the determinant, free of cancellation.
@@ -42,16 +42,20 @@ class Footprints(NamedTuple):
         area = np.abs(j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0])
         minor = area / np.maximum(major, 1e-150)
         angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
-        sizes = (np.clip(PIXEL * size, _LEAST, LARGEST).astype(np.float32) for size in (major, minor))
-        return cls(*sizes, angle.astype(np.float32))
+        return cls(_cut(PIXEL * major), _cut(PIXEL * minor), angle.astype(np.float32))
 
     @classmethod
     def round(cls, sigma: Float64) -> Footprints:
         """Return N round footprints."""
-        size = np.clip(sigma, _LEAST, LARGEST).astype(np.float32)
+        size = _cut(sigma)
         return cls(size, size, np.zeros_like(size))
 
     @classmethod
-    def joined(cls, chosen: Float64, one: Footprints, other: Footprints) -> Footprints:
+    def joined(cls, chosen: Mask, one: Footprints, other: Footprints) -> Footprints:
         """Return `one` where chosen, (N,), and `other` elsewhere."""
         return cls(*(np.where(chosen, a, b) for a, b in zip(one, other, strict=True)))
+
+
+def _cut(deviation: Float64) -> Float32:
+    """Return deviations cut to the sizes that queries may have."""
+    return np.clip(deviation, _LEAST, LARGEST).astype(np.float32)

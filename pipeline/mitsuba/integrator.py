@@ -27,7 +27,7 @@ NAME: Final = "twillight_path"
 
 
 MOST_RAYS: Final = 2**20
-"""Rays under way at a time, at most; a ray takes about a kilobyte."""
+"""Most rays that are traced at a time; a ray takes about a kilobyte."""
 
 
 class PathOptions(BaseModel):
@@ -40,7 +40,7 @@ class PathOptions(BaseModel):
     rr_depth: int = Field(default=5, ge=1)
     """Length from which on paths end at random."""
     hide_emitters: bool = False
-    """Whether lights that the camera sees are hidden."""
+    """True hides lights that the camera sees."""
 
 
 def integrator_class(mi: Any, dr: Any) -> type[Any]:

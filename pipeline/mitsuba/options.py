@@ -9,19 +9,19 @@ from pipeline.scenes.scene import Cloth, Yarns
 
 
 class ClothOptions(BaseModel):
-    """Cloth of a shape, who answers for it, and how large a footprint is."""
+    """Cloth of a shape, the method that evaluates it, and the size of its footprints."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     fabric: str
     """A preset, or the path of a fabric's TOML."""
     method: str = USUAL
-    """Who answers: a model that comes with the package or learns nothing, with ``:k`` for a setting, the folder of a
-    trained one, or ``truth``."""
+    """The method that evaluates the cloth: a model that comes with the package or learns nothing, with ``:k`` for a
+    setting; the folder of a trained model; or ``truth``."""
     yarns: Yarns = 100.0
     """Yarn spacings in one unit of u and of v."""
     yarns_v: Yarns | None = None
-    """Yarn spacings in one unit of v, if they are others than those of u."""
+    """Yarn spacings in one unit of v, if they differ from those of u."""
     turn: float = Field(default=0.0, ge=-360, le=360)
     """Angle from u to the weft, in degrees, as the front shows it."""
     sigma: float | None = Field(default=None, gt=0, le=1e6)

@@ -129,6 +129,9 @@ class _Cone:
     def __init__(self, mi: Any, dr: Any) -> None:
         self._mi, self._dr = mi, dr
         self._width: Any = None
+        self._spread: Any = None
+        self._blur: Any = None
+        self._scatter: Any = None
 
     @property
     def state(self) -> tuple[Any, ...]:

@@ -32,7 +32,7 @@ def register() -> Any:
 
     if mi.variant() is None:
         mi.set_variant(best_variant())
-    if not _rgb(mi.variant()):
+    if not _rgb(str(mi.variant())):
         raise BadInput("mitsuba", "variant", mi.variant(), "must have RGB colours, such as llvm_ad_rgb or scalar_rgb")
     if not _registered:
         mi.detail.add_variant_callback(lambda old, new: _enter(mi))

@@ -120,7 +120,9 @@ class Worn:
         looks, lobes = self._looks(hits), self._lobes(hits)
         runs = [slice(start, start + RUN) for start in range(0, len(random), RUN)]
         tasks = [(looks.take(run), random[run], known) for run, known in zip(runs, lobes, strict=True)]
-        found = _on_all_cores(lambda task: self._bsdf.sample(*task, _seed(task[0].u, task[1])), tasks)
+        found = _on_all_cores(
+            lambda task: self._bsdf.sample(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks
+        )
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*found, strict=True))
         light = np.where(straight[:, None], -hits.viewer, self._from_cloth(wi.astype(np.float64)))
         weight[~straight & ~_lit(hits, light)] = 0.0
@@ -161,7 +163,7 @@ class Worn:
     def _footprints(self, hits: Hits, yarns: Float64) -> Footprints:
         if self.options.sigma is not None:
             return Footprints.round(np.full(len(hits.uv), self.options.sigma))
-        traced = hits.jacobian.any(axis=(1, 2))
+        traced = np.asarray(hits.jacobian.any(axis=(1, 2)))
         found = Footprints.of(self._turn @ (hits.jacobian * yarns[..., None]))
         if traced.all():
             return found
@@ -190,7 +192,8 @@ class Worn:
     ) -> list[Part]:
         """Return the answers of each run of queries."""
         runs = [queries.take(slice(start, start + RUN)) for start in range(0, len(queries.u), RUN)]
-        tasks = list(zip(runs, lobes or [None] * len(runs), strict=True))
+        known: Sequence[Lobes | None] = lobes or [None] * len(runs)
+        tasks = list(zip(runs, known, strict=True))
         return _on_all_cores(lambda task: answer(task[0], _seed(task[0].u, task[0].wi), task[1]), tasks)
 
     def _to_cloth(self, direction: Float64) -> Float64:
@@ -208,12 +211,12 @@ def _lit(hits: Hits, light: Float64) -> Mask:
     """Return which lights are on one side of both normals, and not in the plane, (N,)."""
     facing = np.einsum("ni,ni->n", hits.outward, light) * np.where(hits.outward[:, 2] < 0.0, -1.0, 1.0)
     known = hits.outward.any(axis=1)
-    return (np.abs(light[:, 2]) > _FLAT) & (~known | (light[:, 2] * facing > 0.0))
+    return np.asarray((np.abs(light[:, 2]) > _FLAT) & (~known | (light[:, 2] * facing > 0.0)))
 
 
 def _seed(place: Float32, drawn: Float32 | Float64) -> int:
     """Return a number that any change of places and of directions, or of what draws them, changes."""
-    return zlib.crc32(np.ascontiguousarray(drawn), zlib.crc32(np.ascontiguousarray(place)))
+    return zlib.crc32(drawn.tobytes(), zlib.crc32(place.tobytes()))
 
 
 def _on_all_cores(answer: Callable[[Any], Part], tasks: Sequence[Any]) -> list[Part]:

@@ -1,9 +1,9 @@
 """Error and time of path-traced frames in Mitsuba: soft nodes against one random point a sample.
 
-Frames of shipped scenes by the integrator `twillight_path`; everything but the method that answers is the same. Error
-is the mean squared error of linear RGB over the frame against frames in which the ground truth answers, over the
-squared mean of these. Two such frames r, s of other random numbers stand for the truth: (x - r)(x - s) has the squared
-error of x as its mean, whatever their own noise is. Time is the processor's, of all threads.
+Frames of shipped scenes by the integrator `twillight_path`; everything but the method is the same. Error is the
+mean squared error of linear RGB over the frame against frames that the ground truth renders, over the squared
+mean of these. There are two such frames r, s with different random numbers: (x - r)(x - s) has the squared error of x
+as its mean, whatever the noise of r and s is. Time is the processor's, of all threads.
 
 One point a sample at its limit is not the truth: a ratio of one point has no masking (pipeline.models.point_sampled).
 """
@@ -36,7 +36,7 @@ OTHER: Final = "point_sampled:1"
 """One random point a sample."""
 
 REFERENCE: Final = "truth"
-"""Who answers in the frames that stand for the truth."""
+"""The method that renders the reference frames."""
 
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
 """Samples a pixel of each method."""
@@ -52,7 +52,7 @@ class Traced:
     """One method in one scene with one number of samples."""
 
     method: str
-    """Who answered."""
+    """The method."""
     fabric: str
     """The scene."""
     samples: str
@@ -94,15 +94,15 @@ def measure(
     samples : mapping
         Numbers of samples a pixel, by method; the last method is `OTHER`.
     reference : (str, int)
-        The method that stands for the truth, and its samples.
+        The method of the reference frames, and its samples.
     frames : int
-        Frames of other random numbers; error and time are their means.
+        Frames with different random numbers; error and time are their means.
     """
     for name in scenes:
         truths = [_Scene(name, reference[0], size).frame(reference[1], 1000 + k)[0] for k in range(2)]
         scale = float(np.mean(truths)) ** 2
         found: list[Traced] = []
-        for method, counts in reversed(samples.items()):
+        for method, counts in reversed(list(samples.items())):
             scene = _Scene(name, method, size)
             scene.frame(1, 0)  # loads and tabulates
             for count in counts:
@@ -116,7 +116,7 @@ def measure(
 
 
 class _Scene:
-    """A shipped scene whose cloth one method answers for."""
+    """A shipped scene whose cloth one method evaluates."""
 
     def __init__(self, name: str, method: str, size: int) -> None:
         self._loaded: Loaded = load(load_scene(name), SceneOptions())

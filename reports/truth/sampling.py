@@ -204,7 +204,7 @@ def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Floats:
     found = np.empty(len(straight))
     found[~straight] = bsdf.eval(queries.take(~straight)) @ LUMINANCE
     if straight.any():
-        found[straight] = bsdf.method.transparency(bsdf.fabric, queries.take(straight))
+        found[straight] = bsdf.method.transparency(bsdf.fabric, queries.take(straight), 0)
     return np.asarray(found / drawn.pdf)
 
 
