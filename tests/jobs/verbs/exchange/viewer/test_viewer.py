@@ -41,9 +41,9 @@ def assert_equal(found, wanted):
     assert ((found[..., 0] >= 0.0) == cloth).mean() > 0.99
     span = np.ptp(wanted[cloth], axis=0)
     apart = (np.abs(found - wanted) / span).max(axis=-1)
-    assert (apart[cloth] < 2e-4).mean() > 0.98
+    assert (apart[cloth] < 5e-5).mean() > 0.98
     for at in NAMED:
-        assert wanted[at].sum() > 0.0 and apart[at] < 2e-4, at
+        assert wanted[at].sum() > 0.0 and apart[at] < 5e-5, at
 
 
 PICTURES = [("One yarn", 2), ("Cloth", 8), ("Horizon", 1), ("Sphere", 2), ("Drape", 4)]
