@@ -130,7 +130,8 @@ class Viewer {
       return;
     }
     let spent = 0;
-    for (let row = 0; row < whole[1]; row += this.rows) {
+    let row = 0;
+    while (row < whole[1]) {
       if (row > 0) await new Promise(requestAnimationFrame);
       if (job !== this.job) return;
       const rows = [row, Math.min(row + this.rows, whole[1])];
@@ -141,6 +142,7 @@ class Viewer {
       const own = performance.now() - began;
       spent += own;
       if (rows[1] < whole[1]) this.rows = Math.round(within(this.rows * FRAME / own, 4, whole[1]));
+      [, row] = rows;
     }
     this.tell(spent, whole);
     this.settle(job);
