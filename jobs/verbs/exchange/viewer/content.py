@@ -43,7 +43,7 @@ VIEWS: Final = {
     "Cloth": Camera("plane", 20.0, 45.0, 70.0, -50.0, 40.0, (2.0, 2.0)),
     "Horizon": Camera("plane", 10.0, 7.0, 150.0, -50.0, 40.0, (2.0, 2.0)),
     "Sphere": Camera("sphere", 15.0, 20.0, 215.0, -35.0, 45.0),
-    "Drape": Camera("drape", -20.0, 10.0, 560.0, -65.0, 35.0),
+    "Drape": Camera("drape", -20.0, 10.0, 560.0, -40.0, 40.0),
 }
 """Views of the page, each with a picture of the truth."""
 

@@ -20,7 +20,7 @@ SIZE = 24
 
 _OPTIONS = (
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--remote-debugging-pipe", "--window-size=400,300",
+    "--enable-unsafe-swiftshader", "--remote-debugging-pipe",
 )  # fmt: skip
 
 # Chromium reads from descriptor 3 and writes to 4; a shell may refuse descriptors of two digits.
@@ -62,6 +62,7 @@ class Page:
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=480, height=400, deviceScaleFactor=1, mobile=False)
         self.call("Page.addScriptToEvaluateOnNewDocument", source=before)
         self.call("Page.navigate", url=address)
         ready = "/drawn|still/.test(document.body?.className)"
@@ -112,30 +113,55 @@ def browser(profile):
             own.terminate()
 
 
+def find(truth, levels, bends, still):
+    """Return what the page has of FABRIC at its own width, with pictures of the truth of `truth` pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "DETAILS", levels)
+        patch.setattr(module, "BENDS", bends)
+        patch.setattr(module, "NARROWER", (1.0,))
+        patch.setattr(module, "STILL_SIZE", still)
+        return content(load_fabric(FABRIC), truth)
+
+
+def write(found, folder):
+    """Return the page's file."""
+    path = folder / "gingham.html"
+    path.write_text(whole_page(found), encoding="utf-8")
+    return path
+
+
+@contextmanager
+def opened(path, profile, before=""):
+    """Yield a page, opened from the disk after a script."""
+    if shutil.which("chromium") is None:
+        pytest.skip("chromium is not installed")
+    with browser(profile) as own:
+        own.open(path.as_uri(), before)
+        yield own
+
+
+@pytest.fixture(scope="session")
+def small():
+    """What a small page has: one table, no truth."""
+    return find(0, (2,), (1.0,), 32)
+
+
 @pytest.fixture(scope="session")
 def found():
-    """What the page has of a fabric: two bends, the own width, small pictures of the truth."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "BENDS", (1.0, 1.4))
-        patch.setattr(module, "NARROWER", (1.0,))
-        return content(load_fabric(FABRIC), SIZE)
+    """What the page has: all levels, two bends, pictures of the truth."""
+    return find(SIZE, module.DETAILS, (1.0, 1.4), module.STILL_SIZE)
 
 
 @pytest.fixture(scope="session")
 def written(found, tmp_path_factory):
     """The page's file."""
-    path = tmp_path_factory.mktemp("viewer") / "gingham.html"
-    path.write_text(whole_page(found), encoding="utf-8")
-    return path
+    return write(found, tmp_path_factory.mktemp("viewer"))
 
 
 @pytest.fixture(scope="session")
 def page(written, tmp_path_factory):
     """The page, opened from the disk."""
-    if shutil.which("chromium") is None:
-        pytest.skip("chromium is not installed")
-    with browser(tmp_path_factory.mktemp("profile")) as own:
-        own.open(written.as_uri())
+    with opened(written, tmp_path_factory.mktemp("profile")) as own:
         yield own
 
 

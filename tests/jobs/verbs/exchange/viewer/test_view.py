@@ -11,8 +11,11 @@ import pytest
 from jobs.cli import main
 from jobs.verbs.exchange.shader.languages import slangc
 from jobs.verbs.exchange.viewer import view
-from jobs.verbs.exchange.viewer.content import BENDS, NARROWER, WIDTHS, bends, bent, widths
+from jobs.verbs.exchange.viewer.content import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, widths
 from jobs.verbs.exchange.viewer.generate import SHADER, mark, shader, sources
+from jobs.verbs.exchange.viewer.view import whole_page
+from tests.jobs.verbs.exchange.viewer.conftest import opened, write
+from tests.jobs.verbs.exchange.viewer.test_viewer import assert_equal, components, expected
 from weaves.fabric import load_fabric, preset_names
 
 ROOT = Path(__file__).parents[5]
@@ -36,8 +39,8 @@ def test_an_installed_package_has_all_files_of_the_page():
     assert [path for path in files if not any(fnmatch.fnmatch(str(path), pattern) for pattern in patterns)] == []
 
 
-def test_the_page_is_one_file_without_addresses(written):
-    text = written.read_text(encoding="utf-8")
+def test_the_page_is_one_file_without_addresses(small):
+    text = whole_page(small)
     assert "{{" not in re.sub(r"<script.*?</script>", "", text, flags=re.S)
     assert not re.search(r"https?://", text) and "default-src 'none'" in text
     content = json.loads(re.search(r'id="content">(.*?)</script>', text, re.S)[1])
@@ -77,8 +80,16 @@ def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path
     assert "at most 3 cells" in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
-def test_a_page_is_written_whole(capsys, monkeypatch, tmp_path, found):
-    monkeypatch.setattr(view, "content", lambda fabric, truth: found)
+def test_a_page_is_written_whole(capsys, monkeypatch, tmp_path, small):
+    monkeypatch.setattr(view, "content", lambda fabric, truth: small)
     assert main(["view", "gingham", "--out", str(tmp_path / "a" / "x.html")]) == 0
     assert "5 views" in capsys.readouterr().out
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
+
+
+def test_a_page_draws_what_python_does(small, tmp_path):
+    """The one test of the browser that is not slow."""
+    with opened(write(small, tmp_path), tmp_path / "profile") as page:
+        page.run("viewer.go(3)")
+        assert_equal(components(page, 2), expected(load_fabric("gingham"), VIEWS["Sphere"], 2))
+        assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)

@@ -1,7 +1,5 @@
 """The viewer in headless Chromium: what it draws against Python, its controls, pointers, keys and read-outs."""
 
-import shutil
-
 import numpy as np
 import pytest
 
@@ -12,13 +10,13 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.jobs.verbs.exchange.viewer.conftest import FABRIC, SIZE, browser
+from tests.jobs.verbs.exchange.viewer.conftest import FABRIC, SIZE, opened
 from weaves.fabric import load_fabric
+
+pytestmark = pytest.mark.slow
 
 CLOTH = load_fabric(FABRIC)
 ENDS = CLOTH.weave.repeat[0]
-NAMED = ((SIZE // 2, SIZE // 2), (SIZE // 2 - 5, SIZE // 2 + 2), (SIZE // 2 - 2, SIZE // 2 - 4))
-"""Pixels, row and column, that show lit cloth in every view."""
 
 
 def components(page, method, state="viewer.state"):
@@ -41,18 +39,25 @@ def assert_equal(found, wanted):
     assert ((found[..., 0] >= 0.0) == cloth).mean() > 0.99
     span = np.ptp(wanted[cloth], axis=0)
     apart = (np.abs(found - wanted) / span).max(axis=-1)
-    assert (apart[cloth] < 5e-5).mean() > 0.98
-    for at in NAMED:
-        assert wanted[at].sum() > 0.0 and apart[at] < 5e-5, at
+    assert (wanted[cloth].sum(axis=1) > 0.0).mean() > 0.4 and (apart[cloth] < 5e-5).mean() > 0.98
 
 
-PICTURES = [("One yarn", 2), ("Cloth", 8), ("Horizon", 1), ("Sphere", 2), ("Drape", 4)]
+PICTURES = [
+    ("One yarn", 2, (12, 12)),
+    ("Cloth", 8, (7, 14)),
+    ("Horizon", 1, (10, 8)),
+    ("Sphere", 2, (12, 12)),
+    ("Drape", 4, (12, 12)),
+]
+"""Views, levels, and a lit pixel of each, row and column, that has to be equal."""
 
 
-@pytest.mark.parametrize(("name", "level"), PICTURES)
-def test_pictures_equal_python(fresh, name, level):
+@pytest.mark.parametrize(("name", "level", "pixel"), PICTURES)
+def test_pictures_equal_python(fresh, name, level, pixel):
     fresh.run(f"viewer.go({list(VIEWS).index(name)})")
-    assert_equal(components(fresh, level), expected(CLOTH, VIEWS[name], level))
+    found, wanted = components(fresh, level), expected(CLOTH, VIEWS[name], level)
+    assert_equal(found, wanted)
+    assert wanted[pixel].min() > 0.0 and np.abs(found - wanted)[pixel].max() < 5e-5 * wanted.max()
 
 
 @pytest.mark.parametrize("family", ["warp", "weft"])
@@ -151,7 +156,7 @@ def test_sliders_move_viewer_and_light(fresh, name, value, changes):
         ("Weft, twist", "-35", [1]),
         ("Warp, normal’s weight", "1", [2]),
         ("Weft, normal’s weight", "0", [3]),
-        ("Optical thickness", "1.5", [0, 1]),
+        ("Optical thickness", str(np.log(0.5)), [0, 1]),
         ("Bend", "1", [0, 1, 2, 3]),
     ],
 )
@@ -176,7 +181,7 @@ def test_colours_change_the_picture_and_no_component(fresh, name):
     after = pixels_of(fresh)[2]
     assert (components(fresh, 2) == values).all()
     redder = (after[..., 0] - after[..., 2]) - (before[..., 0] - before[..., 2])
-    assert redder.mean() > 3.0
+    assert redder[before[..., 3] > 0.0].mean() > 3.0
 
 
 def test_the_wipe_parts_the_methods(fresh):
@@ -284,10 +289,8 @@ def test_every_control_has_a_name_and_takes_the_focus(page):
 
 
 def test_without_webgl_a_still_picture_and_a_sentence(written, tmp_path):
-    if shutil.which("chromium") is None:
-        pytest.skip("chromium is not installed")
-    with browser(tmp_path / "profile") as own:
-        own.open(written.as_uri(), "HTMLCanvasElement.prototype.getContext = () => null")
+    without = "HTMLCanvasElement.prototype.getContext = () => null"
+    with opened(written, tmp_path / "profile", without) as own:
         assert own.run("byId('notice').textContent") == ("This is a still picture: This browser has no WebGL 2.")
         assert own.run("byId('still').getBoundingClientRect().width * byId('still').naturalWidth") > 0
         assert own.run("getComputedStyle(byId('panel')).display") == "none"
