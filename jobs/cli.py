@@ -222,7 +222,9 @@ def view(
     fabric: FabricName,
     *,
     out: Annotated[Local, Parameter(help="Page to write, ending in .html.")],
-    truth: Annotated[int, Parameter(help="Pixels along each side of pictures of the truth; 0: none.")] = 160,
+    truth: Annotated[
+        int, Parameter(help="Pixels along each side of the pictures by the truth and other methods; 0: none.")
+    ] = 160,
 ) -> None:
     """Write a page of one file that draws a fabric while light and viewer turn, and compares methods."""
     from jobs.terminal import Terminal

@@ -30,11 +30,14 @@ from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, Table, tabulate
+from pipeline.models.method import Method
+from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn
 
@@ -46,6 +49,9 @@ VIEWS: Final = {
     "Drape": Camera("drape", -20.0, 10.0, 560.0, -40.0, 40.0),
 }
 """Views of the page, each with a picture of the truth."""
+
+TILES: Final = ("selvage", "map_material")
+"""Methods that the page has as pictures at its views, beside the truth."""
 
 STILL: Final = "Drape"
 """View of the still picture, for a browser without WebGL 2."""
@@ -78,7 +84,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
     fabric : Fabric
         The cloth; its repeat is not too large for the shader.
     truth : int
-        Pixels along each side of the pictures of the truth; 0: there are none.
+        Pixels along each side of tiles, which are pictures of the truth and of TILES; 0: there are none.
     """
     ends = fabric.weave.repeat[0]
     factors = bends(fabric), widths(fabric)
@@ -95,6 +101,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
             kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
             found += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
     still, irradiance = _still(fabric)
+    methods = _methods(fabric) if truth else {}
     return {
         "fabric": fabric.name,
         "texture_width": TEXTURE_WIDTH,
@@ -108,7 +115,8 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "gap": GAP,
         "tables": found,
         "grids": grids,
-        "views": [_view(fabric, name, camera, truth) for name, camera in VIEWS.items()],
+        "tiles": [*methods, TRUTH] if truth else [],
+        "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
         "shapes": {
             "spread": SPREAD,
             "radius": sphere_radius(ends),
@@ -189,8 +197,21 @@ def _yarn(yarn: Yarn) -> dict[str, float]:
     return {"roughness": yarn.roughness, "twist": yarn.twist, "blend": yarn.blend}
 
 
-def _view(fabric: Fabric, name: str, camera: Camera, size: int) -> dict[str, Any]:
-    """Return a view with its truth: components as half floats, -1 where there is no cloth, row 0 the lowest."""
+def _methods(fabric: Fabric) -> dict[str, Method]:
+    """Return TILES without those that cannot answer for the fabric, such as maps too small for its repeat."""
+    found: dict[str, Method] = {}
+    for name in TILES:
+        method = named_method(name, "view", "")
+        try:
+            method.prepare(fabric)
+        except BadInput:
+            continue
+        found[name] = method
+    return found
+
+
+def _view(fabric: Fabric, name: str, camera: Camera, size: int, methods: dict[str, Method]) -> dict[str, Any]:
+    """Return a view with its tiles: components as half floats, -1 where there is no cloth, row 0 the lowest."""
     found: dict[str, Any] = {"name": name, **camera._asdict(), "size": size}
     if size:
         ends = fabric.weave.repeat[0]
@@ -198,7 +219,9 @@ def _view(fabric: Fabric, name: str, camera: Camera, size: int) -> dict[str, Any
         answers = estimate(fabric, picture.queries, _PRECISION, 0)
         shown = colours(fabric)
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
-        found["truth"] = packed(_components(picture, answers.mean).astype(np.float16))
+        tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
+        tiles[TRUTH] = answers.mean
+        found["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
         found["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
     return found
 

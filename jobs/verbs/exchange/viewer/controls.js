@@ -13,6 +13,7 @@ const LIMITS = { plane: { tilt: [2, 89], turn: [-180, 180] }, sphere: { tilt: [-
   drape: { tilt: [-35, 60], turn: [-75, 75] } };
 const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60, 60, 1, "°"],
   blend: ["Normal’s weight", 0, 1, 0.01, ""] };
+const TILES = { truth: "Truth", selvage: "Selvage", map_material: "Map material" };
 const FRAME = 1000 / 30;
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
@@ -41,7 +42,7 @@ class Viewer {
     return this.go(content.views.length - 1);
   }
 
-  // Take a view of the page, for which the truth is known.
+  // Take a view of the page, of which it has the truth and other tiles.
   go(index) {
     const view = this.content.views[index];
     return this.set({
@@ -67,8 +68,8 @@ class Viewer {
     return this.draw(dragging);
   }
 
-  // The truth knows the views of the page, with the yarns as they are in the fabric; colours may be others.
-  get truthful() {
+  // Tiles, as the truth's, show the views of the page with the yarns as they are in the fabric; colours may be others.
+  get tiled() {
     const { state, content } = this;
     const same = (family) => Object.keys(YARN).every((name) => state[family][name] === content[family][name]);
     return state.view !== null && content.views[state.view].size > 0 && content.bends[state.bend] === 1
@@ -78,7 +79,9 @@ class Viewer {
   // The method of a name as it can be drawn in this state, and its label.
   method(name) {
     const { state } = this;
-    if (name === "truth" && this.truthful) return { kind: TRUTH, view: state.view, level: this.usual, label: "Truth" };
+    if (name in TILES && this.tiled) {
+      return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
+    }
     if (name === "point") return { kind: POINT, level: this.usual, label: "One point" };
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name);
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
@@ -102,14 +105,14 @@ class Viewer {
   async frame(job) {
     if (job !== this.job) return;
     const { picture, canvas, methods } = this;
-    const truth = methods.some((method) => method.kind === TRUTH);
+    const tiled = methods.some((method) => method.kind === TILE);
     const { state } = this;
     const ready = await picture.prepare(state, methods);
     if (job !== this.job) return;
     this.fit();
     this.label(methods);
     const whole = [canvas.width, canvas.height];
-    if (truth) {
+    if (tiled) {
       const { size } = this.content.views[state.view];
       const side = Math.min(...whole);
       const corner = whole.map((length) => (length - side) >> 1);
@@ -181,9 +184,10 @@ class Viewer {
   label(methods) {
     const { state } = this;
     ["left", "right"].forEach((side, index) => { byId(`label-${side}`).textContent = methods[index].label; });
-    const lacking = [state.left, state.right].includes("truth") && !this.truthful;
-    byId("notice").textContent = lacking
-      ? `The truth is known at the five views, of the yarns as they are; here the finest soft nodes stand in.` : "";
+    const lacking = this.tiled ? [] : [state.left, state.right].filter((name) => name in TILES);
+    const names = [...new Set(lacking.map((name) => TILES[name]))].join(" and ");
+    byId("notice").textContent = names
+      ? `${names}: known at the five views alone, of the yarns as they are. Soft nodes are shown instead.` : "";
     byId("line").style.left = `${100 * state.wipe}%`;
     const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
     byId("footprint").textContent = `${size.toPrecision(2)} yarns, in the middle`;
@@ -216,8 +220,8 @@ class Viewer {
   }
 
   async measure() {
-    const { state, picture, truthful, job } = this;
-    const view = truthful ? this.content.views[state.view] : null;
+    const { state, picture, tiled, job } = this;
+    const view = tiled ? this.content.views[state.view] : null;
     const size = view ? view.size : ERROR_SIZE;
     const [left, right] = this.methods;
     const reference = view ? this.method("truth") : right;
@@ -338,13 +342,13 @@ function makeChoices(viewer, bind) {
     bind.updates.push((state) => { input.checked = state.shape === input.value; });
   }
   const names = [["point", "One point"], ...viewer.levels.map((level) => [String(level), `Soft nodes, k = ${level}`])];
-  if (viewer.content.views.some((view) => view.size)) names.push(["truth", "Truth"]);
+  names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
     names.forEach(([name, text]) => byId(side).add(new Option(text, name)));
     byId(side).addEventListener("change", () => {
       const value = byId(side).value;
       viewer.set({ [side]: value });
-      if (value !== "truth" || viewer.state.view !== null) return;
+      if (!(value in TILES) || viewer.state.view !== null) return;
       viewer.go(viewer.content.views.findIndex((view) => view.shape === viewer.state.shape));
     });
     bind.updates.push((state) => { byId(side).value = state[side]; });

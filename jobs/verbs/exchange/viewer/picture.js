@@ -5,7 +5,7 @@ void main() { gl_Position = vec4(4 * (gl_VertexID % 2) - 1, 4 * (gl_VertexID / 2
 const SHAPES = ["plane", "sphere", "drape"];
 const NODES = 0;
 const POINT = 1;
-const TRUTH = 2;
+const TILE = 2;
 
 function direction(turn, tilt) {
   const [a, b] = [radians(turn), radians(tilt)];
@@ -16,6 +16,7 @@ class Picture {
   constructor(canvas, source, content) {
     this.content = content;
     this.opened = new Map();
+    this.tiles = new Map();
     const options = { alpha: true, antialias: false, depth: false, preserveDrawingBuffer: true };
     const gl = canvas.getContext("webgl2", options);
     if (!gl) throw new Error("This browser has no WebGL 2.");
@@ -33,13 +34,13 @@ class Picture {
       throw new Error(`The shader does not compile here. ${gl.getProgramInfoLog(program) || ""}`);
     }
     gl.useProgram(program);
-    ["integers", "numbers", "nodes", "grid", "truth"].forEach((name, unit) => {
+    ["integers", "numbers", "nodes", "grid", "tile"].forEach((name, unit) => {
       gl.uniform1i(gl.getUniformLocation(program, `${name}_0`), unit);
     });
     gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
     gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "block_View_0"), 0);
     this.target = gl.createFramebuffer();
-    this.empty = this.texture("truth", new Uint16Array(4), 1);
+    this.empty = this.texture("tile", new Uint16Array(4), 1);
   }
 
   // A texture of `width` texels a row, the last row filled up.
@@ -50,7 +51,7 @@ class Picture {
       numbers: [gl.R32F, gl.RED, gl.FLOAT, 1],
       nodes: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4],
       grid: [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, 1],
-      truth: [gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT, 4],
+      tile: [gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT, 4],
     }[name];
     const height = Math.ceil(values.length / count / width);
     const whole = new values.constructor(width * height * count);
@@ -89,11 +90,14 @@ class Picture {
   async prepare(state, methods) {
     const ready = [];
     for (const method of methods) {
-      let truth = this.empty;
-      if (method.kind === TRUTH) {
-        const view = this.content.views[method.view];
-        view.texture ??= this.texture("truth", await unpacked(view.truth, Uint16Array), view.size);
-        truth = view.texture;
+      let tile = this.empty;
+      if (method.kind === TILE) {
+        const { size, tiles } = this.content.views[method.view];
+        const name = `${method.view} ${method.tile}`;
+        if (!this.tiles.has(name)) {
+          this.tiles.set(name, unpacked(tiles[method.tile], Uint16Array).then((f) => this.texture("tile", f, size)));
+        }
+        tile = await this.tiles.get(name);
       }
       const cloth = await this.open(this.indexOf(state, method.level));
       const yarns = [state.warp, state.weft];
@@ -105,7 +109,7 @@ class Picture {
         cloth.nodes = this.texture("nodes", turnedNodes(cloth.table, columns, yarns));
         cloth.edit = edit;
       }
-      ready.push({ ...method, cloth, truth });
+      ready.push({ ...method, cloth, texture: tile });
     }
     return ready;
   }
@@ -145,11 +149,11 @@ class Picture {
     const [width, height] = size;
     gl.viewport(0, 0, width, height);
     gl.enable(gl.SCISSOR_TEST);
-    ready.forEach(({ kind, cloth, truth }, side) => {
+    ready.forEach(({ kind, cloth, texture: tile }, side) => {
       const [low, high] = ready.length === 1 ? [0, width] : side === 0 ? [0, wipe] : [wipe, width];
       if (high <= low) return;
       gl.scissor(low, rows[0], high - low, rows[1] - rows[0]);
-      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, truth].forEach((texture, unit) => {
+      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, tile].forEach((texture, unit) => {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, texture);
       });

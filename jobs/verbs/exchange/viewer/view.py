@@ -16,7 +16,7 @@ from weaves.fabric import Fabric
 
 LEAST: Final = 8
 MOST: Final = 512
-"""Fewest and most of them."""
+"""Fewest and most pixels along each side of a tile."""
 
 SCRIPTS: Final = ("tables.js", "picture.js", "controls.js")
 
@@ -33,7 +33,7 @@ def write_page(fabric: Fabric, path: Path, truth: int) -> str:
     path : Path
         File to write, ending in ``.html``; its folder is made.
     truth : int
-        Pixels along each side of the pictures of the truth, from LEAST to MOST; 0: there are none.
+        Pixels along each side of tiles, pictures of the truth and other methods, from LEAST to MOST; 0: none.
 
     Raises
     ------

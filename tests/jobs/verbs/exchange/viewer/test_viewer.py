@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from jobs.verbs.exchange.viewer.content import VIEWS, bent
+from jobs.verbs.exchange.viewer.content import TILES, VIEWS, bent
 from jobs.verbs.exchange.viewer.shapes import seen
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.named import named_method
 from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -232,12 +233,21 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, found):
     assert 0.0 < of_truth < 3.0 and found["views"][3]["standard_error"] < 0.02
 
 
+@pytest.mark.parametrize("name", TILES)
+def test_tiles_are_the_answers_of_their_methods(fresh, name):
+    fresh.run("viewer.go(3)")
+    picture = seen(VIEWS["Sphere"], SIZE, ENDS)
+    wanted = named_method(name, "test", "").predict(CLOTH, picture.queries)
+    shown = components(fresh, name)[picture.lit]
+    assert np.abs(shown - wanted).max() < 1e-3 * wanted.max()  # half floats
+
+
 def test_where_the_truth_is_not_known_the_page_says_so(fresh):
     fresh.run("viewer.set({ right: 'truth', turn: 3 })")
     assert fresh.run("viewer.method('truth').label") == "Soft nodes, k = 8"
-    assert "stand in" in fresh.run("byId('notice').textContent")
+    assert "Truth: known at the five views alone" in fresh.run("byId('notice').textContent")
     fresh.run("viewer.go(4), viewer.set({ thickness: 3 })")
-    assert not fresh.run("viewer.truthful")
+    assert not fresh.run("viewer.tiled")
 
 
 def test_speed_is_told(fresh):
