@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures report run list plan generate check train bench status savings readme results test tests test-slow faults lint pins clean
+.PHONY: pictures viewer-shader report run list plan generate check train bench status savings readme results test tests test-slow faults lint pins clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -56,6 +56,10 @@ test-slow: $(READY)
 # Kills, full disks, wrong clocks, signals and damaged files; every run ends with the bytes of an undisturbed one.
 faults: $(READY)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
+
+# The shader of `twillight view`, after a change of its source in Slang; needs slangc.
+viewer-shader: $(READY)
+	$(BIN)/python -m jobs.verbs.exchange.viewer.generate
 
 # The pictures of the pages in docs, made by the commands on these pages; a test checks that they are current.
 pictures: $(READY)

@@ -218,6 +218,23 @@ def export(
 
 
 @app.command(sort_key=2)
+def view(
+    fabric: FabricName,
+    *,
+    out: Annotated[Local, Parameter(help="Page to write, ending in .html.")],
+    truth: Annotated[
+        int, Parameter(help="Pixels along each side of the pictures by the truth and other methods; 0: none.")
+    ] = 160,
+) -> None:
+    """Write a page of one file that draws a fabric while light and viewer turn, and compares methods."""
+    from jobs.terminal import Terminal
+    from jobs.verbs.exchange.viewer.view import write_page
+    from weaves.fabric import load_fabric
+
+    Terminal().print(write_page(load_fabric(fabric), out, truth), soft_wrap=True)
+
+
+@app.command(sort_key=2)
 def render(
     scene: Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")],
     *,

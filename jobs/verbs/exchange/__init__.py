@@ -1,1 +1,1 @@
-"""Verbs that exchange fabrics with other programs: `import` and `export`."""
+"""Verbs that exchange fabrics with other programs: `import`, `export`, and `view`, whose page browsers open."""
