@@ -19,7 +19,7 @@ SIZE = 24
 """Pixels along each side of the pictures of the truth."""
 
 _OPTIONS = (
-    "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--use-angle=swiftshader",
+    "--headless", "--no-sandbox", "--hide-scrollbars", "--disable-quic", "--no-first-run", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--remote-debugging-pipe",
 )  # fmt: skip
 

@@ -94,6 +94,7 @@ def test_colours_are_those_of_the_components(fresh):
     width, height, pixels = pixels_of(fresh)
     camera = VIEWS["Drape"]
     side = min(width, height)
+    assert (width - side) % 2 == (height - side) % 2 == 0  # pixels of both pictures lie on each other
     wanted = 255.0 * encoded(fresh, seen(camera, side, ENDS), side)
     box = pixels[(height - side) // 2 :, (width - side) // 2 :][:side, :side]
     apart = np.abs(box[..., :3] - wanted).max(axis=-1)
