@@ -7,7 +7,8 @@ const toSrgb = (c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.0
 const code = (c) => Math.round(255 * toSrgb(within(c, 0, 1))).toString(16).padStart(2, "0");
 const hex = (rgb) => `#${rgb.map(code).join("")}`;
 const linear = (text) => [1, 3, 5].map((at) => toLinear(parseInt(text.slice(at, at + 2), 16) / 255));
-const percent = (share) => `${(100 * share).toPrecision(2)} %`;
+const rounded = (value, digits = 2) => `${Number(value.toPrecision(digits))}`; // never in powers of ten
+const percent = (share) => `${rounded(100 * share)} %`;
 
 const LIMITS = { plane: { tilt: [2, 89], turn: [-180, 180] }, sphere: { tilt: [-75, 80], turn: [-180, 180] },
   drape: { tilt: [-35, 60], turn: [-75, 75] } };
@@ -169,7 +170,7 @@ class Viewer {
 
   tell(spent, [width, height]) {
     const rate = 1000 / spent;
-    byId("speed").textContent = `${rate.toPrecision(rate < 10 ? 2 : 3)} frames/s at ${width} × ${height}`;
+    byId("speed").textContent = `${rounded(rate, rate < 10 ? 2 : 3)} frames/s at ${width} × ${height}`;
   }
 
   // Keep the canvas as large as it is shown, within a limit.
@@ -190,7 +191,7 @@ class Viewer {
       ? `${names}: known at the five views alone, of the yarns as they are. Soft nodes are shown instead.` : "";
     byId("line").style.left = `${100 * state.wipe}%`;
     const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
-    byId("footprint").textContent = `${size.toPrecision(2)} yarns, in the middle`;
+    byId("footprint").textContent = `${rounded(size)} yarns, in the middle`;
   }
 
   // When nothing has changed for a while: errors.
