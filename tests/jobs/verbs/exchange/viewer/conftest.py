@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from contextlib import contextmanager
 
 import pytest
@@ -17,6 +18,9 @@ from weaves.fabric import load_fabric
 FABRIC = "gingham"
 SIZE = 24
 """Pixels along each side of the pictures of the truth."""
+
+HANGS = 300.0
+"""Seconds after which a browser that does not answer is ended."""
 
 _OPTIONS = (
     "--headless", "--no-sandbox", "--hide-scrollbars", "--disable-quic", "--no-first-run", "--use-angle=swiftshader",
@@ -36,8 +40,8 @@ os.execvp("chromium", ["chromium", *sys.argv[3:]])
 class Page:
     """A page in a browser; `errors` are what it wrote to the console, `requests` the addresses that it asked for."""
 
-    def __init__(self, write, read):
-        self._write, self._read, self._count, self._session = write, read, 0, None
+    def __init__(self, process, write, read):
+        self._process, self._write, self._read, self._count, self._session = process, write, read, 0, None
         self.errors, self.requests = [], []
 
     def call(self, method, **parameters):
@@ -48,12 +52,15 @@ class Page:
             message["sessionId"] = self._session
         self._write.write(json.dumps(message).encode() + b"\0")
         self._write.flush()
-        while True:
-            found = self._next()
-            if found.get("id") == self._count:
-                assert "error" not in found, found["error"]
-                return found["result"]
-            self._note(found)
+        guard = threading.Timer(HANGS, self._process.kill)
+        guard.start()
+        try:
+            while (found := self._next()).get("id") != self._count:
+                self._note(found)
+        finally:
+            guard.cancel()
+        assert "error" not in found, found["error"]
+        return found["result"]
 
     def open(self, address, before=""):
         """Load an address, after a script."""
@@ -108,7 +115,7 @@ def browser(profile):
         os.close(down[0])
         os.close(up[1])
         try:
-            yield Page(write, read)
+            yield Page(own, write, read)
         finally:
             own.terminate()
 
