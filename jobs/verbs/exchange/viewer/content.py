@@ -1,4 +1,4 @@
-"""Content of the viewer's page: tables of several shapes and levels, views with the truth, a still picture.
+"""Content of the viewer's page: tables of several shapes and levels, views with their tiles, a still picture.
 
 Buffers are compressed by gzip and written in base64. A table is of one shape of the yarns, a factor of their bend and
 one of their width: the own shape has every level that the shader takes, the others have the usual one.
