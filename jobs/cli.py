@@ -231,7 +231,10 @@ def view(
     from jobs.verbs.exchange.viewer.view import write_page
     from weaves.fabric import load_fabric
 
-    Terminal().print(write_page(load_fabric(fabric), out, truth), soft_wrap=True)
+    console = Terminal()
+    with console.status("tables and tiles"):
+        said = write_page(load_fabric(fabric), out, truth)
+    console.print(said, soft_wrap=True)
 
 
 @app.command(sort_key=2)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from reports.truth.finding import Finding
+    from reports.truth.row_records import RowRecords
 
 Measurement = TypeVar("Measurement")
 
@@ -128,41 +129,46 @@ def truth(out: Path) -> None:
 
 def sampler(out: Path) -> None:
     """Measure the variance that importance sampling saves, also in equal time; print and write the Records."""
-    from jobs.terminal import Terminal
-    from reports.record import this_machine, write_records
-    from reports.tables import truth_rows
-    from reports.truth import sampling
+    from reports.tables.truth_rows import SAMPLERS, sampler_rows
+    from reports.truth.sampling import RECORDS, Saving, measure
 
-    console = Terminal()
-    with console.status("the sampler") as status:
-        found = []
-        for one in sampling.measure():
-            found.append(one)
-            status.update(f"the sampler: {one.fabric}, {one.sampler}")
-    path = out / SAMPLER
-    records = sampling.RECORDS.to_records(found)
-    write_records(path, records, this_machine(1))
-    console.print(_columns(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(found)))
-    console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
+    def title(one: Saving) -> str:
+        return f"the sampler: {one.fabric}, {one.sampler}"
+
+    _one_table(out / SAMPLER, measure(), title, RECORDS, ("fabric", *SAMPLERS), sampler_rows)
 
 
 def mitsuba(out: Path) -> None:
     """Measure error and time of path-traced frames; print and write the Records."""
+    from reports.tables.truth_rows import TRACED, traced_rows
+    from reports.truth.path_traced import RECORDS, Traced, measure
+
+    def title(one: Traced) -> str:
+        return f"frames in Mitsuba: {one.fabric}, {one.method}, {one.samples} samples"
+
+    _one_table(out / MITSUBA, measure(), title, RECORDS, ("scene", *TRACED), traced_rows)
+
+
+def _one_table(
+    path: Path,
+    measured: Iterable[Measurement],
+    title: Callable[[Measurement], str],
+    kept: RowRecords[Measurement],
+    columns: Sequence[str],
+    rows: Callable[[Sequence[Measurement]], list[list[str]]],
+) -> None:
+    """Show what is measured, one `title` after the other; then write the Records and print the table."""
     from jobs.terminal import Terminal
     from reports.record import this_machine, write_records
-    from reports.tables import truth_rows
-    from reports.truth import path_traced
 
-    console = Terminal()
-    with console.status("frames in Mitsuba") as status:
-        found = []
-        for one in path_traced.measure():
+    console, found = Terminal(), []
+    with console.status("measuring") as status:
+        for one in measured:
             found.append(one)
-            status.update(f"frames in Mitsuba: {one.fabric}, {one.method}, {one.samples} samples")
-    path = out / MITSUBA
-    records = path_traced.RECORDS.to_records(found)
+            status.update(title(one))
+    records = kept.to_records(found)
     write_records(path, records, this_machine(1))
-    console.print(_columns(("scene", *truth_rows.TRACED), truth_rows.traced_rows(found)))
+    console.print(_columns(columns, rows(found)))
     console.print(f"\n{path}: {len(records)} records", soft_wrap=True)
 
 

@@ -73,7 +73,7 @@ class PatchBSDF:
     fabric : Fabric
         The cloth, with its colours.
     method : str, Fallback or TruthAnswers
-        Who answers: a name as on the command line (`pipeline.models.named`), a method with its fallback, or the truth.
+        Method that evaluates: a name as on the command line (`pipeline.models.named`), a fallback, or the truth.
     points : int
         Points of the footprint that have a lobe each, at least 1; 1 has its exact lobe.
     widening : float

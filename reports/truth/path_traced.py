@@ -64,7 +64,7 @@ class Traced:
     count: int
     """Frames."""
     gain: float = math.nan
-    """Error of one point a sample in equal time over this error; NaN for one point a sample itself."""
+    """Error of one point a sample in equal time over this error; NaN for one point a sample itself, and unknown."""
 
 
 RECORDS: Final = RowRecords(
@@ -110,7 +110,7 @@ def measure(
                 errors = [float(np.mean((frame - truths[0]) * (frame - truths[1]))) / scale for frame, _ in made]
                 error, seconds = float(np.mean(errors)), float(np.median([seconds for _, seconds in made]))
                 others = [one for one in found if one.method == OTHER]
-                gain = _error_in(seconds, others) / error if method != OTHER else math.nan
+                gain = _error_in(seconds, others) / error if method != OTHER and error > 0 else math.nan
                 found.append(Traced(method, name, str(count), error, seconds, frames, gain))
         yield from found
 
@@ -144,7 +144,10 @@ class _Scene:
 
 
 def _error_in(seconds: float, found: Sequence[Traced]) -> float:
-    """Return the error in a time: between two numbers of samples by a power law, beyond them that of the nearest."""
-    times, errors = (np.array([getattr(one, name) for one in found]) for name in ("seconds", "error"))
-    order = np.argsort(times)
-    return float(np.exp(np.interp(math.log(seconds), np.log(times[order]), np.log(errors[order]))))
+    """Return the error in a time, by a power law between two numbers of samples.
+
+    In less time than the fewest samples take, it is the error of these; in more than the most take, NaN: it is unknown.
+    """
+    known = sorted((one.seconds, one.error) for one in found if one.error > 0)
+    times, errors = np.log(np.array(known)).T
+    return float(np.exp(np.interp(math.log(seconds), times, errors, right=math.nan)))

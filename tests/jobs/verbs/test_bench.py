@@ -12,7 +12,17 @@ from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from jobs.verbs.bench import BENCHES, RECORDS, STABILITY, TRUTH, measured_alone
 from reports.record import read_records
-from reports.truth import accuracy, bias, calibration, effort, footprint_colours, stability, throughput
+from reports.truth import (
+    accuracy,
+    bias,
+    calibration,
+    effort,
+    footprint_colours,
+    path_traced,
+    sampling,
+    stability,
+    throughput,
+)
 from reports.truth.accuracy import Accuracy
 from reports.truth.bias import Bias
 from reports.truth.calibration import Calibration
@@ -20,6 +30,8 @@ from reports.truth.effort import Effort
 from reports.truth.finding import RECORDS as FINDINGS
 from reports.truth.finding import judge
 from reports.truth.footprint_colours import ColourLoss
+from reports.truth.path_traced import Traced
+from reports.truth.sampling import Saving
 
 
 @pytest.mark.parametrize("name", ["stability", "truth"])
@@ -62,6 +74,22 @@ def test_the_truth_is_measured_shown_and_recorded(tmp_path, capsys, monkeypatch)
     assert effort.RECORDS.from_records(records) == efforts
     assert footprint_colours.RECORDS.from_records(records) == losses
     assert [record.value for record in records if record.metric == "rate"] == [1.0e6]
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "row", "cell"),
+    [
+        ("sampler", sampling, Saving("lobes", "denim", 8.0, 5.0, 900.0, 2100.0, 100), "8× · 5× · 900 ns"),
+        ("mitsuba", path_traced, Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.2), "2.5e-03"),
+    ],
+)
+def test_one_table_is_shown_and_recorded(tmp_path, capsys, monkeypatch, name, module, row, cell):
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(module, "measure", lambda: iter([row]))
+    assert main(["bench", name, "--out", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert row.fabric in text and cell in text, text
+    assert module.RECORDS.from_records(read_records([tmp_path / "records" / f"{name}.json"])) == [row]
 
 
 def test_what_was_measured_alone_is_known_by_its_content(tmp_path):

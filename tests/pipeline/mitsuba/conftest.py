@@ -1,11 +1,20 @@
 """Variants of Mitsuba: the scalar one works everywhere, the other one needs LLVM."""
 
+import math
+
+import numpy as np
 import pytest
 
 from pipeline.mitsuba.register import register
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+
+
+def unit(degrees, azimuth):
+    """Return a direction, from its angle to the normal and its azimuth in degrees."""
+    theta, phi = math.radians(degrees), math.radians(azimuth)
+    return np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
 
 
 @pytest.fixture

@@ -1,14 +1,12 @@
 """The BSDF `twillight` as Mitsuba sees it: values, lobes, and its own chi-square test."""
 
-import math
-
 import numpy as np
 import pytest
 
 from pipeline.mitsuba.bsdf import STRAIGHT
 from pipeline.mitsuba.options import ClothOptions
 from pipeline.mitsuba.worn import Hits, Worn
-from pipeline.scenes.variant import llvm_works
+from tests.pipeline.mitsuba.conftest import NEEDS_LLVM, unit
 
 LEVEL = 0.01
 CONFIGURATIONS = {
@@ -27,12 +25,6 @@ CONFIGURATIONS = {
 }
 """Fabric, deviation of the footprint, and the viewer's angle to the normal and azimuth: more than 90 is behind."""
 UV = (0.0062, 0.0057)
-NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
-
-
-def unit(degrees, azimuth):
-    theta, phi = math.radians(degrees), math.radians(azimuth)
-    return [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
 
 
 def interaction(mi, viewer, count=1):
@@ -59,9 +51,9 @@ def test_values_and_densities_are_those_of_the_cloth(mi, name):
     fabric, sigma, theta, phi = CONFIGURATIONS[name]
     bsdf = mi.load_dict({"type": "twillight", "fabric": fabric, "sigma": sigma})
     worn = Worn(ClothOptions(fabric=fabric, sigma=sigma))
-    si, context = interaction(mi, unit(theta, phi)), mi.BSDFContext()
-    for light in (unit(40.0, 200.0), unit(120.0, 30.0)):
-        one = hits(unit(theta, phi))
+    si, context = interaction(mi, unit(theta, phi).tolist()), mi.BSDFContext()
+    for light in (unit(40.0, 200.0).tolist(), unit(120.0, 30.0).tolist()):
+        one = hits(unit(theta, phi).tolist())
         value, pdf = bsdf.eval_pdf(context, si, light)
         np.testing.assert_allclose(number(value), worn.eval(one, np.array([light]))[0], rtol=1e-5)
         np.testing.assert_allclose(number(pdf), worn.pdf(one, np.array([light])), rtol=1e-5)
@@ -72,7 +64,7 @@ def test_values_and_densities_are_those_of_the_cloth(mi, name):
 def test_samples_name_their_lobe(mi):
     """Voile at numbers that reach each lobe; the gap's light goes straight on, and has its probability as density."""
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
-    viewer = unit(25.0, 70.0)
+    viewer = unit(25.0, 70.0).tolist()
     si, context = interaction(mi, viewer), mi.BSDFContext()
     worn, one = Worn(ClothOptions(fabric="voile", sigma=0.5)), hits(viewer)
     flags, kinds = mi.BSDFFlags, set()
@@ -94,7 +86,11 @@ def test_samples_name_their_lobe(mi):
 
 def test_a_context_chooses_lobes(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
-    si, front, behind = interaction(mi, unit(25.0, 70.0)), unit(40.0, 200.0), unit(140.0, 30.0)
+    si, front, behind = (
+        interaction(mi, unit(25.0, 70.0).tolist()),
+        unit(40.0, 200.0).tolist(),
+        unit(140.0, 30.0).tolist(),
+    )
     context = mi.BSDFContext()
     context.component = 0
     assert number(bsdf.eval(context, si, front)).any() and not number(bsdf.eval(context, si, behind)).any()
@@ -105,7 +101,7 @@ def test_a_context_chooses_lobes(mi):
 
 def test_light_straight_through_is_known_without_sampling(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "gauze", "sigma": 0.5})
-    viewer = unit(25.0, 70.0)
+    viewer = unit(25.0, 70.0).tolist()
     share = number(bsdf.eval_null_transmission(interaction(mi, viewer)))
     wanted = Worn(ClothOptions(fabric="gauze", sigma=0.5)).transparency(hits(viewer))
     np.testing.assert_allclose(share, wanted[0], rtol=1e-5)
@@ -140,11 +136,11 @@ def chi_square(mi, name, cells, nodes, samples):
     context = mi.BSDFContext()
     context.type_mask = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Null)
     properties = {"type": "twillight", "fabric": fabric, "sigma": sigma}
-    _, density = mi.chi2.BSDFAdapter("twillight", properties, wi=unit(theta, phi), uv=list(UV), ctx=context)
+    _, density = mi.chi2.BSDFAdapter("twillight", properties, wi=unit(theta, phi).tolist(), uv=list(UV), ctx=context)
     bsdf = mi.load_dict(properties)
 
     def draw(random):
-        si = interaction(mi, unit(theta, phi), dr.width(random))
+        si = interaction(mi, unit(theta, phi).tolist(), dr.width(random))
         sample, _ = bsdf.sample(context, si, random[0], [random[1], random[2]])
         return sample.wo, dr.select(sample.sampled_component == STRAIGHT, mi.Float(0.0), mi.Float(1.0))
 

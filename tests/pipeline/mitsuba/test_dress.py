@@ -15,8 +15,8 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import picture
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.scenes.variant import llvm_works
+from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
 
-NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 METHOD = "soft_nodes:2"
 
 

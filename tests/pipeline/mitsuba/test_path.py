@@ -13,10 +13,8 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.shipped import SHIPPED
-from pipeline.scenes.variant import llvm_works
+from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
 from weaves.errors import BadInput
-
-NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 
 
 def floor(mi, side=1.0, height=0.0):

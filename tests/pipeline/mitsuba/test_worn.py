@@ -11,6 +11,7 @@ from pipeline.mitsuba.options import ClothOptions
 from pipeline.mitsuba.worn import Hits, Worn
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth.query import Queries
+from tests.pipeline.mitsuba.conftest import unit
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -23,11 +24,6 @@ CONFIGURATIONS = {
     "open, behind": ("voile", 1.0, 105.0, 200.0),
 }
 """Fabric, deviation of the footprint, and the viewer's angle to the normal and azimuth: more than 90 is behind."""
-
-
-def unit(degrees, azimuth):
-    theta, phi = math.radians(degrees), math.radians(azimuth)
-    return np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
 
 
 def hits_of(viewer, count, uv=(0.0062, 0.0057), **other):

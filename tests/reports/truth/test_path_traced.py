@@ -38,6 +38,7 @@ def test_rows_are_kept_by_their_records(found):
 
 
 def test_errors_between_two_times_follow_a_power_law():
-    """1 and 4 seconds with errors 8 and 2: 4 at 2 seconds; beyond both, that of the nearest."""
-    rows = [Traced(OTHER, "x", str(n), error, n, 1) for n, error in ((4.0, 2.0), (1.0, 8.0))]
-    assert [path_traced._error_in(t, rows) for t in (0.5, 2.0, 9.0)] == pytest.approx([8.0, 4.0, 2.0])
+    """1 and 4 seconds with errors 8 and 2: 4 at 2 seconds; 8 before, unknown after; noise below 0 is left out."""
+    rows = [Traced(OTHER, "x", str(n), error, n, 1) for n, error in ((4.0, 2.0), (1.0, 8.0), (9.0, -0.1))]
+    assert [path_traced._error_in(t, rows) for t in (0.5, 2.0)] == pytest.approx([8.0, 4.0])
+    assert math.isnan(path_traced._error_in(5.0, rows))

@@ -43,7 +43,7 @@ class Viewer {
     return this.go(content.views.length - 1);
   }
 
-  // Take a view of the page, of which it has the truth and other tiles.
+  // Take a view of the page, one that has tiles.
   go(index) {
     const view = this.content.views[index];
     return this.set({
