@@ -51,23 +51,42 @@ def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) ->
             answer = verb()
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
-    except CycloptsError as error:
+    except (Exception, KeyboardInterrupt) as error:
+        return _handle(error, tokens, out)
+
+
+def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
+    """Print the sentence of an exception, and return the exit code."""
+    error = _wrapped(raised)
+    if isinstance(error, CycloptsError):
         return _end(f"twillight: {error}", 2)
-    except (BadInput, WorkFailed) as error:
+    if isinstance(error, BadInput | WorkFailed):
         return _end(str(error), error.exit_code)
-    except KeyboardInterrupt as stop:
-        return _end(str(stop) or f"stopped; {_CONTINUES}", stop.code if isinstance(stop, _Stopped) else 130)
-    except BrokenPipeError:
+    if isinstance(error, KeyboardInterrupt):
+        return _end(str(error) or f"stopped; {_CONTINUES}", error.code if isinstance(error, _Stopped) else 130)
+    if isinstance(error, BrokenPipeError):
         # The reader of the output has closed it, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except Exception as error:
-        if explained := _storage_error(error):
-            return _end(str(explained), explained.exit_code)
-        if isinstance(error, OSError) and error.errno in _NO_FILE:
-            return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
-        saved = _save_crash(tokens, traceback.format_exc(), out)
-        return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+    if isinstance(error, Exception) and (explained := _storage_error(error)):
+        return _end(str(explained), explained.exit_code)
+    if isinstance(error, OSError) and error.errno in _NO_FILE:
+        return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
+    saved = _save_crash(tokens, "".join(traceback.format_exception(raised)), out)
+    return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+
+
+def _wrapped(raised: BaseException) -> BaseException:
+    """Return the sentence or the stop that a library reported as its own error; else the exception itself.
+
+    Dr.Jit raises a RuntimeError from whatever ends a BSDF in Python.
+    """
+    cause: BaseException | None = raised
+    while cause is not None:
+        if isinstance(cause, BadInput | WorkFailed | KeyboardInterrupt):
+            return cause
+        cause = cause.__cause__
+    return raised
 
 
 class _Stopped(KeyboardInterrupt):

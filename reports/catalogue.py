@@ -344,12 +344,14 @@ METRICS: Final[dict[str, MetricRow]] = {
             "Mean squared error of linear RGB over a frame in Mitsuba, over the squared mean of the frame; the setting "
             "is the samples a pixel.",
             format="scientific",
+            table="traced",
         ),
         MetricRow(
             "traced_time",
             "time of a path-traced frame",
             "Seconds of one processor for that frame.",
             unit="s/frame",
+            table="traced",
             of_machine=True,
         ),
         MetricRow(
@@ -357,6 +359,7 @@ METRICS: Final[dict[str, MetricRow]] = {
             "× lower than one point in equal time",
             "Error of frames with one random point a sample in equal time over this error.",
             better="higher",
+            table="traced",
             of_machine=True,
         ),
     )

@@ -130,7 +130,7 @@ def affordable(
 ) -> Contender:
     """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
 
-    Queries a fabric are doubled from `fewest` on while the last call says that twice as many will do: their number is a
+    Queries a fabric are doubled from `fewest` on while a call with twice as many is made in time: their number is a
     power of 2 times that, or all there are, and so the same in two runs unless a method is near the limit. At most
     `fewest` queries a fabric take longer.
     """
@@ -139,8 +139,9 @@ def affordable(
     rows = fewest
     _answer(contender.first(rows))  # warms up
     while rows < most:
-        # The faster of two: a call that another program interrupted must not end it.
-        if 2e-9 * min(_took(contender.first(rows), clock) for _ in range(2)) > longest:
+        more = contender.first(2 * rows)
+        # The fastest of three: the first call of a size takes new memory, and another program may interrupt one.
+        if 1e-9 * min(_took(more, clock) for _ in range(3)) > longest:
             break
         rows *= 2
     return contender.first(rows)

@@ -32,7 +32,7 @@ from reports.tables.sentences import (
     least_flicker_sentences,
     scene_sentences,
 )
-from reports.truth import accuracy, bias, calibration, effort, footprint_colours, sampling
+from reports.truth import accuracy, bias, calibration, effort, footprint_colours, path_traced, sampling
 from reports.truth.finding import RECORDS as FINDINGS
 
 SECTIONS: Final = {
@@ -50,6 +50,7 @@ SECTIONS: Final = {
     "rates": "Speed of the truth",
     "accuracy": "Cost of accuracy",
     "sampler": "Importance sampling",
+    "traced": "Path-traced frames",
     "fabrics": "Fabrics",
     "made": "Recipe, data and machine",
     "columns": "Definitions",
@@ -165,7 +166,7 @@ def _pictures(page: PageInput, tables: Mapping[str, pd.DataFrame]) -> dict[str, 
 
 
 def _truth(page: PageInput) -> dict[str, Any]:
-    """Return rows about the truth itself: rounding, speed, accuracy, calibration, bias, effort; directions' sampler."""
+    """Return rows about the truth itself: rounding, speed, accuracy, calibration, bias, effort; sampling, paths."""
     measured = truth_measurements(page.records)
     accuracies = truth_rows.accuracy_rows(measured["truth_accuracy"])
     return {
@@ -182,6 +183,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
         "efforts": truth_rows.effort_rows(measured["truth_effort"]),
         "colour_losses": truth_rows.colour_rows(measured["truth_colours"]),
         "samplers": truth_rows.sampler_rows(measured["sampler"]),
+        "traced": truth_rows.traced_rows(measured["traced"]),
         "limit": percent(bias.LIMIT),
         "target": percent(effort.RELATIVE_ERROR),
         "columns": {
@@ -191,6 +193,7 @@ def _truth(page: PageInput) -> dict[str, Any]:
             "effort": truth_rows.EFFORT,
             "colours": truth_rows.COLOURS,
             "sampler": truth_rows.SAMPLERS,
+            "traced": truth_rows.TRACED,
         },
         "titles": {name: plain(name) for name in accuracies},
     }
@@ -224,7 +227,7 @@ def untrained(page: PageInput) -> set[str]:
 
 
 def truth_measurements(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
-    """Return the measurements of the truth itself and of the sampler, by the names of their tables."""
+    """Return the measurements of the truth itself, of the sampler and of path tracing, by the names of their tables."""
     return {
         "truth_accuracy": accuracy.RECORDS.from_records(records),
         "truth_calibration": calibration.RECORDS.from_records(records),
@@ -232,6 +235,7 @@ def truth_measurements(records: Sequence[Record]) -> dict[str, Sequence[Any]]:
         "truth_effort": effort.RECORDS.from_records(records),
         "truth_colours": footprint_colours.RECORDS.from_records(records),
         "sampler": sampling.RECORDS.from_records(records),
+        "traced": path_traced.RECORDS.from_records(records),
     }
 
 

@@ -30,7 +30,7 @@ from reports.tables.number_format import (
 )
 from reports.tables.readme import three_decimals
 from reports.tables.sentences import equal_time_sentences
-from reports.truth import accuracy, bias, calibration, effort, footprint_colours, sampling
+from reports.truth import accuracy, bias, calibration, effort, footprint_colours, path_traced, sampling
 from weaves.errors import BadInput
 
 
@@ -155,10 +155,10 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
-    """Yield what `bench truth` and `bench sampler` measured, if they were run."""
+    """Yield what `bench truth`, `bench sampler` and `bench mitsuba` measured, if they were run."""
     rates, accuracies = truth_rows.rate_rows(records), accuracy.RECORDS.from_records(records)
     biases, efforts = bias.RECORDS.from_records(records), effort.RECORDS.from_records(records)
-    samplers = sampling.RECORDS.from_records(records)
+    samplers, traced = sampling.RECORDS.from_records(records), path_traced.RECORDS.from_records(records)
     calibrations = calibration.RECORDS.from_records(records)
     losses = footprint_colours.RECORDS.from_records(records)
     if rates or accuracies or biases or efforts:
@@ -188,6 +188,13 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
             "time of one direction with its density."
         )
         yield markdown_table(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(samplers))
+    if traced:
+        yield "## Path-traced frames (`twillight bench mitsuba`)"
+        yield (
+            "Mean squared error of linear RGB over the squared mean of the frame, seconds of one processor, and the "
+            "error of one random point a sample in equal time over this error."
+        )
+        yield markdown_table(("scene", *truth_rows.TRACED), truth_rows.traced_rows(traced))
 
 
 def _methods(errors: pd.DataFrame) -> list[tuple[str, str]]:

@@ -13,7 +13,7 @@ from pipeline.truth.checks import invariants
 from pipeline.truth.checks.check_result import exact, worst
 from pipeline.truth.query import Answers
 from reports.images.exr import read_exr
-from weaves.errors import WorkFailed
+from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
@@ -127,12 +127,19 @@ def test_work_left_out_is_failed_work(twillight):
     assert "run `twillight generate` first" in complaint(twillight("train", "smoke"), code=1)
 
 
+def _caused(error, by):
+    error.__cause__ = by
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
         (KeyboardInterrupt(), 130, "the same command continues"),
         (WorkFailed("the loss diverged"), 1, "the loss diverged"),
         (ZeroDivisionError("by zero"), 1, "this is a bug in twillight"),
+        (_caused(RuntimeError("in a library"), by=KeyboardInterrupt()), 130, "the same command continues"),
+        (_caused(RuntimeError("in a library"), by=BadInput("scene", "uv", "", "uv are needed")), 2, "uv are"),
     ],
 )
 def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code, words):
