@@ -59,7 +59,7 @@ faults: $(READY)
 
 # The shader of `twillight view`, after a change of its source in Slang; needs slangc.
 viewer-shader: $(READY)
-	$(BIN)/python -m jobs.verbs.exchange.viewer.generate
+	$(BIN)/python -m reports.viewer.generate
 
 # The pictures of the pages in docs, made by the commands on these pages; a test checks that they are current.
 pictures: $(READY)

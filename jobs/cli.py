@@ -207,7 +207,7 @@ def export(
 
         said = write_draft(cloth, wif)
     elif shader is not None:
-        from jobs.verbs.exchange.shader.export_shader import export_shader
+        from pipeline.shader.export_shader import export_shader
 
         said = export_shader(cloth, shader, level, language, kind, model)
     else:
@@ -228,7 +228,7 @@ def view(
 ) -> None:
     """Write a page of one file that draws a fabric while light and viewer turn, and compares methods."""
     from jobs.terminal import Terminal
-    from jobs.verbs.exchange.viewer.view import write_page
+    from reports.viewer.view import write_page
     from weaves.fabric import load_fabric
 
     console = Terminal()

@@ -17,7 +17,7 @@ TRAINING: Final = 4
 MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "gauss_nodes": 2,
-    "point_sampled": 2,
+    "point_sampled": 3,
     "prefiltered": 2,
     "selvage": 5,
     "soft_nodes": 6,

@@ -230,6 +230,15 @@ class RunOptions(_Options):
     """Measure every network that estimates its errors (`selvage`) at these wished relative errors too."""
 
 
+class LiveOptions(_Options):
+    """Live pages of fabrics, as `twillight view` writes them."""
+
+    fabrics: tuple[str, ...] = ()
+    """Measured fabrics that the page of the recipe shows live."""
+    pixels: int = Field(default=96, ge=8, le=512)
+    """Along each side of their pictures of the truth and of other methods."""
+
+
 class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     """One benchmark: errors on held-out queries, pictures, aliasing, timing; on curved cloth the silhouette."""
 
@@ -239,6 +248,8 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     """Numbers of points k at which `point_sampled` is shown in pictures; tables and plots hold all of them."""
     scenes: SceneBenchOptions = SceneBenchOptions()
     """Scenes with cameras, lights and cloths of their own."""
+    live: LiveOptions = LiveOptions()
+    """Fabrics that the page shows live."""
     edge: EdgeOptions = EdgeOptions()
     """The silhouette, measured where the data set's queries are of curved cloth."""
 

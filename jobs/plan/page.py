@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from jobs.plan.dataset import fingerprint_of
+from jobs.plan.measurements.images.live_page import LivePage
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.measurements.subjects import Subjects
@@ -52,6 +53,8 @@ class Page(Task):
     """File of the Records of times; the machine beside it is the page's."""
     pictures: Annotated[tuple[Picture, ...], PLACE]
     """Pictures of the measurements."""
+    live: Annotated[dict[str, str], PLACE]
+    """Live page of each fabric that has one, by the fabric's name."""
 
     @property
     def group(self) -> str:
@@ -128,6 +131,7 @@ class Page(Task):
             ],
             machine=read_machine(out / self.timing),
             pictures=[PictureFile(p.fabric, p.scene, p.method, p.setting, out / p.path) for p in self.pictures],
+            live={fabric: out / path for fabric, path in self.live.items()},
         )
         write_page(out / self.folder, content, progress)
 
@@ -152,6 +156,7 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
         records=tuple(task.records for task in benches if task.records),
         timing=next(task.records for task in benches if isinstance(task, Timing)),
         pictures=tuple(picture for task in benches for picture in task.pictures),
+        live={task.fabric.name: task.products[0] for task in benches if isinstance(task, LivePage)},
     )
 
 

@@ -7,10 +7,11 @@ from typing import Final
 
 from jobs.recipe.recipe import Recipe
 from pipeline.models.domain import PHYSICS
+from pipeline.shader.limits import MOST_CELLS
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
-from weaves.errors import BadInput
+from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
 
 _TAKEN = ("truth", "bench", "fallback")
@@ -31,8 +32,8 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     BadInput
         For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random unseen
         fabrics, unless a seen fabric has it), different physics in
-        two tables of truth options, models that do not know the queries or the physics of the data set, and the
-        estimator `node_table` for cloth or queries that it does not know.
+        two tables of truth options, models that do not know the queries or the physics of the data set, the
+        estimator `node_table` for cloth or queries that it does not know, and live pages of fabrics that it has not.
     """
     _check_number(recipe, where)
     _check_names(recipe, where)
@@ -40,6 +41,7 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     _check_models(recipe, where)
     _check_physics(recipe, where)
     _check_estimators(recipe, where)
+    _check_live(recipe, where)
 
 
 def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[Fabric]) -> str:
@@ -101,6 +103,18 @@ def _check_population(recipe: Recipe, where: str) -> None:
             exclude = list(recipe.dataset.unseen_population.exclude)
             allowed = f"must name the draft of {fabric.name}, which {member.name} is trained on ({fabric.source})"
             raise BadInput(where, "dataset.unseen_population.exclude", exclude, allowed)
+
+
+def _check_live(recipe: Recipe, where: str) -> None:
+    measured = {fabric.name: fabric for fabric in (*recipe.seen, *recipe.unseen)}
+    for name in recipe.bench.live.fabrics:
+        if name not in measured:
+            allowed = f"must be a seen or unseen fabric of the recipe; {nearest(name, measured)}"
+            raise BadInput(where, "bench.live.fabrics", name, allowed)
+        ends, picks = measured[name].weave.repeat
+        if ends * picks > MOST_CELLS:
+            allowed = f"its repeat has {ends * picks:,} cells, a live page takes at most {MOST_CELLS:,}"
+            raise BadInput(where, "bench.live.fabrics", name, allowed)
 
 
 def _check_physics(recipe: Recipe, where: str) -> None:

@@ -35,7 +35,11 @@ class PointSampler:
         The points are independent, or with `r2` the first of that sequence, shifted at random once a query
         [Roberts2018R2].
         """
-        return _sample(self.model, columns_of(queries), count, np.uint64(seed), r2)
+        return _sample(self.model, columns_of(queries), count, np.uint64(seed), r2, 0, 4)
+
+    def transparency(self, looks: Queries, count: int, seed: int, r2: bool = False) -> Float32:
+        """Return the share of light from straight behind that passes at the same points, (N,)."""
+        return _sample(self.model, columns_of(looks), count, np.uint64(seed), r2, 4, 5)[:, 0]
 
     def bytes_stored(self) -> int:
         """Return the bytes of the tables that the point model reads."""
@@ -43,9 +47,12 @@ class PointSampler:
 
 
 @allocating_kernel
-def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool) -> Float32:
+def _sample(
+    model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool, first_sum: int, end: int
+) -> Float32:
+    """Return the ratios of the sums from `first_sum` to `end` of N queries."""
     rows = len(columns.u)
-    mean = np.zeros((rows, 4), np.float32)
+    mean = np.zeros((rows, end - first_sum), np.float32)
     sums = np.zeros((1, SUMS))
     for row in range(rows):
         key = derive(seed, row)
@@ -56,6 +63,6 @@ def _sample(model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2:
             x, y, weight = place_point(columns, row, model, first, second)
             add_point(model, x, y, weight, query, sums, 0)
         if sums[0, AREA] > 0.0:
-            for c in range(4):
-                mean[row, c] = sums[0, c] / sums[0, AREA]
+            for c in range(first_sum, end):
+                mean[row, c - first_sum] = sums[0, c] / sums[0, AREA]
     return mean

@@ -128,9 +128,9 @@ class Fallback:
             return fallback_rows(fabric, looks, seed)[:, 4]
         result, behind = np.empty(len(looks.u), np.float32), looks.wo[:, 2] < 0.0
         if behind.any():
-            result[behind] = own(fabric.back(), self._nearest(looks.take(behind)).turned())
+            result[behind] = own(fabric.back(), self._nearest(looks.take(behind)).turned(), seed)
         if not behind.all():
-            result[~behind] = own(fabric, self._nearest(looks.take(~behind)))
+            result[~behind] = own(fabric, self._nearest(looks.take(~behind)), seed)
         return result
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from reports.options import BenchOptions, Role
 from reports.page.model_note import ModelNote
@@ -29,3 +30,5 @@ class PageInput:
     machine: Machine
     """Where the times were taken."""
     pictures: Sequence[PictureFile]
+    live: Mapping[str, Path] = field(default_factory=dict)
+    """Live page of each fabric that has one, by the fabric's name."""

@@ -67,6 +67,9 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         atomic_write(folder / "figures" / name, content)
         written.append(f"figures/{name}")
         progress(0.4 + 0.6 * min(1.0, (done + 1) / (3 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
+    for fabric, path in page.live.items():
+        atomic_write(folder / "live" / f"{fabric}.html", path.read_bytes())
+        written.append(f"live/{fabric}.html")
     write_records(folder / OF_A_PAGE, page.records, page.machine)
     write_files(folder, written)
     index = folder / "index.html"

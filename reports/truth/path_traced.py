@@ -41,7 +41,7 @@ REFERENCE: Final = "truth"
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
 """Samples a pixel of each method."""
 
-_SIZE, _REFERENCE_SAMPLES, _FRAMES = 64, 64, 4
+_SIZE, _REFERENCE_SAMPLES, _FRAMES = 64, 16, 4
 _DEPTH = 4
 
 Floats = npt.NDArray[np.float64]

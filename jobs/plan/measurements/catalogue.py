@@ -8,6 +8,10 @@ from jobs.plan.measurements.added_metric import OfAddedMetric
 from jobs.plan.measurements.errors_by_size import ErrorsBySize
 from jobs.plan.measurements.extremes import Extremes
 from jobs.plan.measurements.frame_time import FrameTime
+from jobs.plan.measurements.images.live_page import LivePage
+from jobs.plan.measurements.images.truth_edge import TruthEdge
+from jobs.plan.measurements.images.truth_frames import TruthFrames
+from jobs.plan.measurements.images.truth_picture import TruthPicture
 from jobs.plan.measurements.latents import Latents
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.method import OnFabric
@@ -16,9 +20,6 @@ from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import Timing
 from jobs.plan.measurements.truth import Truth
-from jobs.plan.measurements.truth_edge import TruthEdge
-from jobs.plan.measurements.truth_frames import TruthFrames
-from jobs.plan.measurements.truth_picture import TruthPicture
 from jobs.plan.measurements.unseen_population import OnUnseenPopulation
 
 KINDS: Final[tuple[type[Measurement], ...]] = (
@@ -36,6 +37,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     Timing,
     ErrorsBySize,
     OfAddedMetric,
+    LivePage,
 )
 
 

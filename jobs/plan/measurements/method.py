@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from jobs.plan.measurements.images.truth_edge import TruthEdge
+from jobs.plan.measurements.images.truth_frames import TruthFrames
+from jobs.plan.measurements.images.truth_picture import TruthPicture
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.subjects import Dataset, Subjects, Trained, ways_versions
-from jobs.plan.measurements.truth_edge import TruthEdge
-from jobs.plan.measurements.truth_frames import TruthFrames
-from jobs.plan.measurements.truth_picture import TruthPicture
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline import versions
 from pipeline.scenes.options import View

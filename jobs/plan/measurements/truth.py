@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from jobs.plan.measurements.images.truth_frames import TruthFrames
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Dataset, Subjects
-from jobs.plan.measurements.truth_frames import TruthFrames
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline import versions
 from reports.options import ErrorOptions, FrameOptions, Role, select

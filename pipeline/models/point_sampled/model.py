@@ -67,6 +67,10 @@ class PointSampled:
         """Answer N queries, float32 (N, 4), with the random numbers named by `seed`."""
         return self._samplers.of(fabric).sample(queries, self.count, seed, self.sequence == "r2")
 
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+        """Return the transparency of N footprints, float32 (N,), of the points that `predict` has with this seed."""
+        return self._samplers.of(fabric).transparency(looks, self.count, seed, self.sequence == "r2")
+
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the tables that the point model reads."""
         return self._samplers.of(fabric).bytes_stored()

@@ -91,7 +91,7 @@ class Adaptive:
         """Answer N queries that the network is not trained for, float32 (N, 4), by the finest soft nodes."""
         return self._finest.predict(fabric, queries)
 
-    def transparency(self, fabric: Fabric, looks: Queries) -> Floats:
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Floats:
         """Return the transparency of N footprints, float32 (N,), by the finest soft nodes."""
         return self._finest.transparency(fabric, looks)
 

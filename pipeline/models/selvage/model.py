@@ -251,7 +251,7 @@ class Selvage:
         """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
         return self._nodes.predict(fabric, queries)
 
-    def transparency(self, fabric: Fabric, looks: Queries) -> npt.NDArray[np.float32]:
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
         return self._nodes.transparency(fabric, looks)
 

@@ -73,7 +73,7 @@ class SoftNodes:
             result[rows] = read_behind(table, queries.take(rows))
         return result
 
-    def transparency(self, fabric: Fabric, looks: Queries) -> npt.NDArray[np.float32]:
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
         return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
 

@@ -191,7 +191,7 @@ class Woven:
             place = cloth.take(torch.tensor([0], device=self._device)).placement
         return self._components(queries, blended, place)
 
-    def transparency(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def transparency(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Return the share of light from straight behind that passes unscattered, float32 (N,) in [0, 1].
 
         0 if `transmission` was not learnt.

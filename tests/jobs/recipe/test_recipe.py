@@ -105,6 +105,8 @@ def test_a_recipe_of_ones_own(files):
         ("relative_error = 0.05", 'frame = "macro"', ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
         ("frames = 4", "frmes = 4", ["bench.frmes = 4", "did you mean 'frames'"]),
         ("frames = 4", 'runtimes = ["onx"]', ["bench.runtimes.0 = 'onx'", "'eager-bf16'", "'onnx' or 'onnx-int8'"]),
+        ("frames = 4", 'live = { fabrics = ["satin_8"] }', ["bench.live.fabrics = 'satin_8'", "of the recipe"]),
+        ("frames = 4", "live = { pixels = 4 }", ["bench.live.pixels = 4", "greater than or equal to 8"]),
         ("population = 800", "", ["dataset.rows.population = 0", "must be > 0"]),
         ('exclude = ["twill 4/4"]', 'exclude = ["twill 4/5"]', ["dataset.population.exclude = 'twill 4/5'"]),
         ("move = 2", "move = 0", ["own.toml", "draft"]),

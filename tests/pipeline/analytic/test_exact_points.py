@@ -31,6 +31,16 @@ def test_points_converge_to_the_truth():
     np.testing.assert_allclose(PointSampler(fabric).sample(queries, 400_000, 1), exact.mean, rtol=0.03)
 
 
+def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
+    fabric = load_fabric("gauze")
+    looks = _queries((45, 120), (45, 120), sigma=0.7)
+    exact = estimate(fabric, looks, EXACT, 1).transparency
+    sampler = PointSampler(fabric)
+    assert 0.05 < exact[0] < 0.95
+    np.testing.assert_allclose(sampler.transparency(looks, 400_000, 1), exact, rtol=0.02)
+    assert sampler.transparency(looks, 4, 1) != sampler.transparency(looks, 4, 2)
+
+
 @pytest.mark.parametrize("sigma", [1e-4, 1e4])
 @pytest.mark.parametrize("theta", [0.0, 89.9])
 @pytest.mark.parametrize("roughness", [0.01, 1.0])

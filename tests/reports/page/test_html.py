@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from reports.page.html import SECTIONS, page_html
 from reports.page.page import page_tables
 from reports.page.picture_strips import PictureFile
 from reports.record import Record, this_machine
-from reports.truth import accuracy, bias, effort
+from reports.truth import accuracy, bias, effort, path_traced
 from reports.truth.finding import RECORDS as FINDINGS
 from reports.truth.finding import judge
 from weaves.fabric import load_fabric
@@ -67,6 +68,7 @@ def truth_records():
         *FINDINGS.to_records([judge("f", "corner", "float32", {"w": [0.25]}, [1.0], [1.0], 1e-6, naive=[1.001])]),
         *accuracy.RECORDS.to_records([accuracy.Accuracy("mc", "denim", 0.1, 0.1, 0.1, 64.0, 5e3, 1.0, 7e-4, 150)]),
         *bias.RECORDS.to_records([bias.Bias("denim", bias.SIDES[0], "specular_warp", 1e-3, 5e-4, 900)]),
+        *path_traced.RECORDS.to_records([path_traced.Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.25)]),
         *effort.RECORDS.to_records([effort.Effort("table alone", "denim", 1.0, 4000.0, 2e-5, 900)]),
     ]
 
@@ -92,6 +94,7 @@ def page_of(measured):
     models = [ModelNote("woven", "one network"), ModelNote("point_sampled", "nothing is trained")]
     fabrics = [(load_fabric(name), "seen") for name in ("denim", "basket")]
     page = PageInput("tiny", "", "0123", "tiny-0", fabrics, models, BenchOptions(), records, this_machine(1), pictures)
+    page = replace(page, live={"denim": Path("denim.html")})
     return page_html(page, page_tables(records), set(PLOT_TITLES))
 
 
@@ -129,6 +132,11 @@ def test_nearly_all_sections_are_there(page):
     """Else the tests below look at little."""
     ids = {one.get("id") for one in page.all("section")}
     assert set(SECTIONS) - ids <= {"equal-time", "energy", "rates", "sampler", "other"}
+
+
+def test_path_traced_frames_have_a_table(page):
+    (table,) = [one for one in page.all("table") if "path-traced" in one["text"]]
+    assert "drapesoft_nodes:242.5e-031.503.2×" in table["text"]
 
 
 def test_headings_have_no_gaps(page):

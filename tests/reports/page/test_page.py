@@ -16,6 +16,7 @@ from reports.measure.scene.difference_maps import difference_maps
 from reports.measure.scene.image_error import image_errors
 from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.content import PageInput
+from reports.page.files import read_files
 from reports.page.filmstrip import GAP
 from reports.page.model_note import ModelNote
 from reports.page.page import write_page
@@ -73,6 +74,8 @@ def page_input(made_up, tmp_path_factory):
                 planes = {name: random.random((12, 16)) for name in "RGB"} | {"A": np.ones((12, 16))}
                 write_exr(path, planes)
                 pictures.append(PictureFile(fabric, scene, method, setting, path))
+    live = folder / "live-denim-01234567.html"
+    live.write_bytes(b"<title>denim</title>")
     danger = load_fabric("denim").model_copy(update={"source": "<script>alert('cloth')</script> & more"})
     return PageInput(
         recipe="tiny",
@@ -89,6 +92,7 @@ def page_input(made_up, tmp_path_factory):
         records=made_up,
         machine=this_machine(1),
         pictures=pictures,
+        live={"denim": live},
     )
 
 
@@ -123,6 +127,12 @@ def test_every_figure_is_shown(written):
     folder, page = written
     made = {f"figures/{path.name}" for path in (folder / "figures").iterdir()}
     assert made - set(page.files) == {"figures/overview.png"}  # the sheet is for the README
+
+
+def test_live_pages_are_beside_the_page(written):
+    folder, page = written
+    assert (folder / "live" / "denim.html").read_bytes() == b"<title>denim</title>"
+    assert "live/denim.html" in page.files and "live/denim.html" in read_files(folder)
 
 
 def test_headline_prints_the_papers_comparison(written):

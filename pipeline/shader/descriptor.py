@@ -1,0 +1,274 @@
+"""`soft_nodes.json`, or that of another model: an exported folder, for a program that has not seen this package."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from importlib.metadata import version
+from typing import Any, Final
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from pipeline.compiled.arrays import Float32
+from pipeline.shader.constants import TEXTURE_WIDTH
+from pipeline.shader.golden import ANSWERS, COLUMNS, DENSITY, TRANSPARENCY, Golden
+from pipeline.shader.limits import MOST_CELLS, MOST_NODES
+from pipeline.shader.tables import Tables
+from pipeline.truth.conventions import COMPONENTS
+from weaves.fabric import Fabric
+
+GOLDEN: Final = "golden.json"
+
+_FILES: Final = {
+    "integers": {"int32": "tables/integers.i32"},
+    "numbers": {"float32": "tables/numbers.f32"},
+    "nodes": {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"},
+    "grid": {"uint8": "tables/grid.png"},
+}
+"""Files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
+
+_CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class Place(_Model):
+    """An array in a buffer."""
+
+    offset: int
+    """First element."""
+    shape: tuple[int, ...]
+    """Its extent, row-major."""
+    meaning: str
+    """Its content."""
+
+
+class Buffer(_Model):
+    """A buffer that the shader reads."""
+
+    files: dict[str, str]
+    """Paths by type; one of them is loaded."""
+    channels: int
+    """Numbers in an element."""
+    elements: int
+    """Elements; as a texture they fill rows of `texture_width`, the last one in part."""
+    arrays: dict[str, Place]
+    """Arrays in it, after the scalars."""
+
+
+class Layer(_Model):
+    """A layer: outputs = activation(biases + inputs times weights)."""
+
+    network: str
+    """Network that it belongs to; its layers follow each other."""
+    biases: Place
+    """Biases, filled up with zeros to whole elements."""
+    weights: Place
+    """Weights (inputs, outputs), row-major: row i has those from input i; filled up with zeros."""
+    activation: str
+    """Function of each output."""
+
+
+class Network(_Model):
+    """The networks of a model, in the buffer `weights`. Offsets are in elements, shapes in numbers."""
+
+    name: str
+    """Name of the trained model."""
+    trained_on: dict[str, tuple[float, float]]
+    """Ranges of what it was trained on: footprints and yarns."""
+    outside: str
+    """Why the fabric lies outside these ranges; empty if it does not."""
+    inputs: dict[str, list[str]]
+    """Inputs of each network, in their order."""
+    outputs: dict[str, str]
+    """Meaning of the outputs of each network."""
+    layers: list[Layer]
+    """Layers, in the order of their computation."""
+    onnx: dict[str, str]
+    """Inputs of the ONNX form, each of N rows; its output is `components`, (N, 4)."""
+
+
+class Colours(_Model):
+    """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
+
+    Means if threads differ in colour.
+    """
+
+    specular_warp: tuple[float, float, float]
+    specular_weft: tuple[float, float, float]
+    diffuse_warp: tuple[float, float, float]
+    diffuse_weft: tuple[float, float, float]
+    transmitted_warp: tuple[float, float, float]
+    transmitted_weft: tuple[float, float, float]
+
+
+class Vectors(_Model):
+    """Content of `golden.json`."""
+
+    columns: tuple[str, ...] = COLUMNS
+    """Columns of a query."""
+    queries: list[list[float]]
+    """Queries."""
+    groups: dict[str, tuple[int, int]]
+    """First row and end of the rows of each kind; the range of a column is that of its group."""
+    components: list[list[float]]
+    """Their answers."""
+    bounds: list[list[float]]
+    """Upper bounds of the components."""
+    transparency: list[float]
+    """Transparency of the footprint towards the viewer; empty for a model that does not know it."""
+    density: list[float]
+    """Density with which `sample` finds wi, 1/sr; empty for a model without it."""
+    steady: float
+    """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
+
+
+class Descriptor(_Model):
+    """Content of `soft_nodes.json`."""
+
+    model: str = "soft_nodes"
+    """The method."""
+    fabric: str
+    """Name of the fabric."""
+    generator: str
+    """Program and version."""
+    level: int | None
+    """Level of detail k of the soft nodes; none if the model has none."""
+    inputs: dict[str, str]
+    """Fields of a query, with their units."""
+    outputs: dict[str, str]
+    """Fields of an answer."""
+    conventions: list[str]
+    """Axes, directions, cosine and colours."""
+    components: tuple[str, ...] = COMPONENTS
+    """Order of the four components."""
+    colours: Colours
+    """Colours of the yarns."""
+    repeat: tuple[int, int]
+    """Ends and picks after which the weave repeats."""
+    limits: dict[str, int]
+    """Largest table that the shader takes."""
+    texture_width: int = TEXTURE_WIDTH
+    """Texels of a row of every texture."""
+    kinds: list[str]
+    """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
+    scalars: dict[str, int | float]
+    """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
+    back_scalars: dict[str, int | float]
+    """The next ones of both, of the back of the cloth, if the tables know it."""
+    buffers: dict[str, Buffer]
+    """Buffers, by the name that they have in the source."""
+    network: Network | None = None
+    """Networks, of a model that has some."""
+    source: list[str] = []
+    """Files of the source."""
+    languages: dict[str, list[str]] = {}
+    """Files that slangc made, by language."""
+    golden: str = GOLDEN
+    """Queries with their answers."""
+
+
+INPUTS: Final = {
+    "centre": "middle of the footprint, in yarn spacings: x along the weft, y along the warp; any number",
+    "deviation": "standard deviations of the Gaussian footprint along x and y, in yarn spacings; at least 0.001",
+    "correlation": "of both axes, -1 to 1",
+    "wi": "unit vector to the light",
+    "wo": "unit vector to the viewer",
+    "curvature": "of the cloth in the viewer's plane, 1/yarn spacings, 0 to 1; 0 with the viewer behind",
+}
+"""Fields of a query."""
+
+OUTPUTS: Final = {
+    "components": "specular warp and weft, diffuse warp and weft, for unit colours, in 1/sr",
+    "bounds": "with light and viewer on one side the same without shadows of the light, never below the components, of "
+    "which the diffuse ones integrate to at most 1; else the components",
+}
+"""Fields of an answer."""
+
+CONVENTIONS: Final = [
+    "The cloth is the plane z = 0, its front towards z > 0. Warp yarns run along y, weft yarns along x.",
+    "Lengths are in yarn spacings. The first end and pick of the draft lie in the cell from (0, 0) to (1, 1).",
+    "wi and wo point away from the cloth. Behind it (z < 0) answers are 0 unless `kinds` has `behind`.",
+    "The incident cosine is in the components: radiance is the integral of f L over wi, with no further cosine.",
+    "f = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft, with k_dt in place of k_d where "
+    "light and viewer are on different sides.",
+]
+"""Axes, directions, cosine and colours."""
+
+
+def generator() -> str:
+    """Return program and version."""
+    return f"twillight {version('twillight')}"
+
+
+def colours(fabric: Fabric) -> Colours:
+    """Return the colours of the yarns."""
+    mean = fabric.average()
+    return Colours(
+        specular_warp=mean.warp.specular_rgb,
+        specular_weft=mean.weft.specular_rgb,
+        diffuse_warp=mean.warp.diffuse_rgb,
+        diffuse_weft=mean.weft.diffuse_rgb,
+        transmitted_warp=mean.warp.diffuse_transmission_rgb,
+        transmitted_weft=mean.weft.diffuse_transmission_rgb,
+    )
+
+
+def descriptor(
+    fabric: Fabric,
+    level: int,
+    found: Tables,
+    kinds: Collection[str],
+) -> Descriptor:
+    """Return the content of `soft_nodes.json`, before files are written."""
+    values = {name: getattr(found, name) for name in _FILES}
+    return Descriptor(
+        fabric=fabric.name,
+        generator=generator(),
+        level=level,
+        inputs=INPUTS,
+        outputs=OUTPUTS,
+        conventions=CONVENTIONS,
+        colours=colours(fabric),
+        repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
+        limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
+        kinds=sorted(kinds),
+        scalars=found.scalars,
+        back_scalars=found.back_scalars,
+        buffers={
+            name: Buffer(
+                files=files,
+                channels=_CHANNELS[name],
+                elements=values[name].size // _CHANNELS[name],
+                arrays={
+                    key: Place(offset=array.offset, shape=array.shape, meaning=array.meaning)
+                    for key, array in found.places.get(name, {}).items()
+                },
+            )
+            for name, files in _FILES.items()
+        },
+    )
+
+
+def vectors(found: Golden) -> Vectors:
+    """Return the content of `golden.json`."""
+    whole = found.answers.shape[1] == ANSWERS
+    return Vectors(
+        queries=_short(found.rows),
+        groups=found.groups,
+        components=_short(found.answers[:, :4]),
+        bounds=_short(found.answers[:, 4:8]),
+        transparency=_short(found.answers[:, TRANSPARENCY]) if whole else [],
+        density=_short(found.answers[:, DENSITY]) if whole else [],
+        steady=found.steady,
+    )
+
+
+def _short(values: Float32) -> list[Any]:
+    """Return numbers of single precision with the fewest digits that tell all of them apart."""
+    # `str` keeps to NumPy's print options, which other packages change.
+    numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
+    found: list[Any] = np.array(numbers).reshape(values.shape).tolist()
+    return found

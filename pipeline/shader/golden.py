@@ -1,0 +1,234 @@
+"""Golden vectors: queries of every kind with the answers of pipeline.analytic.
+
+Cells of grids and numbers of nodes are integers: a query may lie so near a step that the last digit of its place
+decides. No implementation can be right or wrong on such a query, so it is not golden: the answer may change by at most
+STEADY, as a share of the range of its column, if the last digits of its footprint change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pipeline.analytic.importance.lobes import POINT_ROWS, ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
+from pipeline.analytic.importance.mixture import density_rows
+from pipeline.analytic.importance.surface import Surface
+from pipeline.analytic.soft_nodes.answer import SMALLEST
+from pipeline.analytic.soft_nodes.behind import read_behind
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.nodes import Table
+from pipeline.compiled.arrays import Float32, Mask
+from pipeline.shader.constants import POINTS, WIDENING
+from pipeline.shader.sides import BEHIND, CURVATURE, Sides
+from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.query import STEEPEST_CURVATURE, Queries
+from weaves.colour import LUMINANCE
+
+COLUMNS: Final = (
+    "u", "v", "deviation_x", "deviation_y", "correlation", "wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z", "curvature"
+)  # fmt: skip
+"""Columns of a query as the shader takes it."""
+
+STEADY: Final = 1e-5
+"""Largest change of a golden answer if the last digits of its footprint change, as a share of the range."""
+
+TRANSPARENCY, DENSITY, ANSWERS = 8, 9, 10
+"""Columns of answers after components and bounds, and the number of all."""
+
+_SEED = 20
+_TRIALS = 4
+_LEAST_RISE = 0.05  # of light and viewer
+_LEAST_CURVATURE = 0.01
+# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow, wide,
+# wider than the repeat; thin ellipses, long and short, and thick ones.
+_FOOTPRINTS = (
+    ((0.01, 0.1), (1.0, 1.0)),
+    ((0.1, 0.25), (1.0, 1.0)),
+    ((0.25, 0.6), (1.0, 1.0)),
+    ((0.6, 8.0), (1.0, 1.0)),
+    ((0.1, 0.7), (1.6, 6.0)),
+    ((0.75, 2.0), (4.0, 8.0)),
+    ((0.4, 3.0), (1.1, 2.5)),
+)
+
+
+class Group(NamedTuple):
+    """Golden queries of one kind: how many, the sides of light and viewer, whether the cloth is curved."""
+
+    rows: int
+    light: float
+    viewer: float
+    curved: bool
+
+
+GROUPS: Final = {
+    "front": Group(128, 1.0, 1.0, False),
+    "transmitted": Group(64, -1.0, 1.0, False),
+    "back": Group(64, -1.0, -1.0, False),
+    "back_transmitted": Group(64, 1.0, -1.0, False),
+    "curved": Group(64, 1.0, 1.0, True),
+    "curved_transmitted": Group(64, -1.0, 1.0, True),
+}
+"""Kinds of golden queries; a folder has those that its tables know."""
+
+
+class Golden(NamedTuple):
+    """Queries with their answers.
+
+    Attributes
+    ----------
+    rows : float32 (N, 12)
+        COLUMNS.
+    answers : float32 (N, ANSWERS) or (N, 8)
+        Components; bounds; of models that know them transparency, and density of wi in the mixture of the lobes, 1/sr.
+    groups : dict
+        First row and end of the rows of each of GROUPS.
+    steady : float
+        Share of the queries tried that are steady.
+    """
+
+    rows: Float32
+    answers: Float32
+    groups: dict[str, tuple[int, int]]
+    steady: float
+
+
+def rows_of(queries: Queries) -> Float32:
+    """Return N queries as the shader takes them, float32 (N, 12)."""
+    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo, queries.curvature)
+    return np.column_stack(columns).astype(np.float32)
+
+
+Answering = Callable[[Queries], Float32]
+"""Answers of N queries, all viewers on one side: components and bounds (N, 8), or all ANSWERS."""
+
+
+def golden(sides: Sides, read: Answering | None = None) -> Golden:
+    """Return golden queries of a cloth, of all kinds that it knows; `read` answers them, or the soft nodes do."""
+    known = {CURVATURE: len(sides.front.falls) > 0, BEHIND: sides.back is not None}
+    groups = {
+        name: group
+        for name, group in GROUPS.items()
+        if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
+    }
+    ends, picks = sides.front.repeat
+    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides))
+
+
+def golden_of(groups: Mapping[str, Group], repeat: tuple[int, int], read: Answering, stretched: bool = True) -> Golden:
+    """Return golden queries over a repeat (ends, picks), footprints all round if not `stretched`."""
+    rng = np.random.default_rng(_SEED)
+    rows, answers, places, share, stop = [], [], {}, [], 0
+    for name, group in groups.items():
+        queries = _candidates(repeat, group, rng)
+        if not stretched:
+            queries = queries._replace(sigma_minor=queries.sigma)
+        steady, answer = _steady(read, queries, rng)
+        chosen = np.flatnonzero(steady)[: group.rows]
+        rows.append(rows_of(queries.take(chosen)))
+        answers.append(answer[chosen])
+        places[name] = stop, stop + len(chosen)
+        stop += len(chosen)
+        share.append(float(steady.mean()))
+    return Golden(np.concatenate(rows), np.concatenate(answers), places, float(np.mean(share)))
+
+
+def read_sides(sides: Sides, queries: Queries) -> Float32:
+    """Return the answers of N queries by pipeline.analytic, float32 (N, ANSWERS); all viewers are on one side.
+
+    Bounds are known with light and viewer on one side; else they are the components.
+    """
+    back = bool(queries.wo[0, 2] < 0.0)
+    table = sides.back if back else sides.front
+    assert table is not None
+    seen = queries.turned() if back else queries
+    result = np.empty((len(queries.u), ANSWERS), np.float32)
+    behind = seen.wi[:, 2] < 0.0
+    if not behind.all():
+        found = read_queries(table, seen.take(~behind))
+        result[~behind, :4], result[~behind, 4:8] = found.components, found.bounds
+    if behind.any():
+        result[behind, :4] = result[behind, 4:8] = read_behind(table, seen.take(behind))[:, :4]
+    result[:, TRANSPARENCY] = transparency(table, seen)
+    lobes = lobes_of(sides, queries)
+    wi, wo, density = (np.ascontiguousarray(a, np.float32) for a in (queries.wi, queries.wo, result[:, DENSITY]))
+    density_rows(lobes, wi, wo, density)
+    result[:, DENSITY] = density
+    return result
+
+
+def transparency(table: Table, looks: Queries) -> Float32:
+    """Return the transparency of N footprints, (N,), the viewer in front; a table of the front alone suffices."""
+    if not len(table.behind_grid):
+        # Horizons of the other side hide the light, of which the transparency knows nothing.
+        table = table._replace(behind_mean=table.mean, behind_sharpness=table.sharpness, behind_grid=table.grid)
+    return read_behind(table, looks._replace(wi=-looks.wo))[:, 4]
+
+
+def lobes_of(sides: Sides, looks: Queries) -> Lobes:
+    """Return the mixtures of N looks by pipeline.analytic.importance with the grids of `sides`; viewers on one side."""
+    back, count = bool(looks.wo[0, 2] < 0.0), len(looks.u)
+    table = sides.back if back else sides.front
+    assert table is not None
+    surface = Surface(
+        table.repeat, table.yarn, table.thickness, table.uniform, table.piece_starts, table.pieces, table.bounds,
+        table.grid.ravel(), table.grid.shape[-1], (sides.colours @ np.array(LUMINANCE, np.float32)).reshape(3, 2),
+    )  # fmt: skip
+    seen, places = looks.turned() if back else looks, point_places(POINTS)
+    columns = (seen.u, seen.v, *deviations(seen, SMALLEST))
+    result = Lobes(np.empty((count, ROWS, POINTS + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
+    find_rows(
+        surface, tuple(np.ascontiguousarray(column, np.float32) for column in columns),  # type: ignore[arg-type]
+        np.ascontiguousarray(seen.wo, np.float32), places, np.float32(WIDENING),
+        np.empty((POINT_ROWS, POINTS), np.float32), result,
+    )  # fmt: skip
+    if back:
+        result.flakes[:, TZ] *= np.float32(-1.0)
+    return result
+
+
+def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator) -> Queries:
+    """Return twice as many queries as a group has, footprints of every kind by turns, anywhere in the repeat."""
+    count = 2 * group.rows
+    kinds = np.array(_FOOTPRINTS)[np.arange(count) % len(_FOOTPRINTS)]
+    drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
+    sigma, ratio = drawn[:, 0], drawn[:, 1]
+    place = rng.random((count, 2)) * repeat
+    # Half of the ellipses lie along the yarns.
+    angle = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(-0.5, 0.5, count)) * np.pi
+    wi, wo = (_front(rng, count) * np.array([1.0, 1.0, side]) for side in (group.light, group.viewer))
+    curvature = np.zeros(count)
+    if group.curved:
+        curvature = _LEAST_CURVATURE * (STEEPEST_CURVATURE / _LEAST_CURVATURE) ** rng.random(count)
+    columns = (place[:, 0], place[:, 1], sigma, wi, wo, sigma / ratio, angle, curvature)
+    return Queries(*(np.asarray(column, np.float32) for column in columns))
+
+
+def _front(rng: np.random.Generator, count: int) -> Float32:
+    """Return unit vectors, even over the directions in front, (N, 3)."""
+    z, turn = rng.uniform(_LEAST_RISE, 1.0, count), rng.uniform(0.0, 2.0 * np.pi, count)
+    level = np.sqrt(1.0 - z * z)
+    return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
+
+
+def _steady(read: Answering, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
+    """Return which queries are steady, and the answers of all, (N, ANSWERS)."""
+    answer = read(queries)
+    span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
+    change = np.zeros(len(answer))
+    for _ in range(_TRIALS):
+        moved = queries._replace(
+            u=_next(queries.u, rng), v=_next(queries.v, rng), sigma=_next(queries.sigma, rng),
+            sigma_minor=_next(queries.sigma_minor, rng),
+        )  # fmt: skip
+        change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
+    return np.asarray(change <= STEADY), answer
+
+
+def _next(values: Float32, rng: np.random.Generator) -> Float32:
+    """Return the numbers above or below, at random."""
+    towards = np.where(rng.random(len(values)) < 0.5, np.float32(-np.inf), np.float32(np.inf))
+    return np.nextafter(values, towards, dtype=np.float32)

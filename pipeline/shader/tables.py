@@ -1,0 +1,306 @@
+"""The table of a cloth as a shader reads it: four buffers, and the places of its arrays in them.
+
+    integers   int32: scalars of `Table`, of the front and of the back, then arrays
+    numbers    float32: scalars, then colours, yarns, extents of pieces, the rules along both axes and those of Gauss
+    nodes      float32 (rows, 4), `stride` rows a node: normal and 1 / n_z; tangent and share of the area; change of the
+               tangent along; across; mean and sharpness of horizons, two azimuths a row; cosine and sine of waves, two
+               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row
+    grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; the same of the back
+
+`layout.slang` holds the constants and a function that reads the scalars and places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.importance.lobes import point_places
+from pipeline.analytic.soft_nodes import footprint_nodes
+from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
+from pipeline.analytic.soft_nodes.waves import TOGETHER
+from pipeline.compiled.arrays import Float32
+from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants
+from pipeline.shader.limits import MOST_CELLS, MOST_HEIGHT, MOST_NODES
+from pipeline.shader.sides import Sides
+from weaves.errors import BadInput
+
+
+class Array(NamedTuple):
+    """An array in a buffer: its first element there, its shape, and what it holds."""
+
+    offset: int
+    shape: tuple[int, ...]
+    meaning: str
+
+
+class Tables(NamedTuple):
+    """A cloth for a shader.
+
+    Attributes
+    ----------
+    integers, numbers : int32, float32
+    nodes : float32 (rows, 4)
+    grid : uint8
+        The four buffers.
+    scalars, back_scalars : dict
+        Values of `Table` of type int, then of type float, in the order in which the buffers begin with them: of the
+        front, then of the back, if the tables know it.
+    places : dict
+        Buffer and arrays in it, by name.
+    """
+
+    integers: npt.NDArray[np.int32]
+    numbers: Float32
+    nodes: Float32
+    grid: npt.NDArray[np.uint8]
+    scalars: dict[str, int | float]
+    back_scalars: dict[str, int | float]
+    places: dict[str, dict[str, Array]]
+
+
+_MEANINGS: Final = {
+    "groups": "first node, lines of nodes, rules along x and y, family, first cell, number of cells",
+    "group_cells": "end and pick of the cells of all groups",
+    "piece_starts": "first piece of every cell, pick by pick; their end",
+    "pieces": "family (0 warp, 1 weft, 2 gap) and grid of every piece",
+    "wave_periods": "periods of every wave in a repeat, along x and y",
+    "colours": "linear Rec. 709: k_s, k_d and k_dt, each of warp and weft",
+    "point_places": "points of the lobes: in deviations of a footprint; in repeats, where it covers the cloth evenly",
+    "yarn": "warp, weft: radius, 1/radius, sine and cosine of the twist, roughness, relief, blend, largest bend",
+    "bounds": "extent of every piece in x and y within its cell; offset, curve, largest sine of its inclination",
+    "places_x": "nodes of the rules along x, within a cell",
+    "weights_x": "their weights",
+    "places_y": "nodes of the rules along y",
+    "weights_y": "their weights",
+    "wave_size": "squared wave numbers, 1/yarn spacings^2",
+    "gauss_places": "Gauss-Legendre rules of 0 to 6 nodes, filled up to 8",
+    "gauss_weights": "their weights",
+    "hermite_places": "Gauss-Hermite rule, in deviations",
+    "hermite_weights": "its weights",
+}
+
+
+def refuse_large(ends: int, picks: int) -> None:
+    """Refuse a repeat of more than MOST_CELLS cells."""
+    if ends * picks > MOST_CELLS:
+        allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"
+        raise BadInput("export", "--shader", f"{ends} ends × {picks} picks", allowed)
+
+
+def tables(sides: Sides) -> Tables:
+    """Return the buffers of a cloth without threads of their own; BadInput above MOST_NODES or MOST_HEIGHT."""
+    refuse_large(*(int(n) for n in sides.front.repeat))
+    found = [_side(table) for table in (sides.front, sides.back) if table is not None]
+    _refuse_large_tables(found)
+    shared = {"colours": sides.colours, "point_places": point_places(POINTS)}
+    first = found[0]
+    own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
+    integers, numbers = _Buffer(own * len(found)), _Buffer(len(first.numbers) * len(found))
+    of_shared = numbers.add(shared)
+    heads: list[dict[str, int | float]] = []
+    node = grid = 0
+    for prefix, side in zip(("", "back_"), found, strict=False):
+        offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
+        heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
+        node, grid = node + side.rows[..., 0].size, grid + side.grid.size
+    return Tables(
+        integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
+        numbers.filled([value for head in heads for value in head.values() if isinstance(value, float)], np.float32),
+        np.ascontiguousarray(np.concatenate([side.rows.reshape(-1, 4) for side in found]), np.float32),
+        np.concatenate([side.grid for side in found]),
+        heads[0],
+        heads[1] if len(heads) > 1 else {},
+        {"integers": integers.places, "numbers": numbers.places},
+    )
+
+
+_STARTS: Final = ("first_node", "first_grid")
+"""Scalars of where the nodes and the grids of a side begin."""
+
+
+class _Buffer:
+    """A buffer that begins with scalars; arrays are added after them."""
+
+    def __init__(self, scalars: int) -> None:
+        self.places: dict[str, Array] = {}
+        self._stop, self._values = scalars, [np.zeros(0)]
+
+    def add(self, arrays: dict[str, npt.NDArray[Any]], prefix: str = "") -> dict[str, int]:
+        """Add arrays; return their first elements by name."""
+        found = {}
+        for name, values in arrays.items():
+            meaning = f"of the back: {_MEANINGS[name]}" if prefix else _MEANINGS[name]
+            self.places[prefix + name] = Array(self._stop, values.shape, meaning)
+            found[name], self._stop = self._stop, self._stop + values.size
+            self._values.append(values.ravel())
+        return found
+
+    def filled(self, scalars: list[Any], kind: type) -> npt.NDArray[Any]:
+        """Return all numbers."""
+        return np.concatenate([scalars, *self._values]).astype(kind)
+
+
+class _Side(NamedTuple):
+    """One side of a cloth: its scalars and arrays by name, the rows of its nodes, its grids."""
+
+    integers: dict[str, int | float]
+    numbers: dict[str, int | float]
+    of_integers: dict[str, npt.NDArray[Any]]
+    of_numbers: dict[str, npt.NDArray[Any]]
+    rows: Float32
+    grid: npt.NDArray[np.uint8]
+
+
+def _side(table: Table) -> _Side:
+    """Return what the shader reads of one side."""
+    rows = _node_rows(table)
+    groups, cells = _groups(table)
+    gauss_places, gauss_weights, hermite = _rules()
+    waves, behind, curvatures = len(table.waves), int(len(table.behind_grid) > 0), len(table.grid_falls)
+    integers: dict[str, int | float] = {
+        "ends": int(table.repeat[0]),
+        "picks": int(table.repeat[1]),
+        "size": table.grid.shape[2],
+        "per_azimuth": table.grid.shape[2] * table.grid.shape[3],
+        "grid_size": table.grid.size,
+        "legendre": table.legendre,
+        "blocks": len(table.evenly),
+        "stride": rows.shape[1],
+        "waves": waves,
+        "rules_x": len(table.places_x) // COLUMNS,
+        "rules_y": len(table.places_y) // COLUMNS,
+        "group_count": len(groups),
+        "behind": behind,
+        "curvatures": curvatures,
+        "behind_row": WAVE_ROW + waves // 2,
+        "falls_row": WAVE_ROW + waves // 2 + behind * (AZIMUTHS // 2),
+    }
+    numbers: dict[str, int | float] = {
+        "thickness": float(table.thickness),
+        "uniform": table.uniform,
+        "waves_from": table.waves_from,
+        "lines_per_cell": table.lines_per_cell,
+        "narrow": float(table.narrow),
+    }
+    of_integers: dict[str, npt.NDArray[Any]] = {
+        "groups": groups,
+        "group_cells": cells,
+        "piece_starts": table.piece_starts,
+        "pieces": table.pieces,
+        "wave_periods": table.waves,
+    }
+    of_numbers: dict[str, npt.NDArray[Any]] = {
+        "yarn": table.yarn,
+        "bounds": table.bounds,
+        "places_x": table.places_x,
+        "weights_x": table.weights_x,
+        "places_y": table.places_y,
+        "weights_y": table.weights_y,
+        "wave_size": table.wave_size,
+        "gauss_places": gauss_places,
+        "gauss_weights": gauss_weights,
+        "hermite_places": hermite[0],
+        "hermite_weights": hermite[1],
+    }
+    grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
+    return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
+
+
+def _refuse_large_tables(found: Sequence[_Side]) -> None:
+    """Refuse tables above MOST_NODES or MOST_HEIGHT."""
+    count = max(len(side.rows) for side in found)
+    if count > MOST_NODES:
+        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower --level"
+        raise BadInput("export", "--shader", f"{count:,} nodes", allowed)
+    size = sum(len(side.grid) for side in found)
+    if size > TEXTURE_WIDTH * MOST_HEIGHT:
+        allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
+        raise BadInput("export", "--shader", f"{size:,} horizons", allowed)
+
+
+def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> str:
+    """Return a file of the source with constants, whose types are those of the values."""
+    lines = [f"// Generated from {origin}; do not edit.", "", "#pragma once", ""]
+    for name, value in values.items():
+        if isinstance(value, bool):
+            kind, text = "bool", str(value).lower()
+        else:
+            kind, text = ("int", str(value)) if isinstance(value, int) else ("float", f"{value:.9g}")
+        if kind == "float" and not any(mark in text for mark in ".e"):
+            text += ".0"
+        lines.append(f"static const {kind} {name} = {text};")
+    return "\n".join([*lines, ""])
+
+
+def layout_slang(found: Tables) -> str:
+    """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
+    lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
+    kinds = {name: "int" if isinstance(value, int) else "float" for name, value in found.scalars.items()}
+    lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
+    lines += ["int integer(int i);", "float number(int i);", ""]
+    lines += ["Table load_table_at(int first_integer, int first_number) {", "    Table table;"]
+    seen = {"int": 0, "float": 0}
+    for name, kind in kinds.items():
+        read = "integer(first_integer" if kind == "int" else "number(first_number"
+        lines.append(f"    table.{name} = {read} + {seen[kind]});")
+        seen[kind] += 1
+    behind = list(kinds).index("behind")
+    lines += ["    return table;", "}", "", "/// The front of the cloth.", "Table load_table() {"]
+    lines += ["    return load_table_at(0, 0);", "}", "", "/// The side that a viewer sees, if the table knows both."]
+    lines += ["Table load_side(bool back) {", f"    bool other = back && integer({behind}) > 0;"]
+    lines += [f"    return load_table_at(other ? {seen['int']} : 0, other ? {seen['float']} : 0);", "}", ""]
+    return "\n".join(lines)
+
+
+def _node_rows(table: Table) -> Float32:
+    """Return the rows of all nodes, (nodes, stride, 4)."""
+    count, waves = table.evenly.size, len(table.waves)
+    surface = table.nodes.transpose(0, 2, 1).reshape(count, -1)
+    behind, curvatures = len(table.behind_grid) > 0, len(table.falls)
+    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS]
+    rows = np.zeros((count, sum(parts), 4), np.float32)
+    ends = np.cumsum(parts)
+    rows[:, 0] = surface[:, :4]
+    rows[:, 1, :3], rows[:, 1, 3] = surface[:, 4:7], table.evenly.ravel()
+    rows[:, 2, :3], rows[:, 3, :3] = surface[:, 7:10], surface[:, 10:13]
+    rows[:, 4:WAVE_ROW] = _horizon_rows(table.mean, table.sharpness)
+    # (blocks, H / TOGETHER, 2 TOGETHER, BLOCK_NODES): cosines and sines of one wave follow each other.
+    of_waves = table.wave_nodes.reshape(-1, waves // TOGETHER, 2 * TOGETHER, BLOCK_NODES)
+    rows[:, ends[0] : ends[1]] = of_waves.transpose(0, 3, 1, 2).reshape(count, -1, 4)
+    if behind:
+        rows[:, ends[1] : ends[2]] = _horizon_rows(table.behind_mean, table.behind_sharpness)
+    falls = table.falls.reshape(curvatures * AZIMUTHS, count)
+    rows[:, ends[2] :] = falls.T.reshape(count, -1, 4)
+    return rows
+
+
+def _horizon_rows(mean: Float32, sharpness: Float32) -> Float32:
+    """Return horizons, (AZIMUTHS, B, BLOCK_NODES), as rows of nodes, (nodes, AZIMUTHS / 2, 4)."""
+    pairs = np.stack([mean.reshape(AZIMUTHS, -1), sharpness.reshape(AZIMUTHS, -1)], axis=-1)
+    return pairs.transpose(1, 0, 2).reshape(pairs.shape[1], -1, 4)
+
+
+def _groups(table: Table) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Return the groups with their lists of cells, (G, 7), and these cells, (cells, 2)."""
+    ends = int(table.repeat[0])
+    starts = table.group_starts.astype(np.int64)
+    of_cell = np.repeat(np.arange(len(starts) - 1), starts[1:] - starts[:-1])
+    order = np.argsort(table.cell_groups, kind="stable")
+    counts = np.bincount(table.cell_groups, minlength=len(table.groups))
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    cells = np.stack([of_cell[order] % ends, of_cell[order] // ends], axis=1)
+    return np.column_stack([table.groups, first, counts]).astype(np.int32), cells.astype(np.int32)
+
+
+def _rules() -> tuple[Float32, Float32, Float32]:
+    """Return places and weights of the rules of Gauss and Legendre, (7, 8), and the rule of Hermite, (2, 4)."""
+    own = vars(footprint_nodes)
+    count = footprint_nodes.HERMITE
+    hermite = np.stack([own["_HERMITE_PLACES"][:count], own["_HERMITE_WEIGHTS"][:count]])
+    return own["_GAUSS_PLACES"], own["_GAUSS_WEIGHTS"], hermite

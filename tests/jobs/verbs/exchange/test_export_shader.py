@@ -1,0 +1,112 @@
+"""`twillight export --shader` on the command line: what it writes without a compiler, and what it refuses."""
+
+import json
+import shutil
+
+import pytest
+
+from jobs.cli import main
+from pipeline.models.card import write_model
+from pipeline.models.woven.options import WovenOptions
+from pipeline.shader import export_shader as verb
+from pipeline.shader import languages, soft_nodes, tables
+from tests.pipeline.shader.test_networks import CLOTH, neumip_folder
+from weaves.fabric import load_fabric
+
+
+@pytest.fixture
+def twillight(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*tokens):
+        code = main(["export", *tokens])
+        return code, capsys.readouterr()
+
+    return call
+
+
+def test_the_source_needs_no_compiler(twillight, monkeypatch, tmp_path):
+    monkeypatch.setattr(languages, "find_spec", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    code, said = twillight("gingham", "--shader", "out", "--level", "1")
+    assert code == 0 and "slang; level 1" in said.out
+    assert json.loads((tmp_path / "out" / "soft_nodes.json").read_text())["languages"] == {}
+    code, said = twillight("gingham", "--shader", "out", "--language", "wgsl")
+    assert code == 2 and said.err.count("\n") == 1
+    assert "slangc is needed: pip install --no-deps slangtorch" in said.err
+
+
+@pytest.mark.parametrize(
+    ("tokens", "allowed"),
+    [
+        (("--shader", "x", "--language", "basic"), "must be one of slang, cpp, cuda, glsl"),
+        (("--shader", "x", "--kind", "wet"), "must be one of behind, curvature, all"),
+        (("--shader", "x", "--level", "3"), "must be one of 1, 2, 4, 8"),
+        (("--wif", "x.wif", "--level", "2"), "is not for --wif"),
+        (("--mesh", "x.ply", "--language", "cpp"), "is not for --mesh"),
+        (("--maps", "x", "--kind", "all"), "is not for --maps"),
+        (("--mesh", "x.ply", "--shader", "x"), "one of --mesh, --wif, --maps and --shader is needed"),
+    ],
+)
+def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, allowed):
+    code, said = twillight("gingham", *tokens)
+    assert code == 2 and said.err.count("\n") == 1 and allowed in said.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, tmp_path):
+    code, said = twillight("crepe", "--shader", "x", "--level", "8")
+    assert code == 2 and "1,856 nodes" in said.err and "at most 1,024; choose a lower --level" in said.err
+    monkeypatch.setattr(tables, "MOST_HEIGHT", 16)
+    code, said = twillight("gingham", "--shader", "x")
+    assert code == 2 and "horizons" in said.err
+    monkeypatch.setattr(tables, "MOST_CELLS", 3)
+    monkeypatch.setattr(soft_nodes, "tabulate_sides", None)  # cells are counted before any work
+    code, said = twillight("gingham", "--shader", "x")
+    assert code == 2 and "at most 3 cells" in said.err and not list(tmp_path.iterdir())
+
+
+def refused(twillight, *tokens):
+    """Return the one sentence of a refusal."""
+    code, said = twillight(*tokens)
+    assert code == 2 and said.err.count("\n") == 1
+    return said.err
+
+
+def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, tmp_path):
+    neumip = neumip_folder(tmp_path / "neumip", load_fabric(CLOTH), texels_per_yarn=2)
+    shader = ("--shader", "x", "--model")
+    assert "did you mean 'selvage'" in refused(twillight, CLOTH, *shader, "selvag")
+    assert "was not trained on denim" in refused(twillight, "denim", *shader, neumip)
+    old = neumip_folder(tmp_path / "old", load_fabric(CLOTH), version=99, texels_per_yarn=2)
+    assert "version = 99" in refused(twillight, CLOTH, *shader, old)
+    damaged = neumip_folder(tmp_path / "damaged", load_fabric(CLOTH), texels_per_yarn=2)
+    (tmp_path / "damaged" / "model.safetensors").write_bytes(b"\0")
+    assert "damaged" in refused(twillight, CLOTH, *shader, damaged)
+    assert "trained with level 2" in refused(twillight, CLOTH, *shader, "selvage", "--level", "4")
+    assert "has no soft nodes" in refused(twillight, CLOTH, *shader, neumip, "--level", "4")
+    assert "soft_nodes has no network" in refused(twillight, CLOTH, "--shader", "x", "--language", "onnx")
+    assert "is not for --mesh" in refused(twillight, CLOTH, "--mesh", "x.ply", "--model", "selvage")
+    write_model(tmp_path / "woven", b"", {"options": WovenOptions().model_dump(mode="json"), "version": {"model": 1}})
+    refused(twillight, CLOTH, *shader, str(tmp_path / "woven"))
+    assert not (tmp_path / "x").exists()
+
+
+def test_other_models_have_no_shader(twillight, monkeypatch):
+    monkeypatch.setattr(verb, "shader_of", verb.shader_of)
+    monkeypatch.setattr("pipeline.shader.models.covering_model", lambda *_: object())
+    assert "has no shader; soft_nodes, selvage and" in refused(twillight, CLOTH, "--shader", "x", "--model", "woven")
+
+
+def test_missing_packages_are_named(twillight, monkeypatch):
+    monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
+    said = refused(twillight, CLOTH, "--shader", "x", "--model", "selvage", "--language", "onnx")
+    assert "not installed: onnxscript" in said
+
+
+def test_a_fabric_unlike_the_training_is_named(twillight, tmp_path):
+    code, said = twillight("gauze", "--shader", "out", "--model", "selvage")
+    assert code == 0 and "gauze is not like its training: optical_thickness = 2.5" in said.out
+    network = json.loads((tmp_path / "out" / "selvage.json").read_text())["network"]
+    assert network["outside"] == "optical_thickness = 2.5" and network["trained_on"]["optical_thickness"] == [2.0, 2.0]

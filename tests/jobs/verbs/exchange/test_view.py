@@ -1,0 +1,38 @@
+"""`twillight view` on the command line."""
+
+import pytest
+
+from jobs.cli import main
+from reports.viewer import view
+from tests.reports.viewer.conftest import find
+
+
+@pytest.mark.parametrize(
+    ("tokens", "allowed"),
+    [
+        (("--out", "x.htm"), "a path that ends in .html is needed"),
+        (("--out", "x.html", "--truth", "5"), "must be from 8 to 512, or 0 for none"),
+        (("--out", "x.html", "--truth", "-1"), "must be from 8 to 512, or 0 for none"),
+    ],
+)
+def test_bad_input_is_one_sentence(capsys, monkeypatch, tmp_path, tokens, allowed):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["view", "gingham", *tokens]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and allowed in said and not list(tmp_path.iterdir())
+
+
+def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(view, "MOST_CELLS", 3)
+    monkeypatch.setattr(view, "content", None)
+    assert main(["view", "gingham", "--out", str(tmp_path / "x.html")]) == 2
+    assert "at most 3 cells" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_a_page_is_written_whole(capsys, monkeypatch, tmp_path):
+    found = find(0, (2,), (1.0,), 32)
+    monkeypatch.setattr(view, "content", lambda fabric, truth: found)
+    assert main(["view", "gingham", "--out", str(tmp_path / "a" / "x.html")]) == 0
+    assert "5 views" in capsys.readouterr().out
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]

@@ -1,0 +1,64 @@
+"""The file that `twillight view` writes, its parts, and the sentences for what cannot be shown."""
+
+import fnmatch
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipeline.shader.languages import slangc
+from reports.viewer import view
+from reports.viewer.content import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, widths
+from reports.viewer.generate import SHADER, mark, shader, sources
+from reports.viewer.view import whole_page
+from tests.reports.viewer.conftest import opened, write
+from tests.reports.viewer.test_viewer import assert_equal, components, expected
+from weaves.fabric import load_fabric, preset_names
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_the_shader_is_made_of_its_source():
+    assert mark(sources()) in SHADER.read_text(encoding="utf-8"), "run `make viewer-shader`"
+
+
+def test_slangc_makes_the_shader_again():
+    if slangc() is None:
+        pytest.skip("slangc is not installed")
+    assert shader(sources()) == SHADER.read_text(encoding="utf-8"), "run `make viewer-shader`"
+
+
+def test_an_installed_package_has_all_files_of_the_page():
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["reports"]
+    folder = Path(view.__file__).parent
+    files = [path.relative_to(ROOT / "reports") for path in folder.iterdir() if path.is_file() and path.suffix != ".py"]
+    assert len(files) >= 7
+    assert [path for path in files if not any(fnmatch.fnmatch(str(path), pattern) for pattern in patterns)] == []
+
+
+def test_the_page_is_one_file_without_addresses(small):
+    text = whole_page(small)
+    assert "{{" not in re.sub(r"<script.*?</script>", "", text, flags=re.S)
+    assert not re.search(r"https?://", text) and "default-src 'none'" in text
+    content = json.loads(re.search(r'id="content">(.*?)</script>', text, re.S)[1])
+    assert content["fabric"] == "gingham" and len(content["views"]) == 5
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_factors_keep_yarns_within_their_ranges(name):
+    fabric = load_fabric(name)
+    assert bends(fabric) in ((1.0,), BENDS[:2], BENDS) and widths(fabric) in (WIDTHS, NARROWER)
+    for bend in bends(fabric):
+        for width in widths(fabric):
+            for yarn in (bent(fabric, bend, width).warp, bent(fabric, bend, width).weft):
+                type(yarn).model_validate(yarn.model_dump())
+
+
+def test_a_page_draws_what_python_does(small, tmp_path):
+    """The one test of the browser that is not slow."""
+    with opened(write(small, tmp_path), tmp_path / "profile") as page:
+        page.run("viewer.go(3)")
+        assert_equal(components(page, 2), expected(load_fabric("gingham"), VIEWS["Sphere"], 2))
+        assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)
