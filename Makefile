@@ -57,7 +57,7 @@ test-slow: $(READY)
 faults: $(READY)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
 
-# The shader of `twillight view`, after a change of its source in Slang; needs slangc.
+# The shaders of `twillight view`, after a change of their source in Slang or of the pretrained network; needs slangc.
 viewer-shader: $(READY)
 	$(BIN)/python -m reports.viewer.generate
 

@@ -39,5 +39,8 @@ BENCH: Final = 5
 SCENE_BENCH: Final = 4
 """Measurements in scenes and the files they write (`reports.measure.scene`)."""
 
+VIEWER: Final = 1
+"""The page of a live fabric: its shaders, scripts and views (`reports.viewer`)."""
+
 EXTREMES: Final = 1
 """Measurements at extremes (`reports.measure.extremes`)."""

@@ -14,6 +14,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.error_network import SLOPE
 from pipeline.models.selvage.model import LARGEST, Selvage
+from pipeline.shader import descriptor as said
 from pipeline.shader.descriptor import Network, descriptor
 from pipeline.shader.golden import golden, read_sides
 from pipeline.shader.shader import Shader
@@ -23,7 +24,6 @@ from pipeline.shader.soft_nodes import refuse_large_repeat, size_of, table_files
 from pipeline.shader.tables import constants_slang, layout_slang, tables
 from pipeline.shader.training_domain import trained_ranges, why_outside
 from pipeline.shader.weights import Weights, quads
-from pipeline.truth.geometry.heightfield import SIN_TWIST
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -85,24 +85,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
         raise BadInput("export", "--level", level, f"leave it out: {method.name} was trained with level {trained}")
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, trained, kinds)
-    found, weights, layers = tables(sides), Weights(), method.layers(fabric)
-    twists = np.arcsin(np.clip(sides.front.yarn[:, SIN_TWIST], -1.0, 1.0))
-    weights.add("twists", twists[None], "twists of warp and weft, radians")
-    first = weights.count
-    described = weights.add_perceptron("correction", layers, f"leaky ReLU of slope {SLOPE}", "2 / (1 + exp(-x))")
-    own = vars(features)
-    network = {
-        "FEATURE_QUADS": quads(OF_QUERY),
-        "WIDTH_QUADS": quads(method.options.width),
-        "HIDDEN_LAYERS": len(layers) - 1,
-        "FIRST_LAYER": first,
-        "SLOPE": SLOPE,
-        "LARGEST": LARGEST,
-        "BOUNDED": method.bound,
-        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
-        "ALMOST_HIDDEN": float(own["_HIDDEN"]),
-    }
-    said = descriptor(fabric, trained, found, kinds)
+    found, (weights, described, network) = tables(sides), correction(method, fabric)
+    about_tables = descriptor(fabric, trained, found, kinds)
     about = Network(
         name=method.name,
         trained_on=trained_ranges(method.domain),
@@ -119,16 +103,38 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
     return Shader(
         NAME,
         SOURCES,
-        {"layout.slang": layout_slang(found), "network.slang": constants_slang(network, "pipeline.models.selvage")},
+        {"layout.slang": layout_slang(found), "network.slang": network},
         table_files(found) | weights.files(),
-        said.model_copy(
-            update={"model": NAME, "network": about, "buffers": {**said.buffers, "weights": weights.buffer()}}
+        about_tables.model_copy(
+            update={"model": NAME, "network": about, "buffers": {**about_tables.buffers, "weights": weights.buffer()}}
         ),
         golden(sides, partial(_answers, method, fabric, sides)),
         size_of(trained, sides),
         True,
         partial(as_onnx, method, fabric, tuple(about.onnx)),
     )
+
+
+def correction(method: Selvage, fabric: Fabric) -> tuple[Weights, list[said.Layer], str]:
+    """Return the weights of the network for a fabric, what they are, and `network.slang`, equal for all fabrics."""
+    weights, layers = Weights(), method.layers(fabric)
+    twists = np.radians([[yarn.twist for yarn in (fabric.warp, fabric.weft)]]).astype(np.float32)
+    weights.add("twists", twists, "twists of warp and weft, radians")
+    first = weights.count
+    described = weights.add_perceptron("correction", layers, f"leaky ReLU of slope {SLOPE}", "2 / (1 + exp(-x))")
+    own = vars(features)
+    constants = {
+        "FEATURE_QUADS": quads(OF_QUERY),
+        "WIDTH_QUADS": quads(method.options.width),
+        "HIDDEN_LAYERS": len(layers) - 1,
+        "FIRST_LAYER": first,
+        "SLOPE": SLOPE,
+        "LARGEST": LARGEST,
+        "BOUNDED": method.bound,
+        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
+        "ALMOST_HIDDEN": float(own["_HIDDEN"]),
+    }
+    return weights, described, constants_slang(constants, "pipeline.models.selvage")
 
 
 def _answers(method: Selvage, fabric: Fabric, sides: Sides, queries: Queries) -> Float32:

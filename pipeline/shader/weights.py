@@ -82,13 +82,17 @@ class Weights:
             arrays=self.places,
         )
 
+    @property
+    def values(self) -> Float32:
+        """All numbers of the buffer."""
+        return np.concatenate(self._parts)
+
     def files(self) -> dict[str, bytes]:
         """Return its files, by their paths; BadInput for more than MOST_ELEMENTS."""
         if self.count > MOST_ELEMENTS:
             allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
             raise BadInput("export", "--shader", f"{self.count:,} elements", allowed)
-        values = np.concatenate(self._parts)
         return {
-            "tables/weights.f32": values.astype("<f4").tobytes(),
-            "tables/weights.f16": values.astype("<f2").tobytes(),
+            "tables/weights.f32": self.values.astype("<f4").tobytes(),
+            "tables/weights.f16": self.values.astype("<f2").tobytes(),
         }

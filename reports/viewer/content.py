@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -19,9 +20,13 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, Table, tabulate
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
+from pipeline.models.registry import load_model, model_folder
+from pipeline.models.selvage.model import Selvage
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES
+from pipeline.shader.selvage import NAME as SELVAGE
+from pipeline.shader.selvage import correction
 from pipeline.shader.sides import Sides, tabulate_sides
 from pipeline.shader.tables import Tables, tables
 from pipeline.truth.estimator import estimate
@@ -51,7 +56,7 @@ VIEWS: Final = {
 }
 """Views of the page, each with a picture of the truth."""
 
-TILES: Final = ("selvage", "map_material")
+TILES: Final = ("map_material",)
 """Methods that the page has as pictures at its views, beside the truth."""
 
 STILL: Final = "Drape"
@@ -115,6 +120,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "columns": {"sin": SIN_TWIST, "cos": COS_TWIST, "roughness": ALPHA, "relief": BETA, "blend": BLEND},
         "gap": GAP,
         "tables": found,
+        "selvage": _selvage(fabric, found),
         "grids": grids,
         "tiles": [*methods, TRUTH] if truth else [],
         "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
@@ -196,6 +202,16 @@ def _families(table: Table, found: Tables) -> npt.NDArray[np.uint8]:
 
 def _yarn(yarn: Yarn) -> dict[str, float]:
     return {"roughness": yarn.roughness, "twist": yarn.twist, "blend": yarn.blend}
+
+
+def _selvage(fabric: Fabric, found: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """Return the weights of the network for the fabric; None if the page lacks the table that it corrects."""
+    (method,) = load_model(model_folder(SELVAGE, "view", ""))
+    assert isinstance(method, Selvage)
+    level = method.options.level
+    if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in found):
+        return None
+    return {"level": level, "weights": packed(correction(method, fabric)[0].values)}
 
 
 def _methods(fabric: Fabric) -> dict[str, Method]:

@@ -14,7 +14,7 @@ const LIMITS = { plane: { tilt: [2, 89], turn: [-180, 180] }, sphere: { tilt: [-
   drape: { tilt: [-35, 60], turn: [-75, 75] } };
 const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60, 60, 1, "°"],
   blend: ["Normal’s weight", 0, 1, 0.01, ""] };
-const TILES = { truth: "Truth", selvage: "Selvage", map_material: "Map material" };
+const TILES = { truth: "Truth", map_material: "Map material" };
 const FRAME = 1000 / 30;
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
@@ -69,12 +69,18 @@ class Viewer {
     return this.draw(dragging);
   }
 
-  // Tiles, as the truth's, show the views of the page with the yarns as they are in the fabric; colours may be others.
-  get tiled() {
+  // Whether the yarns are as they are in the fabric, but for their colours.
+  get own() {
     const { state, content } = this;
     const same = (family) => Object.keys(YARN).every((name) => state[family][name] === content[family][name]);
-    return state.view !== null && content.views[state.view].size > 0 && content.bends[state.bend] === 1
-      && content.widths[state.width] === 1 && state.thickness === content.thickness && same("warp") && same("weft");
+    return content.bends[state.bend] === 1 && content.widths[state.width] === 1
+      && state.thickness === content.thickness && same("warp") && same("weft");
+  }
+
+  // Tiles, as the truth's, show the views of the page with the fabric's own yarns.
+  get tiled() {
+    const { state, content } = this;
+    return state.view !== null && content.views[state.view].size > 0 && this.own;
   }
 
   // The method of a name as it can be drawn in this state, and its label.
@@ -83,8 +89,9 @@ class Viewer {
     if (name in TILES && this.tiled) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
+    if (name === "selvage" && this.own) return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
     if (name === "point") return { kind: POINT, level: this.usual, label: "One point" };
-    const wished = name === "truth" ? Math.max(...this.levels) : Number(name);
+    const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
     return { kind: NODES, level, label: `Soft nodes, k = ${level}` };
   }
@@ -187,8 +194,9 @@ class Viewer {
     ["left", "right"].forEach((side, index) => { byId(`label-${side}`).textContent = methods[index].label; });
     const lacking = this.tiled ? [] : [state.left, state.right].filter((name) => name in TILES);
     const names = [...new Set(lacking.map((name) => TILES[name]))].join(" and ");
-    byId("notice").textContent = names
-      ? `${names}: known at the five views alone, of the yarns as they are. Soft nodes are shown instead.` : "";
+    const said = names ? [`${names}: known at the five views alone, of the yarns as they are.`] : [];
+    if ([state.left, state.right].includes("selvage") && !this.own) said.push("Selvage: known of the yarns as they are.");
+    byId("notice").textContent = said.length ? `${said.join(" ")} Soft nodes are shown instead.` : "";
     byId("line").style.left = `${100 * state.wipe}%`;
     const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
     byId("footprint").textContent = `${rounded(size)} yarns, in the middle`;
@@ -343,6 +351,7 @@ function makeChoices(viewer, bind) {
     bind.updates.push((state) => { input.checked = state.shape === input.value; });
   }
   const names = [["point", "One point"], ...viewer.levels.map((level) => [String(level), `Soft nodes, k = ${level}`])];
+  if (viewer.content.selvage) names.push(["selvage", "Selvage"]);
   names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
     names.forEach(([name, text]) => byId(side).add(new Option(text, name)));
@@ -441,7 +450,7 @@ function listen(viewer) {
 
 async function start() {
   try {
-    const viewer = new Viewer(JSON.parse(byId("content").textContent), byId("shader").textContent);
+    const viewer = new Viewer(JSON.parse(byId("content").textContent), { nodes: byId("shader").textContent, selvage: byId("selvage").textContent });
     const updates = [];
     const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes(), true));
     const bind = { updates, input };

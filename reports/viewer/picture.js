@@ -6,6 +6,7 @@ const SHAPES = ["plane", "sphere", "drape"];
 const NODES = 0;
 const POINT = 1;
 const TILE = 2;
+const SELVAGE = 3;
 
 function direction(turn, tilt) {
   const [a, b] = [radians(turn), radians(tilt)];
@@ -13,8 +14,11 @@ function direction(turn, tilt) {
 }
 
 class Picture {
-  constructor(canvas, source, content) {
+  // `sources`: a shader that draws nodes, points and tiles, and one that draws `selvage`.
+  constructor(canvas, sources, content) {
     this.content = content;
+    this.sources = sources;
+    this.programs = new Map();
     this.opened = new Map();
     this.tiles = new Map();
     const options = { alpha: true, antialias: false, depth: false, preserveDrawingBuffer: true };
@@ -22,6 +26,22 @@ class Picture {
     if (!gl) throw new Error("This browser has no WebGL 2.");
     this.gl = gl;
     this.floats = gl.getExtension("EXT_color_buffer_float") !== null;
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
+    this.target = gl.createFramebuffer();
+    this.empty = this.texture("tile", new Uint16Array(4), 1);
+    this.use(NODES);
+  }
+
+  // Draw by the program of a kind of method; it is compiled when it is first needed.
+  use(kind) {
+    const { gl } = this;
+    const name = kind === SELVAGE ? "selvage" : "nodes";
+    if (!this.programs.has(name)) this.programs.set(name, this.compiled(this.sources[name]));
+    gl.useProgram(this.programs.get(name));
+  }
+
+  compiled(source) {
+    const { gl } = this;
     const program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, CORNERS], [gl.FRAGMENT_SHADER, source]]) {
       const shader = gl.createShader(kind);
@@ -34,13 +54,11 @@ class Picture {
       throw new Error(`The shader does not compile here. ${gl.getProgramInfoLog(program) || ""}`);
     }
     gl.useProgram(program);
-    ["integers", "numbers", "nodes", "grid", "tile"].forEach((name, unit) => {
+    ["integers", "numbers", "nodes", "grid", "tile", "weights"].forEach((name, unit) => {
       gl.uniform1i(gl.getUniformLocation(program, `${name}_0`), unit);
     });
-    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
     gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "block_View_0"), 0);
-    this.target = gl.createFramebuffer();
-    this.empty = this.texture("tile", new Uint16Array(4), 1);
+    return program;
   }
 
   // A texture of `width` texels a row, the last row filled up.
@@ -50,6 +68,7 @@ class Picture {
       integers: [gl.R32I, gl.RED_INTEGER, gl.INT, 1],
       numbers: [gl.R32F, gl.RED, gl.FLOAT, 1],
       nodes: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4],
+      weights: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4],
       grid: [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, 1],
       tile: [gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT, 4],
     }[name];
@@ -109,7 +128,11 @@ class Picture {
         cloth.nodes = this.texture("nodes", turnedNodes(cloth.table, columns, yarns));
         cloth.edit = edit;
       }
-      ready.push({ ...method, cloth, texture: tile });
+      if (method.kind === SELVAGE) {
+        this.weights ??= unpacked(this.content.selvage.weights, Float32Array).then((f) => this.texture("weights", f));
+      }
+      const weights = method.kind === SELVAGE ? await this.weights : this.empty;
+      ready.push({ ...method, cloth, texture: tile, weights });
     }
     return ready;
   }
@@ -149,15 +172,17 @@ class Picture {
     const [width, height] = size;
     gl.viewport(0, 0, width, height);
     gl.enable(gl.SCISSOR_TEST);
-    ready.forEach(({ kind, cloth, texture: tile }, side) => {
+    ready.forEach(({ kind, cloth, texture: tile, weights }, side) => {
       const [low, high] = ready.length === 1 ? [0, width] : side === 0 ? [0, wipe] : [wipe, width];
       if (high <= low) return;
       gl.scissor(low, rows[0], high - low, rows[1] - rows[0]);
-      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, tile].forEach((texture, unit) => {
+      this.use(kind);
+      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, tile, weights].forEach((texture, unit) => {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, texture);
       });
-      gl.bufferData(gl.UNIFORM_BUFFER, this.view(state, kind, width, height, components), gl.DYNAMIC_DRAW);
+      const drawn = kind === SELVAGE ? NODES : kind; // its program has no other
+      gl.bufferData(gl.UNIFORM_BUFFER, this.view(state, drawn, width, height, components), gl.DYNAMIC_DRAW);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.SCISSOR_TEST);

@@ -10,7 +10,7 @@ from typing import Final
 from pipeline.atomic import atomic_write
 from pipeline.shader.limits import MOST_CELLS
 from reports.viewer.content import content
-from reports.viewer.generate import SHADER
+from reports.viewer.generate import SHADERS
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -60,7 +60,8 @@ def whole_page(found: dict[str, object]) -> str:
         "FABRIC": html.escape(str(found["fabric"]).replace("_", " ")),
         "STILL": str(found["still"]),
         "STYLE": _text("page.css"),
-        "SHADER": SHADER.read_text(encoding="utf-8"),
+        "SHADER": SHADERS["cloth"].read_text(encoding="utf-8"),
+        "SELVAGE": SHADERS["selvage"].read_text(encoding="utf-8"),
         # No content can end the element.
         "CONTENT": json.dumps({key: value for key, value in found.items() if key != "still"}).replace("<", "\\u003c"),
         "SCRIPT": "\n".join(_text(name) for name in SCRIPTS),

@@ -29,7 +29,13 @@ def test_answers_of_the_fallback_have_a_version_of_their_own(files, monkeypatch)
     assert expected < set(changed) and "point_sampled on denim" not in changed
 
 
+def test_a_live_page_has_the_version_of_its_scripts(files, monkeypatch):
+    path = files.exchange("frames = 4", 'frames = 4\nlive = { fabrics = ["denim"] }').write()
+    assert changed_by("VIEWER", path, monkeypatch)[0] == "live page of denim"
+
+
 @pytest.mark.parametrize("version", [name for name in vars(versions) if name.isupper() and name != "MODELS"])
 def test_every_version_changes_some_identity(files, monkeypatch, version):
-    path = files.exchange("frames = 4", 'frames = 4\nbounds = true\nscenes = { names = ["sphere"] }').write()
+    more = 'bounds = true\nlive = { fabrics = ["denim"] }\nscenes = { names = ["sphere"] }'
+    path = files.exchange("frames = 4", f"frames = 4\n{more}").write()
     assert changed_by(version, path, monkeypatch)

@@ -11,23 +11,25 @@ import pytest
 from pipeline.shader.languages import slangc
 from reports.viewer import view
 from reports.viewer.content import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, widths
-from reports.viewer.generate import SHADER, mark, shader, sources
+from reports.viewer.generate import SHADERS, mark, shader, sources
 from reports.viewer.view import whole_page
 from tests.reports.viewer.conftest import opened, write
-from tests.reports.viewer.test_viewer import assert_equal, components, expected
+from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
 from weaves.fabric import load_fabric, preset_names
 
 ROOT = Path(__file__).parents[3]
 
 
-def test_the_shader_is_made_of_its_source():
-    assert mark(sources()) in SHADER.read_text(encoding="utf-8"), "run `make viewer-shader`"
+@pytest.mark.parametrize("name", SHADERS)
+def test_the_shaders_are_made_of_their_source(name):
+    assert mark(sources()) in SHADERS[name].read_text(encoding="utf-8"), "run `make viewer-shader`"
 
 
-def test_slangc_makes_the_shader_again():
+@pytest.mark.parametrize("name", SHADERS)
+def test_slangc_makes_the_shaders_again(name):
     if slangc() is None:
         pytest.skip("slangc is not installed")
-    assert shader(sources()) == SHADER.read_text(encoding="utf-8"), "run `make viewer-shader`"
+    assert shader(name, sources()) == SHADERS[name].read_text(encoding="utf-8"), "run `make viewer-shader`"
 
 
 def test_an_installed_package_has_all_files_of_the_page():
@@ -60,5 +62,7 @@ def test_a_page_draws_what_python_does(small, tmp_path):
     """The one test of the browser that is not slow."""
     with opened(write(small, tmp_path), tmp_path / "profile") as page:
         page.run("viewer.go(3)")
-        assert_equal(components(page, 2), expected(load_fabric("gingham"), VIEWS["Sphere"], 2))
+        cloth = load_fabric("gingham")
+        assert_equal(components(page, 2), expected(cloth, VIEWS["Sphere"], 2))
+        assert_equal(components(page, "selvage"), expected_of("selvage", cloth, VIEWS["Sphere"]))
         assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)

@@ -27,11 +27,20 @@ def components(page, method, state="viewer.state"):
 
 
 def expected(fabric, camera, level):
-    """Return the components of Python, (SIZE, SIZE, 4), as the page draws them."""
+    """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them."""
+    return whole(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
+
+
+def expected_of(name, fabric, camera):
+    """Return the components of a method in Python, (SIZE, SIZE, 4), as the page draws them."""
+    return whole(camera, lambda queries: named_method(name, "test", "method").predict(fabric, queries))
+
+
+def whole(camera, answer):
     picture = seen(camera, SIZE, ENDS)
-    whole = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
-    whole[picture.lit] = read_queries(tabulate(fabric, level=level), picture.queries).components
-    return whole
+    found = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
+    found[picture.lit] = answer(picture.queries)
+    return found
 
 
 def assert_equal(found, wanted):
@@ -59,6 +68,17 @@ def test_pictures_equal_python(fresh, name, level, pixel):
     found, wanted = components(fresh, level), expected(CLOTH, VIEWS[name], level)
     assert_equal(found, wanted)
     assert wanted[pixel].min() > 0.0 and np.abs(found - wanted)[pixel].max() < 5e-5 * wanted.max()
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_selvage_equals_python_where_the_yarns_are_those_of_the_fabric(fresh, name):
+    fresh.run(f"viewer.go({list(VIEWS).index(name)}), viewer.set({{ left: 'selvage', right: '2' }})")
+    assert fresh.run("viewer.methods[0].label") == "Selvage"
+    assert_equal(components(fresh, "selvage"), expected_of("selvage", CLOTH, VIEWS[name]))
+    fresh.run("viewer.set({ thickness: 5 }).then(() => viewer.drawn)")
+    assert fresh.run("viewer.methods[0].label") == "Soft nodes, k = 2"
+    said = fresh.run("document.getElementById('notice').textContent")
+    assert said == "Selvage: known of the yarns as they are. Soft nodes are shown instead."
 
 
 @pytest.mark.parametrize("family", ["warp", "weft"])

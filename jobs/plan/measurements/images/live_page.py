@@ -69,9 +69,9 @@ class LivePage(Measurement):
         return _TABLES_BYTES + _BYTES_A_PIXEL * self.pixels**2
 
     def versions(self) -> dict[str, int]:
-        """Return the versions of the truth, of the models that it shows, and of the benchmark."""
+        """Return the versions of the truth, of the models that it shows, and of the page."""
         shown = ("soft_nodes", "selvage", "map_material")
-        return {"truth": versions.TRUTH, "bench": versions.BENCH} | {
+        return {"truth": versions.TRUTH, "viewer": versions.VIEWER} | {
             name: versions.MODELS.get(name, 1) for name in shown
         }
 
