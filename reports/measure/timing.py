@@ -25,7 +25,7 @@ from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]
 
-LONGEST: Final = 0.05
+LONGEST: Final = 0.25
 """Seconds that one timed call of a method, over all its fabrics, should not exceed by much."""
 
 FEWEST: Final = 16
