@@ -176,7 +176,7 @@ class Viewer {
   }
 
   tell(spent, [width, height]) {
-    const rate = 1000 / spent;
+    const rate = 1000 / Math.max(spent, 0.1); // clocks may be coarse
     byId("speed").textContent = `${rounded(rate, rate < 10 ? 2 : 3)} frames/s at ${width} × ${height}`;
   }
 

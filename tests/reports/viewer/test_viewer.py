@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.named import named_method
+from pipeline.models.named import named_method, own_method
 from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -32,8 +32,8 @@ def expected(fabric, camera, level):
 
 
 def expected_of(name, fabric, camera):
-    """Return the components of a method in Python, (SIZE, SIZE, 4), as the page draws them."""
-    return whole(camera, lambda queries: named_method(name, "test", "method").predict(fabric, queries))
+    """Return the components of a method in Python, (SIZE, SIZE, 4): outside its training too, as a shader."""
+    return whole(camera, lambda queries: own_method(name, "test", "method").predict(fabric, queries))
 
 
 def whole(camera, answer):
