@@ -64,6 +64,7 @@ viewer-shader: $(READY)
 # The pictures of the pages in docs, made by the commands on these pages; a test checks that they are current.
 pictures: $(READY)
 	TWILLIGHT_WRITE_PICTURES=1 $(BIN)/pytest -q tests/test_task_pages.py tests/test_twillight_mitsuba.py
+	$(BIN)/python docs/pictures/cover.py
 
 lint: $(READY)
 	$(BIN)/ruff check

@@ -5,6 +5,7 @@ With TWILLIGHT_WRITE_PICTURES=1 (`make pictures`) the picture is written to `doc
 
 import os
 import re
+import runpy
 import shutil
 from pathlib import Path
 
@@ -58,6 +59,22 @@ def test_the_example_with_small_pixels(example):
     picture = example(size=('"width": 384, "height": 256', '"width": 12, "height": 8'), samples=("spp=64", "spp=1"))
     assert picture.shape == (8, 12, 3) and 0.2 < picture.mean() < 0.9
     assert picture.std() > 0.05
+
+
+@pytest.mark.slow
+def test_the_cover_shows_cloth_with_light_behind_it():
+    """Twelve columns of pixels: the organza in the middle is brighter than the tartan beside it."""
+    import mitsuba as mi
+
+    before = mi.variant()
+    mitsuba()
+    try:
+        scene = runpy.run_path(str(ROOT / "docs" / "pictures" / "cover.py"))["scene"](12, 5)
+        picture = np.asarray(mi.render(scene, spp=16), float)
+    finally:
+        if before is not None:
+            mi.set_variant(before)
+    assert np.isfinite(picture).all() and picture[1:4, 5:7].mean() > 1.5 * picture[1:4, 2:4].mean()
 
 
 def test_the_page_has_every_property():
