@@ -41,15 +41,15 @@ def scene(width: int, height: int) -> Any:
                 "sun_direction": [-0.35, 1.0, 0.3],
                 "turbidity": 3.0,
                 "sun_scale": 0.0,
-                "sky_scale": 4.0,
+                "sky_scale": 2.5,
             },
             "behind": window([-3.0, 6.0, 6.2], 4.0, [10.0, 8.2, 6.0]),
             "front": window([3.5, -6.0, 3.5], 1.6, [2.2, 2.4, 2.6]),
             **{name: hanging(name, *place) for name, place in HANGING.items()},
             "floor": {
                 "type": "rectangle",
-                "to_world": T().translate([0, 0, -0.8]).scale(60),
-                "cloth": {"type": "twillight", "fabric": "herringbone", "yarns": 4000.0, "turn": 30.0},
+                "to_world": T().translate([0, 0, -0.8]).scale(3000),
+                "cloth": {"type": "twillight", "fabric": "herringbone", "yarns": 200_000.0, "turn": 30.0},
             },
             "camera": {
                 "type": "perspective",
