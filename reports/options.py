@@ -230,12 +230,17 @@ class RunOptions(_Options):
     """Measure every network that estimates its errors (`selvage`) at these wished relative errors too."""
 
 
+LEAST_TILE: Final = 8
+MOST_TILE: Final = 512
+"""Fewest and most pixels along each side of a picture of the truth on a live page."""
+
+
 class LiveOptions(_Options):
     """Live pages of fabrics, as `twillight view` writes them."""
 
     fabrics: tuple[str, ...] = ()
     """Measured fabrics that the page of the recipe shows live."""
-    pixels: int = Field(default=96, ge=8, le=512)
+    pixels: int = Field(default=96, ge=LEAST_TILE, le=MOST_TILE)
     """Along each side of their pictures of the truth and of other methods."""
 
 

@@ -1,6 +1,6 @@
-"""Render the picture of README.md, reports/cover.png: hanging cloth with light behind it, path-traced in Mitsuba.
+"""Render the picture of README.md, reports/cover.jpg: hanging cloth with light behind it, path-traced in Mitsuba.
 
-    make list && .venv/bin/python docs/pictures/cover.py      # needs LLVM, takes some ten minutes
+    make list && .venv/bin/python docs/pictures/cover.py      # needs LLVM, takes a quarter of an hour
 
 Tartan and charmeuse let little light through; organza lets it through its yarns and through its gaps, so that the cloth
 behind it is seen. The floor is herringbone up to the horizon.
@@ -83,5 +83,5 @@ def hanging(fabric: str, centre: tuple[float, float], half: float, yarns: float)
 
 
 if __name__ == "__main__":
-    path = Path(__file__).parents[2] / "reports" / "cover.png"
-    mi.util.write_bitmap(str(path), EXPOSURE * mi.render(scene(840, 360), spp=48), write_async=False)
+    path = Path(__file__).parents[2] / "reports" / "cover.jpg"
+    mi.util.write_bitmap(str(path), EXPOSURE * mi.render(scene(840, 360), spp=48), write_async=False, quality=90)

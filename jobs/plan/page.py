@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from jobs.plan.dataset import fingerprint_of
-from jobs.plan.measurements.images.live_page import LivePage
+from jobs.plan.measurements.live_page import LivePage
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.scene_shot import SceneShot
 from jobs.plan.measurements.subjects import Subjects

@@ -3,6 +3,6 @@
 soft_nodes.slang is made of query, look, horizons, shade, fixed_nodes and placed_nodes; selvage.slang and neumip.slang
 add perceptron; importance draws directions; colours applies colours; evaluate and draw are entry points. soft_nodes.py,
 selvage and neumip return what a model writes, models chooses among them; sides, tables, weights and constants make
-buffers and constants. languages runs slangc; golden makes queries with their answers; descriptor says what is in the
-folder, training_domain of what it learnt; export_shader writes it.
+buffers and constants, within limits. languages runs slangc; golden makes queries with their answers; descriptor says
+what is in the folder, training_domain of what it learnt; export_shader writes it.
 """

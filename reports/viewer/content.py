@@ -20,12 +20,9 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, Table, tabulate
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
-from pipeline.models.registry import load_model, model_folder
-from pipeline.models.selvage.model import Selvage
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES
-from pipeline.shader.selvage import NAME as SELVAGE
 from pipeline.shader.selvage import correction
 from pipeline.shader.sides import Sides, tabulate_sides
 from pipeline.shader.tables import Tables, tables
@@ -33,6 +30,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
+from reports.viewer.generate import network
 from reports.viewer.shapes import (
     HALF_ARC,
     HALF_HEIGHT,
@@ -206,8 +204,7 @@ def _yarn(yarn: Yarn) -> dict[str, float]:
 
 def _selvage(fabric: Fabric, found: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """Return the weights of the network for the fabric; None if the page lacks the table that it corrects."""
-    (method,) = load_model(model_folder(SELVAGE, "view", ""))
-    assert isinstance(method, Selvage)
+    method = network()
     level = method.options.level
     if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in found):
         return None

@@ -89,7 +89,9 @@ class Viewer {
     if (name in TILES && this.tiled) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
-    if (name === "selvage" && this.own) return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
+    if (name === "selvage" && this.own && this.picture.knowsSelvage) {
+      return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
+    }
     if (name === "point") return { kind: POINT, level: this.usual, label: "One point" };
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
@@ -195,7 +197,10 @@ class Viewer {
     const lacking = this.tiled ? [] : [state.left, state.right].filter((name) => name in TILES);
     const names = [...new Set(lacking.map((name) => TILES[name]))].join(" and ");
     const said = names ? [`${names}: known at the five views alone, of the yarns as they are.`] : [];
-    if ([state.left, state.right].includes("selvage") && !this.own) said.push("Selvage: known of the yarns as they are.");
+    if ([state.left, state.right].includes("selvage")) {
+      if (!this.own) said.push("Selvage: known of the yarns as they are.");
+      else if (!this.picture.knowsSelvage) said.push("Selvage: its shader does not compile here.");
+    }
     byId("notice").textContent = said.length ? `${said.join(" ")} Soft nodes are shown instead.` : "";
     byId("line").style.left = `${100 * state.wipe}%`;
     const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
@@ -450,7 +455,8 @@ function listen(viewer) {
 
 async function start() {
   try {
-    const viewer = new Viewer(JSON.parse(byId("content").textContent), { nodes: byId("shader").textContent, selvage: byId("selvage").textContent });
+    const sources = { nodes: byId("shader").textContent, selvage: byId("selvage").textContent };
+    const viewer = new Viewer(JSON.parse(byId("content").textContent), sources);
     const updates = [];
     const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes(), true));
     const bind = { updates, input };

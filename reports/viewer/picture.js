@@ -34,10 +34,22 @@ class Picture {
 
   // Draw by the program of a kind of method; it is compiled when it is first needed.
   use(kind) {
-    const { gl } = this;
     const name = kind === SELVAGE ? "selvage" : "nodes";
     if (!this.programs.has(name)) this.programs.set(name, this.compiled(this.sources[name]));
-    gl.useProgram(this.programs.get(name));
+    this.gl.useProgram(this.programs.get(name));
+  }
+
+  // Whether the shader of `selvage` compiles on this device, found once.
+  get knowsSelvage() {
+    if (this.selvageKnown === undefined) {
+      try {
+        this.use(SELVAGE);
+        this.selvageKnown = true;
+      } catch {
+        this.selvageKnown = false;
+      }
+    }
+    return this.selvageKnown;
   }
 
   compiled(source) {

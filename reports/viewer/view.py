@@ -9,14 +9,11 @@ from typing import Final
 
 from pipeline.atomic import atomic_write
 from pipeline.shader.limits import MOST_CELLS
+from reports.options import LEAST_TILE, MOST_TILE
 from reports.viewer.content import content
 from reports.viewer.generate import SHADERS
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-
-LEAST: Final = 8
-MOST: Final = 512
-"""Fewest and most pixels along each side of a tile."""
 
 SCRIPTS: Final = ("tables.js", "picture.js", "controls.js")
 
@@ -33,7 +30,7 @@ def write_page(fabric: Fabric, path: Path, truth: int) -> str:
     path : Path
         File to write, ending in ``.html``; its folder is made.
     truth : int
-        Pixels along each side of tiles, pictures of the truth and other methods, from LEAST to MOST; 0: none.
+        Pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to MOST_TILE; 0: none.
 
     Raises
     ------
@@ -42,8 +39,8 @@ def write_page(fabric: Fabric, path: Path, truth: int) -> str:
     """
     if path.suffix != ".html":
         raise BadInput("view", "--out", str(path), "a path that ends in .html is needed")
-    if truth and not LEAST <= truth <= MOST:
-        raise BadInput("view", "--truth", truth, f"must be from {LEAST} to {MOST}, or 0 for none")
+    if truth and not LEAST_TILE <= truth <= MOST_TILE:
+        raise BadInput("view", "--truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
     picks, ends = fabric.weave.warp_over.shape
     if ends * picks > MOST_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"

@@ -8,11 +8,11 @@ from jobs.plan.measurements.added_metric import OfAddedMetric
 from jobs.plan.measurements.errors_by_size import ErrorsBySize
 from jobs.plan.measurements.extremes import Extremes
 from jobs.plan.measurements.frame_time import FrameTime
-from jobs.plan.measurements.images.live_page import LivePage
 from jobs.plan.measurements.images.truth_edge import TruthEdge
 from jobs.plan.measurements.images.truth_frames import TruthFrames
 from jobs.plan.measurements.images.truth_picture import TruthPicture
 from jobs.plan.measurements.latents import Latents
+from jobs.plan.measurements.live_page import LivePage
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.method import OnFabric
 from jobs.plan.measurements.scene import OnScene

@@ -81,6 +81,14 @@ def test_selvage_equals_python_where_the_yarns_are_those_of_the_fabric(fresh, na
     assert said == "Selvage: known of the yarns as they are. Soft nodes are shown instead."
 
 
+def test_a_shader_of_selvage_that_does_not_compile_is_named(written, tmp_path):
+    with opened(written, tmp_path / "profile") as own:
+        own.run("viewer.picture.sources.selvage = 'broken', viewer.set({ left: 'selvage' }).then(() => viewer.drawn)")
+        assert own.run("viewer.methods[0].label") == "Soft nodes, k = 2"
+        said = own.run("document.getElementById('notice').textContent")
+        assert said == "Selvage: its shader does not compile here. Soft nodes are shown instead."
+
+
 @pytest.mark.parametrize("family", ["warp", "weft"])
 def test_edited_yarns_equal_tables_made_anew(fresh, family):
     yarn = getattr(CLOTH, family).model_copy(update={"roughness": 0.3, "twist": 25.0, "blend": 0.9})

@@ -1,1 +1,1 @@
-"""Images of the truth, which other measurements read, and live pages of a fabric."""
+"""Images of the truth, which other measurements read."""

@@ -31,21 +31,10 @@ def read_ply(path):
     return vertices["place"], vertices["colour"], faces["index"]
 
 
-@pytest.fixture
-def twillight(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*tokens):
-        code = main(["export", *tokens])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
-
-
 def test_the_file_holds_the_mesh_in_the_colours_of_its_yarns(twillight, tmp_path):
-    code, text, complaint = twillight("denim", "--mesh", "deep/cloth.ply", "--vertices", "6", "--repeats", "2")
+    code, text, complaint = twillight(
+        "export", "denim", "--mesh", "deep/cloth.ply", "--vertices", "6", "--repeats", "2"
+    )
     assert (code, complaint) == (0, "") and "deep/cloth.ply" in text
     places, colours, faces = read_ply(tmp_path / "deep" / "cloth.ply")
     meshes = repeat_mesh(load_fabric("denim"), 6, (2, 2))
@@ -66,7 +55,7 @@ def test_the_file_holds_the_mesh_in_the_colours_of_its_yarns(twillight, tmp_path
     # Nothing but the file is left, and the same command writes the same bytes.
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["cloth.ply"]
     first = (tmp_path / "deep" / "cloth.ply").read_bytes()
-    twillight("denim", "--mesh", "deep/cloth.ply", "--vertices", "6", "--repeats", "2")
+    twillight("export", "denim", "--mesh", "deep/cloth.ply", "--vertices", "6", "--repeats", "2")
     assert (tmp_path / "deep" / "cloth.ply").read_bytes() == first
 
 
@@ -100,7 +89,7 @@ def _srgb(linear):
 )
 def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, said):
     (tmp_path / "file").write_text("no folder")
-    code, text, complaint = twillight(*tokens)
+    code, text, complaint = twillight("export", *tokens)
     assert code == 2 and text == "" and said in complaint
     assert complaint.count("\n") == 1 and "Traceback" not in complaint
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -5,7 +5,6 @@ import shutil
 
 import pytest
 
-from jobs.cli import main
 from pipeline.models.card import write_model
 from pipeline.models.woven.options import WovenOptions
 from pipeline.shader import export_shader as verb
@@ -14,27 +13,15 @@ from tests.pipeline.shader.test_networks import CLOTH, neumip_folder
 from weaves.fabric import load_fabric
 
 
-@pytest.fixture
-def twillight(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*tokens):
-        code = main(["export", *tokens])
-        return code, capsys.readouterr()
-
-    return call
-
-
 def test_the_source_needs_no_compiler(twillight, monkeypatch, tmp_path):
     monkeypatch.setattr(languages, "find_spec", lambda name: None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    code, said = twillight("gingham", "--shader", "out", "--level", "1")
-    assert code == 0 and "slang; level 1" in said.out
+    code, said, complaint = twillight("export", "gingham", "--shader", "out", "--level", "1")
+    assert code == 0 and "slang; level 1" in said
     assert json.loads((tmp_path / "out" / "soft_nodes.json").read_text())["languages"] == {}
-    code, said = twillight("gingham", "--shader", "out", "--language", "wgsl")
-    assert code == 2 and said.err.count("\n") == 1
-    assert "slangc is needed: pip install --no-deps slangtorch" in said.err
+    code, said, complaint = twillight("export", "gingham", "--shader", "out", "--language", "wgsl")
+    assert code == 2 and complaint.count("\n") == 1
+    assert "slangc is needed: pip install --no-deps slangtorch" in complaint
 
 
 @pytest.mark.parametrize(
@@ -50,28 +37,28 @@ def test_the_source_needs_no_compiler(twillight, monkeypatch, tmp_path):
     ],
 )
 def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, allowed):
-    code, said = twillight("gingham", *tokens)
-    assert code == 2 and said.err.count("\n") == 1 and allowed in said.err
+    code, _, complaint = twillight("export", "gingham", *tokens)
+    assert code == 2 and complaint.count("\n") == 1 and allowed in complaint
     assert not list(tmp_path.iterdir())
 
 
 def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, tmp_path):
-    code, said = twillight("crepe", "--shader", "x", "--level", "8")
-    assert code == 2 and "1,856 nodes" in said.err and "at most 1,024; choose a lower --level" in said.err
+    code, _, complaint = twillight("export", "crepe", "--shader", "x", "--level", "8")
+    assert code == 2 and "1,856 nodes" in complaint and "at most 1,024; choose a lower --level" in complaint
     monkeypatch.setattr(tables, "MOST_HEIGHT", 16)
-    code, said = twillight("gingham", "--shader", "x")
-    assert code == 2 and "horizons" in said.err
+    code, _, complaint = twillight("export", "gingham", "--shader", "x")
+    assert code == 2 and "horizons" in complaint
     monkeypatch.setattr(tables, "MOST_CELLS", 3)
     monkeypatch.setattr(soft_nodes, "tabulate_sides", None)  # cells are counted before any work
-    code, said = twillight("gingham", "--shader", "x")
-    assert code == 2 and "at most 3 cells" in said.err and not list(tmp_path.iterdir())
+    code, _, complaint = twillight("export", "gingham", "--shader", "x")
+    assert code == 2 and "at most 3 cells" in complaint and not list(tmp_path.iterdir())
 
 
 def refused(twillight, *tokens):
     """Return the one sentence of a refusal."""
-    code, said = twillight(*tokens)
-    assert code == 2 and said.err.count("\n") == 1
-    return said.err
+    code, _, complaint = twillight("export", *tokens)
+    assert code == 2 and complaint.count("\n") == 1
+    return complaint
 
 
 def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, tmp_path):
@@ -106,7 +93,7 @@ def test_missing_packages_are_named(twillight, monkeypatch):
 
 
 def test_a_fabric_unlike_the_training_is_named(twillight, tmp_path):
-    code, said = twillight("gauze", "--shader", "out", "--model", "selvage")
-    assert code == 0 and "gauze is not like its training: optical_thickness = 2.5" in said.out
+    code, said, _ = twillight("export", "gauze", "--shader", "out", "--model", "selvage")
+    assert code == 0 and "gauze is not like its training: optical_thickness = 2.5" in said
     network = json.loads((tmp_path / "out" / "selvage.json").read_text())["network"]
     assert network["outside"] == "optical_thickness = 2.5" and network["trained_on"]["optical_thickness"] == [2.0, 2.0]

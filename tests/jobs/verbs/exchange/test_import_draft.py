@@ -2,22 +2,8 @@
 
 import pytest
 
-from jobs.cli import main
 from tests.weaves.draft_files.drafts import numbered, wif
 from weaves.fabric import load_fabric
-
-
-@pytest.fixture
-def twillight(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*tokens):
-        code = main([*tokens])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 def test_a_draft_becomes_a_fabric_that_other_verbs_load(twillight, tmp_path):
