@@ -1,9 +1,9 @@
 """How kernels are compiled: single-threaded, without the GIL, cached on disk, the same bits whoever compiled them.
 
 numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of a
-kernel's package, and of the packages it may import, cannot serve a stale kernel. Packages come in an order
-(`PACKAGES`), so that editing an approximation recompiles no ground truth. No fast-math but where a kernel says so
-(`fast_kernel`).
+kernel's package, and of the packages it may import, cannot serve a stale kernel. The name depends on no path, so copies
+of the tree share one cache (`NUMBA_CACHE_DIR`). Packages come in an order (`PACKAGES`), so that editing an
+approximation recompiles no ground truth. No fast-math but where a kernel says so (`fast_kernel`).
 
 pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. Processes
 compile different kernels at the same time. Of one kernel, one process alone: the others wait and read what it wrote,
@@ -23,6 +23,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from filelock import FileLock
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 
 from pipeline.compiled.reproducible import make_reproducible
@@ -37,7 +38,9 @@ _ROOT = _HOME.parents[1]
 
 
 def _cache_home() -> Path:
-    """Return where compiled kernels are kept: this package's own ``__pycache__``, else the user's cache."""
+    """Return where compiled kernels are kept: ``NUMBA_CACHE_DIR``, this package's ``__pycache__``, the user's cache."""
+    if chosen := numba.config.CACHE_DIR:  # type: ignore[attr-defined]
+        return Path(chosen)
     if os.access(_HOME, os.W_OK):
         return _HOME / "__pycache__"
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "twillight"
@@ -59,6 +62,27 @@ def _package_of(module: str) -> str:
 
 
 _CACHE = _cache_home()
+
+
+class _ByContent(UserProvidedCacheLocator):
+    """Place of a kernel in the cache: a folder for its module in the one that is named after the sources."""
+
+    def __init__(self, function: Callable[..., Any], path: str) -> None:
+        super().__init__(function, path)  # type: ignore[no-untyped-call]
+        self._cache_path = str(_cache_folder(_package_of(function.__module__)) / function.__module__)
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ByContent:
+        return cls(py_func, py_file)
+
+
+class _KernelCacheFormat(CompileResultCacheImpl):
+    _locator_classes = [_ByContent]  # noqa: RUF012, numba's own declaration
+
+
+class _KernelCache(FunctionCache):
+    _impl_class = _KernelCacheFormat
+
 
 make_reproducible()
 
@@ -84,22 +108,21 @@ def _decorator(allocates: bool = False, **flags: Any) -> Callable[[_Function], _
     """
     # Nothing calls kernels from C, and the functions for it took a tenth of the time of compiling.
     flags |= {"_nrt": allocates, "no_cfunc_wrapper": True}
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)
+    compiled = numba.njit(nogil=True, error_model="numpy", **flags)
 
     def decorate(function: _Function) -> _Function:
-        folder = _cache_folder(_package_of(function.__module__))
-        # numba reads its cache folder when a function is decorated.
-        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
         dispatcher: Any = compiled(function)
+        dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
+        folder = Path(dispatcher._cache.cache_path)
         compile_or_load = dispatcher.compile
         name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
-        lock = FileLock(folder / f"{name}.lock", thread_local=False)
 
         def compile_alone(signature: Any) -> Any:
             # This process's compiler first, then the kernel's file; a process that dies releases both.
             with global_compiler_lock:
                 folder.mkdir(parents=True, exist_ok=True)
-                with lock:
+                # A lock made before a fork would refuse to work in the child.
+                with FileLock(folder / f"{name}.lock", thread_local=False):
                     result = compile_or_load(signature)
             returned = list(dispatcher.overloads.values())[-1].signature.return_type
             if not allocates and _holds_array(returned):

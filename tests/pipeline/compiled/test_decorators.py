@@ -184,6 +184,40 @@ def test_each_kernel_is_announced_when_it_is_compiled(copies):
     assert answers(start(copies[0], NAMES)).split() == ["fast", "inverse_length", "shared"]
 
 
+FORKED = """
+import os
+import numpy as np
+from pipeline.truth import small
+
+child = os.fork()
+value = small.fast(np.ones(61, np.float32))
+if child == 0:
+    os._exit(0)
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), value)
+"""
+
+
+def test_a_forked_process_compiles_kernels_too(copies):
+    assert answers(start(copies[0], FORKED)).split()[0] == "0"
+
+
+COMPILED = """
+from pathlib import Path
+import numpy as np
+from pipeline.truth import small
+
+small.fast(np.ones(61, np.float32))
+print(*sorted(f"{path.name}:{path.stat().st_mtime_ns}" for path in Path(sys.argv[1]).rglob("*.nbc")))
+"""
+
+
+def test_copies_of_the_tree_share_compiled_kernels(copies, tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    first, second = (answers(start(copy, f"import sys\n{COMPILED}", str(tmp_path / "kernels"))) for copy in copies[:2])
+    assert first == second and len(first.split()) == 3
+    assert not list(copies[0].rglob("*.nbc"))
+
+
 ARRAYS = """
 import numpy as np
 from pipeline.compiled.decorators import allocating_kernel, kernel
