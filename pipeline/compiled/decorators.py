@@ -1,9 +1,9 @@
 """How kernels are compiled: single-threaded, without the GIL, cached on disk, the same bits whoever compiled them.
 
-numba notices a changed file but not a changed file that it calls into; a cache folder named after all sources of a
-kernel's package, and of the packages it may import, cannot serve a stale kernel. The name depends on no path, so copies
-of the tree share one cache (`NUMBA_CACHE_DIR`). Packages come in an order (`PACKAGES`), so that editing an
-approximation recompiles no ground truth. No fast-math but where a kernel says so (`fast_kernel`).
+numba notices a changed file but not a changed file that it calls into. So a kernel's cache folder is named after the
+content of its module and of all modules of `pipeline` and `reports` that this one imports, directly or not. The name
+depends on no path: copies of the tree share one cache (`NUMBA_CACHE_DIR`). No fast-math but where a kernel says so
+(`fast_kernel`).
 
 pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. Processes
 compile different kernels at the same time. Of one kernel, one process alone: the others wait and read what it wrote,
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -30,11 +31,9 @@ from pipeline.compiled.reproducible import make_reproducible
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-PACKAGES = ("pipeline.compiled", "pipeline.truth", "pipeline.analytic", "pipeline.materials", "reports.truth")
-"""Packages that hold kernels; each may call those before it."""
-
 _HOME = Path(__file__).parent
 _ROOT = _HOME.parents[1]
+_IMPORT = re.compile(r"^[ \t]*from[ \t]+((?:pipeline|reports)[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.+)", re.MULTILINE)
 
 
 def _cache_home() -> Path:
@@ -47,29 +46,38 @@ def _cache_home() -> Path:
 
 
 @cache
-def _cache_folder(package: str) -> Path:
-    """Return the folder for the compiled kernels of a package, named after its sources and those it may import."""
-    sources = hashlib.sha256()
-    for name in PACKAGES[: PACKAGES.index(package) + 1]:
-        for path in sorted(_ROOT.joinpath(*name.split(".")).rglob("*.py")):
-            sources.update(path.read_bytes())
-    return _CACHE / f"{package}-{sources.hexdigest()[:12]}"
+def _imported(path: Path) -> frozenset[Path]:
+    """Return the files of `pipeline` and `reports` that a file imports."""
+    files = set()
+    for package, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        for module in (package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))):
+            place = _ROOT.joinpath(*module.split("."))
+            files |= {file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()}
+    return frozenset(files)
 
 
-def _package_of(module: str) -> str:
-    """Return the package in which a module lies, of those that hold kernels; code from elsewhere may call them all."""
-    return next((package for package in PACKAGES if f"{module}.".startswith(f"{package}.")), PACKAGES[-1])
+@cache
+def _cache_folder(module: str, path: Path) -> Path:
+    """Return the folder for a module's compiled kernels, named after its sources and those that it imports."""
+    sources, left = set(), {path}
+    while left:
+        sources |= left
+        left = {file for source in left for file in _imported(source)} - sources
+    content = hashlib.sha256(path.read_bytes())
+    for source in sorted(sources - {path}):
+        content.update(source.read_bytes())
+    return _CACHE / f"{module}-{content.hexdigest()[:12]}"
 
 
 _CACHE = _cache_home()
 
 
 class _ByContent(UserProvidedCacheLocator):
-    """Place of a kernel in the cache: a folder for its module in the one that is named after the sources."""
+    """Place of a kernel in the cache."""
 
     def __init__(self, function: Callable[..., Any], path: str) -> None:
         super().__init__(function, path)  # type: ignore[no-untyped-call]
-        self._cache_path = str(_cache_folder(_package_of(function.__module__)) / function.__module__)
+        self._cache_path = str(_cache_folder(function.__module__, Path(path)))
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ByContent:
