@@ -1,6 +1,6 @@
 """How fast the ground truth is: points and patch queries a second, beside a plain NumPy version in the same process.
 
-The same of soft nodes and `selvage`, with the share of the processor's arithmetic that they use.
+The same of soft nodes and `selvage`, by one thread and by two.
 
 Every rate is the median over repeats of a call that takes long enough for the clock. The NumPy version is what one
 writes first: surface and point model by array expressions, visibility from the same table of horizons.
@@ -19,21 +19,22 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.detail import DETAILS
-from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.compiled.decorators import allocating_kernel
 from pipeline.models.method import CHUNK, Method
-from pipeline.models.per_query import Portable
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import cloth_side, columns_of
+from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
-from pipeline.truth.node_table.build import Table
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND
+from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, Table
+from pipeline.truth.node_table.directions import node_directions
+from pipeline.truth.node_table.kernels import Horizons, Layer, Normals, Tangents, reflected, weigh
+from pipeline.truth.node_table.shares import NodeShares, no_shares
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from reports.measure.timing import set_threads
-from reports.truth.machine_limit import network_of, operations_of, work_of
-from reports.truth.rate import MULTIPLY_ADDS, OPERATIONS, evaluate_points, multiply_adds
 from reports.truth.row_records import RowRecords
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
@@ -79,13 +80,11 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
         Presets whose patch queries are timed.
     """
     set_threads(1)
-    limit = _arithmetic()
-    yield limit
-    yield from _points(limit)
+    yield from _points()
     for name in fabrics:
         yield from _queries(load_fabric(name), rows)
     yield _two_threads(load_fabric(fabrics[0]), rows)
-    yield from _models(load_fabric(fabrics[0]), limit)
+    yield from _models(load_fabric(fabrics[0]))
     yield _memory(load_fabric(fabrics[0]), rows)
 
 
@@ -110,18 +109,7 @@ def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: st
     return Rate(what, fabric, middle, low, high, unit, note)
 
 
-def _arithmetic() -> Rate:
-    """Return the multiply-adds a second of one core that does nothing else."""
-    values = np.linspace(0.1, 0.9, 4096, dtype=np.float32)
-
-    def arithmetic() -> float:
-        multiply_adds(values, 200)
-        return 200.0 * values.size * MULTIPLY_ADDS
-
-    return _rate(arithmetic, "multiply-adds alone", "", "1/s")
-
-
-def _points(limit: Rate) -> Iterator[Rate]:
+def _points() -> Iterator[Rate]:
     """Yield points a second: vectorised kernels and NumPy."""
     fabric = load_fabric("polyester_lining")
     model = cloth_side(fabric, TruthOptions())
@@ -133,13 +121,12 @@ def _points(limit: Rate) -> Iterator[Rate]:
     yield plain
     for name, visibility in (("specular", False), ("everything", True)):
         rate = _rate(
-            lambda visibility=visibility: float(evaluate_points(model, table, columns, visibility)[1]),  # type: ignore[misc]
+            lambda visibility=visibility: float(_evaluate_points(model, table, columns, visibility)[1]),  # type: ignore[misc]
             f"points, {name}",
             fabric.name,
             "points/s",
         )
-        arithmetic_share = rate.value * OPERATIONS[name][0] / limit.value
-        yield replace(rate, note=f"{rate.value / plain.value:.0f} x NumPy; {arithmetic_share:.0%} of arithmetic alone")
+        yield replace(rate, note=f"{rate.value / plain.value:.0f} x NumPy")
     exact = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1024, max_count=1024)
     few = queries.take(slice(200))
     yield _rate(
@@ -149,6 +136,57 @@ def _points(limit: Rate) -> Iterator[Rate]:
         "points/s",
         "float64",
     )
+
+
+@allocating_kernel
+def _evaluate_points(model: ClothSide, table: Table, columns: Columns, visibility: bool) -> tuple[float, int]:
+    """Evaluate all nodes for every query: specular, and with `visibility` all else; return their sum and count."""
+    nodes = table.normal.shape[1]
+    shares = no_shares(nodes)
+    shares.lit[:] = np.float32(1.0)
+    total, points = np.float64(0.0), 0
+    thickness, one = np.float32(model.front.thickness), np.float32(1.0)
+    for row in range(len(columns.u)):
+        towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+        light, viewer = towards.light, towards.viewer
+        for p in range(len(table.pieces)):
+            piece = table.pieces[p]
+            start, count, family = piece[START], piece[COLUMNS] * piece[ROWS], min(piece[FAMILY], 1)
+            stop, f0 = start + count, piece[FINE_START]
+            f1 = f0 + count
+            yarn = model.front.yarn[family]
+            normal = Normals(
+                table.normal[0, start:stop],
+                table.normal[1, start:stop],
+                table.normal[2, start:stop],
+                table.normal[3, start:stop],
+            )
+            own = NodeShares(
+                table.evenly[start:stop],
+                shares.lit[start:stop],
+                shares.areas[start:stop],
+                shares.diffuses[start:stop],
+                shares.speculars[start:stop],
+                shares.margins[start:stop],
+                shares.lit_margins[start:stop],
+                shares.undecided[start:stop],
+            )
+            if visibility:
+                area, diffuse = weigh(
+                    normal,
+                    light,
+                    Horizons(table.slope[light.first, start:stop], table.slope[light.second, start:stop]),
+                    viewer,
+                    Horizons(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
+                    np.float32(yarn[BLEND]),
+                    own,
+                )
+                total += area + diffuse
+            tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
+            layer = Layer(np.float32(yarn[ALPHA] ** 2), thickness, one)
+            total += reflected(normal, tangent, light, viewer, one, layer, own.lit, own.speculars)
+            points += count
+    return total, points
 
 
 def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
@@ -218,20 +256,11 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
     return Rate(f"{what}, two threads", fabric.name, middle, low, high, "queries/s", note, _TURNS)
 
 
-def _models(fabric: Fabric, limit: Rate) -> Iterator[Rate]:
-    """Yield queries a second of soft nodes and of `selvage`, what arithmetic they need, and how far that is from all.
-
-    The arithmetic is that of the nodes and of the network; placing nodes, weights and features are the rest.
-    """
+def _models(fabric: Fabric) -> Iterator[Rate]:
+    """Yield queries a second of soft nodes at all levels and of `selvage`, by one thread and by two."""
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK)
-    few = queries.take(slice(CHUNK))
-    operations = operations_of(tabulate(fabric))
-    (selvage,) = load_model(pretrained_folder("selvage"))
-    assert isinstance(selvage, Portable)
-    network = network_of(selvage, fabric)
-    methods: list[tuple[Method, int, int]] = [(SoftNodes(level), level, 0) for level in DETAILS]
-    for method, level, products in [*methods, (selvage, network.level, network.multiply_adds)]:
-        work = work_of(tabulate(fabric, level=level), few, operations)
+    methods: list[Method] = [*map(SoftNodes, DETAILS), *load_model(pretrained_folder("selvage"))]
+    for method in methods:
         what = " ".join(filter(None, ("queries,", method.name, method.setting)))
 
         def answer(asked: Queries, method: Method = method) -> object:
@@ -241,11 +270,7 @@ def _models(fabric: Fabric, limit: Rate) -> Iterator[Rate]:
             answer(queries)
             return float(len(queries.u))
 
-        rate = _rate(count, what, fabric.name, "queries/s")
-        share = rate.value * (work.operations + products) / limit.value
-        note = f"{work.fixed:.0f} fixed and {work.in_footprint:.0f} placed nodes, {work.operations:,.0f} operations"
-        note += f", {products:,} multiply-adds of the network" if products else ""
-        yield replace(rate, note=f"{note}; {share:.0%} of arithmetic alone")
+        yield _rate(count, what, fabric.name, "queries/s")
         yield _threads_compared(what, fabric, answer, 4 * CHUNK)
 
 

@@ -26,11 +26,11 @@ from pipeline.analytic.soft_nodes.diamond import around
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
 from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
+from pipeline.analytic.soft_nodes.nodes import Table
 from pipeline.analytic.soft_nodes.scratch import Scratch, scratch_for
 from pipeline.analytic.soft_nodes.shade import SUMS
 from pipeline.analytic.soft_nodes.wide import sum_fixed
-from pipeline.compiled.arrays import Float32, Index
+from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import deviations, narrow_axis
 from pipeline.truth.query import Queries
@@ -50,24 +50,6 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 def query_sums(table: Table, queries: Queries) -> tuple[Float32, Float32]:
     """Return what `sum_queries` returns for N queries, the viewer in front."""
     return sum_queries(table, *_columns(queries))
-
-
-def nodes_taken(table: Table, queries: Queries) -> Index:
-    """Return how many fixed and how many placed nodes the sums of N queries take, int64 (N, 2), whole blocks.
-
-    Of a patch that is almost hidden, the nodes of the second placement count.
-    """
-    columns, kinds = _columns(queries), int(table.kinds.sum())
-    scratch = scratch_for(table, MOST_OF_FOOTPRINT)
-    sums, gaps = np.zeros((1, kinds, SUMS), np.float32), np.zeros(1, np.float32)
-    taken = np.zeros((len(queries.u), 2), np.int64)
-    for n in range(len(taken)):
-        scratch.stops[:] = 0
-        u, v, deviation_x, deviation_y, correlation, wi, wo, bend = (column[n : n + 1] for column in columns)
-        _sum_rows(table, scratch, (u, v, deviation_x, deviation_y, correlation), wi, wo, bend, sums, gaps)
-        taken[n, 1] = (-(-scratch.stops // BLOCK_NODES)).sum() * BLOCK_NODES
-        taken[n, 0] = 0 if taken[n, 1] else table.starts[kinds] * BLOCK_NODES
-    return taken
 
 
 def _columns(queries: Queries) -> tuple[Float32, ...]:
