@@ -33,6 +33,7 @@ class Shard(Task):
     """The task that makes one shard."""
 
     stage: ClassVar[Stage] = "generate"
+    shares_process: ClassVar[bool] = True
 
     shard: AnyShardTask
     """Rows of one fabric, and how they are answered."""

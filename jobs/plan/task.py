@@ -71,7 +71,9 @@ class Task(Part):
     stage: ClassVar[Stage]
     """The stage that does it."""
     alone: ClassVar[bool] = False
-    """True if it measures time, so that nothing else may run beside it."""
+    """True if it measures time: nothing else may run beside it, and it has a new process."""
+    shares_process: ClassVar[bool] = False
+    """True if it may run beside others in one process: it uses no random numbers and threads of a library."""
 
     @property
     def group(self) -> str:

@@ -10,6 +10,8 @@ import asyncio
 import logging
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.client import HTTPException
@@ -17,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 from urllib.request import ProxyHandler, build_opener
 
-from jobs.run.child import ONE_THREAD, ends_deferred, interrupts_held
+from pipeline.own_process import ONE_THREAD, interrupts_held
 from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
 
@@ -137,6 +139,24 @@ async def _answer(address: str, security: Any) -> None:
 
 
 @contextmanager
+def _ends_deferred() -> Iterator[None]:
+    """Defer SIGTERM and SIGHUP to the end of the block, in this process alone: processes that start within are free."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+    numbers = signal.SIGTERM, signal.SIGHUP
+    before = {number: signal.signal(number, lambda number, frame: received.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if received:
+            signal.raise_signal(received[0])
+
+
+@contextmanager
 def _local(workers: int) -> Iterator[Any]:
     """Start a cluster on the loopback."""
     from multiprocessing import resource_tracker
@@ -156,7 +176,7 @@ def _local(workers: int) -> Iterator[Any]:
     }
     with dask.config.set(settings):
         try:
-            with ends_deferred(), interrupts_held():  # a cluster that is half there cannot be closed
+            with _ends_deferred(), interrupts_held():  # a cluster that is half there cannot be closed
                 cluster = LocalCluster(  # type: ignore[no-untyped-call]
                     n_workers=workers,
                     threads_per_worker=1,
@@ -176,7 +196,7 @@ def _local(workers: int) -> Iterator[Any]:
         try:
             yield client
         finally:
-            with ends_deferred(), interrupts_held():
+            with _ends_deferred(), interrupts_held():
                 try:
                     client.close()  # type: ignore[no-untyped-call]
                     cluster.close()

@@ -168,7 +168,7 @@ def _work(tasks: Sequence[Task], out: str, inputs: Mapping[str, str], topic: str
         if expected and expected != _digest():
             outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
         else:
-            outcome = work(task, place(out), partial(progress, task), inputs)
+            outcome = work(task, place(out), partial(progress, task), inputs, worker.state.nthreads)
         files = {name: product.model_dump() for name, product in outcome.files.items()}
         outcomes[task.id] = outcome._asdict() | {"files": files, "worker": worker.address}
     worker.log_event(topic, (key, outcomes))

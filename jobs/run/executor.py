@@ -7,9 +7,8 @@ task that fails is tried once more if an input turns out to be damaged. Else a t
 exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
 On this machine one task a core is handed out at a time, and while only shards are made one more: dask, which cannot
 know how long a task takes, would park short ones behind a training. Shards that take a few milliseconds go several at a
-time (`jobs.plan.bundles`). A task that measures time runs in a process of its
-own (`jobs.run.alone`) while the workers have nothing to do; with `--scheduler` it runs in a worker, because the
-driver's machine may not be the one to measure.
+time (`jobs.plan.bundles`). A task that measures time runs in
+a process of its own, started by a worker while the others have nothing to do (`jobs.run.outcome`).
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from rich.console import Console
 from jobs.plan.bundles import Bundles
 from jobs.plan.ready import Ready
 from jobs.plan.task import STAGES, Stage, Task
-from jobs.run.alone import run_alone
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected, dashboard_of
 from jobs.run.dispatch import Dispatch
 from jobs.run.inputs import Inputs
@@ -148,7 +146,7 @@ def execute(
         board.start(len(crew.accepted), dashboard_of(client) if external else None)
         book = _Book(Ready(todo, finished), summary, stages, board)
         inputs = Inputs(tasks, ledger)
-        loop = _Loop(book, crew, dispatch, Bundles(), board, ledger, inputs, external, recorded, settle)
+        loop = _Loop(book, crew, dispatch, Bundles(), board, ledger, inputs, recorded, settle)
         try:
             loop.run()
         finally:
@@ -219,7 +217,6 @@ class _Loop(NamedTuple):
     board: Board
     ledger: Ledger
     inputs: Inputs
-    external: bool
     recorded: Recorded
     settle: Callable[[], None]
 
@@ -228,16 +225,15 @@ class _Loop(NamedTuple):
         while True:
             self.crew.look()
             self.board.tally.workers = len(self.crew.accepted)
-            started, ended = self._start()
+            started = self._start()
             if not self.book.ready.running:
                 if started:
                     continue  # damaged inputs are made first
                 break  # what is left waits for tasks that failed
-            if not ended:
-                ended = self.dispatch.ended(_SECONDS_BETWEEN_LOOKS)
-                for task, _ in ended:
-                    self.book.ready.free(task)
-                self._start(alone=False)  # workers have something to do while receipts are written
+            ended = self.dispatch.ended(_SECONDS_BETWEEN_LOOKS)
+            for task, _ in ended:
+                self.book.ready.free(task)
+            self._start(alone=False)  # workers have something to do while receipts are written
             for task, outcome in ended:
                 if outcome is None:
                     self.book.ready.again(task)
@@ -248,8 +244,8 @@ class _Loop(NamedTuple):
                 self._take(task, outcome)
             self.board.waiting_for(self.dispatch.running, workers=len(self.crew.accepted))
 
-    def _start(self, alone: bool = True) -> tuple[list[Task], Sequence[tuple[Task, Outcome | None]]]:
-        """Start as many tasks as there are slots; return them, and the outcome of one that was done alone, here."""
+    def _start(self, alone: bool = True) -> list[Task]:
+        """Start as many tasks as there are slots, and return them."""
         ready, failed_on, slots = self.book.ready, self.book.failed_on, self.crew.slots
         size, bundle = self.bundles.size, list[Task]()
         started = ready.take(slots, alone, size * (slots + self.crew.spare) - slots)
@@ -261,8 +257,6 @@ class _Loop(NamedTuple):
             if task.needs:
                 self.settle()
             self.board.begin(task)
-            if task.alone and not self.external:
-                return started, [(task, run_alone(task, self.ledger.out, self.inputs.hashes(task), self.board))]
             if size == 1 or task.id in failed_on or not self.bundles.allows(task):
                 self.dispatch.start([task], self.inputs.hashes(task), failed_on.get(task.id, ()))
                 continue
@@ -272,7 +266,7 @@ class _Loop(NamedTuple):
                 bundle = []
         if bundle:
             self.dispatch.start(bundle, {})
-        return started, []
+        return started
 
     def _take(self, task: Task, outcome: Outcome) -> None:
         """Write the receipt of a task that is done, try it again, or note why it failed."""

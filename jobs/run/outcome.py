@@ -12,6 +12,7 @@ from typing import NamedTuple
 from jobs.plan.task import Progress, Task
 from jobs.run.receipt import Product, measure
 from jobs.run.workspace import workspace
+from pipeline.own_process import ProcessEnded, in_own_process
 from pipeline.patience import StorageFailed
 from pipeline.storage import explained, is_local
 from weaves.errors import BadInput, WorkFailed
@@ -50,13 +51,32 @@ class Outcome(NamedTuple):
     storage_failed: bool = False
 
 
-def work(task: Task, out: Path, progress: Progress, inputs: Mapping[str, str] = MappingProxyType({})) -> Outcome:
-    """Do a task; `out` is the place of all products, `inputs` as for `jobs.run.workspace.workspace`."""
+def work(
+    task: Task, out: Path, progress: Progress, inputs: Mapping[str, str] = MappingProxyType({}), threads: int = 1
+) -> Outcome:
+    """Do a task, in a process of its own if it measures time, or must not share one with other tasks.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    out : Path
+        Place of all products.
+    progress : callable
+        Receives the finished share.
+    inputs : mapping
+        As for `jobs.run.workspace.workspace`.
+    threads : int
+        Tasks that this process may do at the same time.
+    """
+    own = task.alone or (threads > 1 and not task.shares_process)
     start = time.perf_counter()
     try:
         with workspace(task, out, inputs) as folder:
-            task.run(folder, progress)
+            in_own_process(task.run, folder, progress=progress) if own else task.run(folder, progress)
             files = {Path(path).name: measure(folder / path) for path in task.products}
+    except ProcessEnded as error:
+        return Outcome({}, time.perf_counter() - start, str(error), traceback.format_exc())
     except (BadInput, WorkFailed) as error:
         failed = isinstance(error, StorageFailed)
         return Outcome({}, time.perf_counter() - start, str(error), storage_failed=failed)

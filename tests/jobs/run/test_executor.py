@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import dask.config
@@ -15,6 +16,7 @@ from rich.console import Console
 from jobs.run.cluster import Scheduler
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
+from jobs.run.outcome import work
 from jobs.run.receipt import measure
 from weaves.errors import BadInput, WorkFailed
 
@@ -196,3 +198,16 @@ def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
     recorded.clear()
     execute([twin], tmp_path, recorded=lambda task, files: recorded.append(task), console=quiet())
     assert not recorded
+
+
+def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, fake, monkeypatch):
+    """A worker with several threads: two trainings in its process would draw from the same random numbers."""
+    monkeypatch.setattr(fake.Fake, "shares_process", True)
+    monkeypatch.setattr(fake.FakeTraining, "shares_process", False)
+    tasks = [fake.task(f"{kind.stage} {index}", kind) for kind in (fake.Fake, fake.FakeTraining) for index in range(2)]
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        outcomes = list(pool.map(lambda task: work(task, tmp_path, lambda share: None, threads=4), tasks))
+    assert not any(outcome.reason for outcome in outcomes)
+    pids = {event["name"]: event["pid"] for event in fake.events(tmp_path)}
+    assert pids["generate 0"] == pids["generate 1"] == os.getpid()
+    assert len({*pids.values()}) == 3

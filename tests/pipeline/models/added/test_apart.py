@@ -1,17 +1,10 @@
-import os
-import subprocess
-import sys
 import time
-from pathlib import Path
 
-import psutil
 import pytest
 
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed
-from weaves.errors import BadInput, WorkFailed
-
-ROOT = Path(__file__).parents[4]
+from weaves.errors import WorkFailed
 
 GUARDED = "__import__('pipeline.models.added.guarded', fromlist=['WATCH'])"
 BEGIN = f"{GUARDED}.WATCH.begin(b'theirs', b'predict', 0.5)"
@@ -26,31 +19,6 @@ class Code:
 
     def __reduce__(self):
         return eval, (self.text,)
-
-
-def test_the_result_and_the_progress_come_back():
-    shares = []
-    assert run_apart(Code("lambda a, progress: [progress(.5), 2 * a][1]"), 21, progress=shares.append) == 42
-    assert shares == [0.5]
-
-
-def test_it_is_another_process_with_the_paths_of_this_one(tmp_path, monkeypatch):
-    (tmp_path / "weaves").mkdir()
-    (tmp_path / "weaves" / "__init__.py").write_text("raise RuntimeError('hides a package')")
-    monkeypatch.chdir(tmp_path)
-    assert run_apart(Code("lambda progress: __import__('os').getpid()")) != os.getpid()
-
-
-def test_bad_input_comes_back_as_it_is():
-    with pytest.raises(BadInput, match=r"^a: b = 1: no$"):
-        run_apart(
-            Code("lambda p: (_ for _ in ()).throw(__import__('weaves.errors').errors.BadInput('a', 'b', 1, 'no'))")
-        )
-
-
-def test_an_unexpected_exception_has_its_traceback():
-    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
-        run_apart(Code("lambda progress: 1 / 0"))
 
 
 def test_a_call_that_hangs_is_ended():
@@ -74,21 +42,3 @@ def test_a_process_that_dies_outside_of_calls_blames_no_method():
     with pytest.raises(WorkFailed, match=r"ended \(exit code 9\)") as failure:
         run_apart(Code("lambda progress: __import__('os')._exit(9)"))
     assert not isinstance(failure.value, MethodFailed)
-
-
-PARENT = """
-from pipeline.models.added.apart import run_apart
-
-class Code:
-    def __reduce__(self):
-        return eval, ("lambda p: (p(__import__('os').getpid()), __import__('time').sleep(3600))",)
-
-run_apart(Code(), progress=lambda pid: print(int(pid), flush=True))
-"""
-
-
-def test_the_process_ends_when_its_parent_is_killed():
-    with subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True, cwd=ROOT) as parent:
-        child = psutil.Process(int(parent.stdout.readline()))
-        parent.kill()
-        child.wait(timeout=120)

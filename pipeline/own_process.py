@@ -1,0 +1,155 @@
+"""Work in a process of its own: of code that may hang or crash, of what measures time, and of what shares nothing.
+
+The process is started as a command, because a worker of dask may not have children of `multiprocessing`.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any, Final, TypeVar
+
+from weaves.errors import WorkFailed
+
+Result = TypeVar("Result")
+
+ONE_THREAD: Final = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+"""Environment of a process that computes on one thread."""
+
+_SECONDS_BETWEEN_LOOKS: Final = 0.2
+
+
+class ProcessEnded(WorkFailed):
+    """The process has ended without a result."""
+
+    def __init__(self, code: int) -> None:
+        self.code = code
+        self.how = f"exit code {code}" if code >= 0 else f"signal {signal.Signals(-code).name}"
+        super().__init__(f"the process that ran it ended ({self.how}); is there enough memory?")
+
+    def __reduce__(self) -> tuple[type[ProcessEnded], tuple[int]]:
+        return type(self), (self.code,)
+
+
+def in_own_process(
+    function: Callable[..., Result],
+    *arguments: Any,
+    progress: Callable[[float], None] = lambda share: None,
+    look: Callable[[], None] = lambda: None,
+) -> Result:
+    """Call ``function(*arguments, progress)`` in a new process of one thread, and return its result.
+
+    The process ends with this one, and never receives Ctrl-C. What it prints is lost.
+
+    Parameters
+    ----------
+    function : callable
+        A function of a module, or a method; it, its arguments and its result can be pickled.
+    arguments
+        Its arguments.
+    progress : callable
+        Receives the finished share.
+    look : callable
+        Called now and then while nothing is received; an exception of it ends the process.
+
+    Raises
+    ------
+    ProcessEnded
+        If the process ends without a result.
+    Exception
+        What the function raises, with the traceback of the process as a note.
+    """
+    here, there = Pipe()
+    # The paths of this process, and no other: a folder of the current one must not hide a package.
+    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109, a string is needed
+    with interrupts_held():
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "pipeline.own_process", str(there.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": paths},
+            pass_fds=[there.fileno()],
+        )
+    there.close()
+    try:
+        here.send((function, arguments))
+        while True:
+            if not here.poll(_SECONDS_BETWEEN_LOOKS):
+                look()
+                continue
+            kind, content = here.recv()
+            if kind == "raised":
+                raise content
+            if kind == "result":
+                result: Result = content
+                return result
+            progress(content)
+    except (EOFError, ConnectionError) as error:
+        raise ProcessEnded(process.wait()) from error
+    finally:
+        process.kill()
+        process.wait()
+        here.close()
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back until the end of the block.
+
+    Threads and processes that start within the block never receive Ctrl-C, although a terminal sends it to every
+    process. Only the driver receives it, and stops the others.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _main() -> None:
+    """Do the work of the parent process at the other end of a pipe, given by its number, and send the result."""
+    sys.dont_write_bytecode = True  # nothing is written beside the code of others
+    pipe = Connection(int(sys.argv[1]))
+    try:
+        function, arguments = pipe.recv()
+        threading.Thread(target=_end_with_parent, args=(pipe,), daemon=True).start()
+        answer = "result", function(*arguments, lambda share: pipe.send(("share", float(share))))
+    except BaseException as error:
+        answer = "raised", _portable(error)
+    pipe.send(answer)
+    os._exit(0)  # threads that the work has left running do not hold the process
+
+
+def _end_with_parent(pipe: Connection) -> None:
+    try:
+        pipe.recv()
+    except (EOFError, OSError):
+        os._exit(1)
+
+
+def _portable(error: BaseException) -> Exception:
+    """Return an exception with its traceback as a note; one that cannot be sent, or would end the parent, by name."""
+    trace = traceback.format_exc()
+    try:
+        portable = isinstance(pickle.loads(pickle.dumps(error)), Exception)
+    except Exception:
+        portable = False
+    sent = error if portable and isinstance(error, Exception) else RuntimeError(repr(error))
+    sent.add_note(trace)
+    return sent
+
+
+if __name__ == "__main__":
+    _main()
