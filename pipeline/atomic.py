@@ -46,18 +46,15 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
         return
     temporary = path.with_name(f".tmp-{path.name}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        if durable:
-            with temporary.open("rb+") as file:
-                os.fsync(file.fileno())
-        temporary.replace(path)
-        if durable:
-            _sync_folder(path.parent)
-    except OSError as error:
-        if error.errno in _UNWRITABLE:
-            raise _unwritable(path, error) from error
-        raise WorkFailed(f"{path}: {error.strerror or error}; what was written before is kept") from error
+        with disk_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            if durable:
+                with temporary.open("rb+") as file:
+                    os.fsync(file.fileno())
+            temporary.replace(path)
+            if durable:
+                _sync_folder(path.parent)
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -70,44 +67,14 @@ def atomic_write(path: Path, content: bytes, *, durable: bool = True) -> None:
 
 
 @contextmanager
-def atomic_folder(path: Path, listing: str) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`; on leaving without error it takes the place of `path`.
-
-    Parameters
-    ----------
-    path : Path
-        The folder. It may exist if it is empty, or was written before, which the file `listing` in it shows.
-    listing : str
-        Name of a file that every such folder holds.
-
-    Raises
-    ------
-    BadInput
-        If the place is taken by something else, or cannot be written.
-    WorkFailed
-        If the disk is full.
-    """
-    if path.is_symlink() or (path.exists() and not path.is_dir()):
-        raise BadInput(str(path), "", "is no folder", "name another place")
-    if path.is_dir() and any(path.iterdir()) and not (path / listing).is_file():
-        raise BadInput(str(path), "", "is not empty", f"name a new folder, or one with a {listing} of this command")
-    target, temporary = path.absolute(), None
+def disk_errors(path: Path) -> Iterator[None]:
+    """Turn errors of the disk inside into BadInput, if the place cannot be written, or WorkFailed."""
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".tmp-{target.name[:60]}-", dir=target.parent))
-        temporary.chmod(0o755)
-        (made := temporary / "new").mkdir()
-        yield made
-        if target.exists():
-            target.rename(temporary / "old")
-        made.rename(target)
+        yield
     except OSError as error:
         if error.errno in _UNWRITABLE:
             raise _unwritable(path, error) from error
         raise WorkFailed(f"{path}: {error.strerror or error}; what was written before is kept") from error
-    finally:
-        if temporary is not None:
-            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def refuse_unwritable(path: Path) -> None:

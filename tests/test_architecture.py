@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 # Imports point to the left (upwards in this list) only.
 ORDER = [
     "weaves",
-    "pipeline",  # fingerprint, atomic
+    "pipeline",  # fingerprint, atomic, folders
     "pipeline.compiled",
     "pipeline.truth",
     "pipeline.analytic",

@@ -168,6 +168,8 @@ class Descriptor(_Model):
     """Files that slangc made, by language."""
     golden: str = GOLDEN
     """Queries with their answers."""
+    files: dict[str, str] = {}
+    """SHA-256 of every file, by path; that of this file is of its other keys."""
 
 
 INPUTS: Final = {

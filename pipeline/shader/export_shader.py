@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from pipeline.atomic import atomic_folder
+from pipeline.folders import own_files
 from pipeline.models.runtimes import no_onnx
 from pipeline.shader.descriptor import GOLDEN, vectors
 from pipeline.shader.languages import ALL, ONNX, SOURCE, compiler_for, made, refuse_unknown, translate
@@ -37,7 +37,7 @@ def export_shader(
     fabric : Fabric
         The cloth.
     folder : Path
-        Folder to write; it may hold an export of the same model of before, which it then replaces.
+        Folder to write; an earlier export of the same model is replaced (`pipeline.folders`).
     level : int, optional
         Level of detail k of the soft nodes, one of DETAILS.
     languages : sequence of str
@@ -63,7 +63,7 @@ def export_shader(
     onnx = _onnx(shader, languages)
     listing = f"{shader.name}.json"
     entries = ("evaluate", "draw", *(("scatter",) if shader.sampled else ()))
-    with atomic_folder(folder, listing) as here:
+    with own_files(folder, listing) as here:
         source = here / SOURCE
         source.mkdir()
         names = _write_source(shader, source)

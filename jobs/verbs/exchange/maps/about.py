@@ -82,6 +82,8 @@ class AboutMaps(_Model):
     """Maps by name."""
     mip_levels: list[tuple[int, int]]
     """Width and height of the smaller levels: `mips/WIDTHxHEIGHT/NAME.exr` and `.png`."""
+    files: dict[str, str] = {}
+    """SHA-256 of every file, by path; that of `maps.json` is of its other keys."""
 
 
 def yarns_per_cm(fabric: Fabric) -> Pair:

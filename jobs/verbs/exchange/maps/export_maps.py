@@ -13,7 +13,7 @@ from jobs.verbs.exchange.maps.openpbr import FILE as DOCUMENT
 from jobs.verbs.exchange.maps.openpbr import write_openpbr
 from jobs.verbs.exchange.maps.sample import FILE as SAMPLE
 from jobs.verbs.exchange.maps.sample import LARGEST_TEXTURE, write_sample
-from pipeline.atomic import atomic_folder
+from pipeline.folders import own_files
 from pipeline.materials.layout import layout
 from pipeline.materials.planes import planes, yarn_ids
 from pipeline.materials.reflectance import reflectance
@@ -34,7 +34,7 @@ def export_maps(fabric: Fabric, folder: Path, size: int) -> str:
     fabric : Fabric
         The cloth.
     folder : Path
-        Folder to write; it may hold maps of before, which it then replaces.
+        Folder to write; maps of before are replaced (`pipeline.folders`).
     size : int
         Texels of the longer side.
 
@@ -48,7 +48,7 @@ def export_maps(fabric: Fabric, folder: Path, size: int) -> str:
             allowed = f"{package} is needed for materials: pip install 'twillight[materials]'"
             raise BadInput("export", "--maps", str(folder), allowed)
     found = layout(fabric, size)
-    with atomic_folder(folder, ABOUT) as made:
+    with own_files(folder, ABOUT) as made:
         written = _write(fabric, size, made)
     assumed = "" if fabric.yarns_per_cm else ", assumed because the fabric has no yarns_per_cm"
     width, height = written.size_cm

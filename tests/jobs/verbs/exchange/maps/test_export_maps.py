@@ -1,7 +1,9 @@
 """The folder of maps, read back by other readers, and the sentences for what cannot be written."""
 
 import errno
+import filecmp
 import json
+import shutil
 
 import MaterialX
 import numpy as np
@@ -151,24 +153,25 @@ def test_the_sample_is_read_by_other_libraries(folder):
     np.testing.assert_allclose(lengths / 1000.0, mesh.edges_unique_length[mesh.edges_unique_inverse], rtol=0.05)
 
 
-def test_maps_of_before_are_replaced_and_other_folders_are_not(folder, tmp_path, capsys):
-    made = tmp_path / "made"
+def test_maps_of_before_are_replaced_and_other_files_stay(folder, tmp_path, capsys):
+    (made := tmp_path / "made" / ".git").mkdir(parents=True)
+    (made / "config").write_text("[core]", encoding="utf-8")
+    (made := made.parent).joinpath("note.txt").write_text("dear", encoding="utf-8")
     for name in ("denim", "gauze"):
         assert call(name, "--maps", str(made), "--size", "64") == 0
     assert (made / "maps.json").read_bytes() == (folder / "maps.json").read_bytes()
-    assert list(tmp_path.iterdir()) == [made]
-    (tmp_path / "letters").mkdir()
-    (tmp_path / "letters" / "to_mother.txt").write_text("dear", encoding="utf-8")
+    assert {path.name for path in made.iterdir()} == {path.name for path in folder.iterdir()} | {".git", "note.txt"}
+    assert (made / ".git" / "config").is_file() and list(tmp_path.iterdir()) == [made]
+    (made / "opacity.png").write_bytes(b"painted over")
     capsys.readouterr()
-    assert call("denim", "--maps", str(tmp_path / "letters"), "--size", "64") == 2
-    assert "is not empty" in capsys.readouterr().err
-    assert [path.name for path in (tmp_path / "letters").iterdir()] == ["to_mother.txt"]
+    assert call("denim", "--maps", str(made), "--size", "64") == 2
+    assert "opacity.png: was changed" in capsys.readouterr().err
+    assert (made / "opacity.png").read_bytes() == b"painted over"
 
 
-def test_a_full_disk_leaves_the_maps_of_before(tmp_path, monkeypatch, capsys):
+def test_a_full_disk_leaves_the_maps_of_before(folder, tmp_path, monkeypatch, capsys):
     made = tmp_path / "made"
-    made.mkdir()
-    (made / "maps.json").write_text("before", encoding="utf-8")
+    shutil.copytree(folder, made)
 
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -176,7 +179,7 @@ def test_a_full_disk_leaves_the_maps_of_before(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(export_maps, "write_texture", full)
     assert call("denim", "--maps", str(made), "--size", "64") == 1
     assert "No space left" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [made] and (made / "maps.json").read_text(encoding="utf-8") == "before"
+    assert not filecmp.dircmp(folder, made).diff_files and len([*made.iterdir()]) == len([*folder.iterdir()])
 
 
 @pytest.mark.parametrize(
