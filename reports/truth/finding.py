@@ -35,27 +35,16 @@ class Finding:
     """One expression over one set of corners."""
 
     expression: str
-    """Expression that is computed."""
-    corner: str
-    """Over which inputs."""
-    arithmetic: str
-    """``float32`` or ``float64``: what computes it; the next better one is the reference."""
-    count: int
-    """Inputs."""
-    worst: float
-    """Worst relative error of the finite values."""
-    at: str
-    """The input that did it."""
-    listed: float
-    """The error this form is known to make."""
-    not_finite: int
-    """Values that are NaN or infinite."""
-    negative: int
-    """Values below 0 where none can be."""
-    naive: float = math.nan
-    """Worst relative error of the textbook's form; NaN if there is none."""
-    naive_not_finite: int = 0
-    """How often that one is NaN or infinite."""
+    corner: str  # over which inputs
+    arithmetic: str  # float32 or float64: what computes it; the next better one is the reference
+    count: int  # inputs
+    worst: float  # worst relative error of the finite values
+    at: str  # the input that did it
+    listed: float  # the error this form is known to make
+    not_finite: int  # values that are NaN or infinite
+    negative: int  # values below 0 where none can be
+    naive: float = math.nan  # worst relative error of the textbook's form; NaN if there is none
+    naive_not_finite: int = 0  # how often that one is NaN or infinite
 
     @property
     def limit(self) -> float:
@@ -64,7 +53,7 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """True if it does not, and every value is a number that can be."""
+        """True if there is no fault."""
         return not self.fault
 
     @property
@@ -85,11 +74,10 @@ def judge(
     value: npt.ArrayLike,
     reference: npt.ArrayLike,
     listed: float,
-    *,
     naive: npt.ArrayLike | None = None,
     floor: float = 0.0,
-    absolute: bool = False,
     signed: bool = False,
+    absolute: bool = False,
 ) -> Finding:
     """Compare values with their reference.
 
@@ -98,7 +86,7 @@ def judge(
     expression, corner, arithmetic, listed
         As in `Finding`.
     inputs : mapping
-        Name and value (N,) of what the N corners differ in.
+        Name and values (N,) or (3, N) of what the N corners differ in.
     value, reference : float (N,) or (N, k)
         What was computed, and what it should be; objects of 50 digits are welcome. Of k numbers the length of the
         error vector over that of the reference counts.
@@ -106,60 +94,59 @@ def judge(
         The textbook's form.
     floor : float
         Size below which the reference counts as this large.
-    absolute : bool
-        Errors are not divided by the reference.
-    signed : bool
-        Values may be negative.
+    signed, absolute : bool
+        Values may be negative; errors are not divided by the reference.
     """
-    found, naive_found = np.asarray(value, np.float64), None if naive is None else np.asarray(naive, np.float64)
-    error = _errors(value, reference, floor, absolute)
-    finite = np.isfinite(found).reshape(len(found), -1).all(axis=1)
-    error = np.where(finite, error, 0.0)
+    error, finite = _errors(value, reference, floor, absolute)
+    negative = finite & ~np.bool_(signed) & (np.asarray(value, np.float64) < 0).reshape(len(finite), -1).any(axis=1)
     # What cannot be at all comes before what is merely wrong.
-    impossible = ~finite if signed else ~finite | (found < 0).reshape(len(found), -1).any(axis=1)
+    impossible = ~finite | negative
     row = int(impossible.argmax() if impossible.any() else error.argmax())
     other, lost = math.nan, 0
-    if naive is not None and naive_found is not None:
-        good = np.isfinite(naive_found)
-        lost = int((~good).sum())
-        other = float(np.where(good, _errors(np.where(good, naive, 0.0), reference, floor, absolute), 0.0).max())
+    if naive is not None:
+        naive_error, naive_finite = _errors(naive, reference, floor, absolute)
+        other, lost = float(naive_error.max()), int((~naive_finite).sum())
     return Finding(
         expression=expression,
         corner=corner,
         arithmetic=arithmetic,
         count=len(error),
         worst=float(error.max()),
-        at=", ".join(f"{name} {_word(np.asarray(column)[row])}" for name, column in inputs.items()),
+        at=", ".join(f"{name} {_word(np.asarray(column).T[row])}" for name, column in inputs.items()),
         listed=listed,
         not_finite=int((~finite).sum()),
-        negative=int((impossible & finite).sum()),
+        negative=int(negative.sum()),
         naive=other,
         naive_not_finite=lost,
     )
 
 
-def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool) -> npt.NDArray[np.float64]:
-    """Return relative errors (N,); the differences are taken in the better of the two arithmetics."""
+def _errors(
+    value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    """Return relative errors (N,), 0 of values that are not finite, and which are finite.
+
+    Differences are taken in the better of the two arithmetics.
+    """
     truth = np.asarray(reference)
-    found = np.asarray(value)
+    good = np.isfinite(np.asarray(value, np.float64))
+    values = np.where(good, value, 0.0)
     if truth.dtype == object:
         from reports.truth.formulas import exact
 
-        # Infinite and NaN values are counted elsewhere.
-        found = exact(np.where(np.isfinite(np.asarray(value, np.float64)), value, 0.0))
+        values = exact(values)
     else:
-        found, truth = found.astype(np.float64), truth.astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        difference = np.abs(np.asarray(found - truth)).reshape(len(truth), -1)
+        values, truth = values.astype(np.float64), truth.astype(np.float64)
+    finite = np.asarray(good.reshape(len(good), -1).all(axis=1))
+    difference = np.abs(np.asarray(values - truth)).reshape(len(truth), -1)
     size = np.abs(truth).reshape(len(truth), -1)
     if difference.shape[1] > 1:
         difference, size = (np.sqrt((part * part).sum(axis=1, keepdims=True)) for part in (difference, size))
-    if absolute:
-        return np.asarray(difference[:, 0], np.float64)
-    nothing = np.equal(size, 0).astype(np.bool_)
-    # Where the truth is 0, so must be the value.
-    bounded = np.where(np.less(size, floor).astype(np.bool_), floor, np.where(nothing, 1, size))
-    return np.asarray((difference / bounded)[:, 0], np.float64)
+    if not absolute:
+        # Where the truth is 0, so must be the value.
+        nothing = np.equal(size, 0).astype(np.bool_)
+        difference = difference / np.where(np.less(size, floor).astype(np.bool_), floor, np.where(nothing, 1, size))
+    return np.where(finite, np.asarray(difference[:, 0], np.float64), 0.0), finite
 
 
 def failures(findings: Iterable[Finding]) -> list[Finding]:
