@@ -439,17 +439,17 @@ def footprints() -> list[Finding]:
         for alpha, thickness in ((0.01, 100.0), (1.0, 0.001)):
             fabric = _fabric(rows, alpha, thickness)
             near, far, inputs = _queries(fabric)
-            values = [
+            far_values, near_values = (
                 np.concatenate([
                     np.hstack([a.mean, a.standard_error, a.transparency[:, None]])
                     for a in (estimate(fabric, queries, option, 0) for option in options)
                 ])
                 for queries in (far, near)
-            ]  # fmt: skip
+            )  # fmt: skip
             inputs = {key: np.tile(column, 2) for key, column in inputs.items()}
             inputs["footprint"] = np.repeat(_SHAPES, len(near.u))
             corner = f"{name}, α = {alpha:g}, T = {thickness:g}, 1e6 yarns away"
-            findings.append(judge("answer", corner, "float64", inputs, *values, _ROUNDING))
+            findings.append(judge("answer", corner, "float64", inputs, far_values, near_values, _ROUNDING))
     return findings
 
 
