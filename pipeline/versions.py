@@ -16,7 +16,6 @@ TRAINING: Final = 4
 
 MODELS: Final[dict[str, int]] = {
     "curved": 2,
-    "gauss_nodes": 2,
     "point_sampled": 3,
     "prefiltered": 2,
     "selvage": 5,

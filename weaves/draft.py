@@ -118,10 +118,6 @@ class Draft:
         """Return this cloth with the repeat shifted by `ends` to the left and `picks` down."""
         return Draft(np.roll(self.warp_over, (picks, ends), axis=(0, 1)), self.name)
 
-    def tiled(self, repeats: int) -> Draft:
-        """Return several repeats in each direction as one; BadInput if that is too large."""
-        return Draft(np.tile(self.warp_over, (repeats, repeats)), f"{self.name}, {repeats} x {repeats} repeats")
-
     def rows(self) -> list[str]:
         """Return the drawing that `from_rows` reads."""
         return ["".join("#" if over else "." for over in pick) for pick in self.warp_over[::-1]]

@@ -11,8 +11,6 @@ import reprlib
 from collections.abc import Iterable
 from typing import Final
 
-from weaves.renamed import replacement
-
 MOST_LETTERS: Final = 300
 """Most letters of a sentence."""
 
@@ -100,7 +98,7 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(one if one.isprintable() or one in "\n\t" else "·" for one in text)
 
 
-def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
+def nearest(word: str, known: Iterable[str]) -> str:
     """Return the known name that was probably meant, as the end of a sentence.
 
     Parameters
@@ -109,18 +107,13 @@ def nearest(word: str, known: Iterable[str], kind: str = "") -> str:
         The name found.
     known : iterable of str
         Names that are allowed.
-    kind : str
-        Kind of the name in `weaves.renamed`; empty if names of this kind never changed.
 
     Returns
     -------
     str
-        ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near; for a name of an earlier
-        version ``"'old' is now 'x'"``.
+        ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near.
     """
     names = sorted(known)
-    if new := replacement(kind, word):
-        return new
     close = difflib.get_close_matches(word[:_WORD], names, n=1, cutoff=0.5)
     suggestion = f"did you mean {close[0]!r}? " if close else ""
     return f"{suggestion}known: {', '.join(names)}"

@@ -16,7 +16,6 @@ from pydantic import BaseModel, ValidationError
 
 from weaves.errors import BadInput, brief, nearest, one_line
 from weaves.reading import MOST_TEXT, read_text
-from weaves.renamed import KEY, replacement
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -107,19 +106,15 @@ def bad_input(error: ValidationError, model: type[BaseModel], data: object, wher
         case "missing":
             return BadInput(where, "", f"{key} is missing", f"it is required{more}")
         case "extra_forbidden":
-            allowed = "unknown key; " + nearest(str(location[-1]), _fields_at(model, location[:-1]), KEY)
+            allowed = "unknown key; " + nearest(str(location[-1]), _fields_at(model, location[:-1]))
         case "union_tag_invalid":
             context = first["ctx"]
             discriminator = context["discriminator"].strip("'")
             key, value = f"{key}.{discriminator}", context["tag"]
-            allowed = nearest(
-                context["tag"], [name.strip(" '") for name in context["expected_tags"].split(",")], discriminator
-            )
+            allowed = nearest(context["tag"], [name.strip(" '") for name in context["expected_tags"].split(",")])
         case "union_tag_not_found":
             discriminator = first["ctx"]["discriminator"].strip("'")
             return BadInput(where, "", f"{key}.{discriminator} is missing", f"it is required{more}")
-        case "literal_error" if new := replacement(str(location[-1]), first["input"]):
-            allowed = new
         case "model_type" | "model_attributes_type" | "dict_type":
             allowed = "a table is needed"
         case _:

@@ -15,10 +15,9 @@ from pipeline.models.added.added_code import AddedFunction
 from pipeline.models.added.added_method import ADDED, GROUP, AddedMethod
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import WHERE
-from pipeline.models.catalogue import CLASSES
+from pipeline.models.catalogue import CLASSES, REPLACED
 from reports.added_metric import AddedMetric
 from weaves.errors import BadInput, nearest
-from weaves.renamed import replacement
 from weaves.validation import validated
 
 _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "runtimes")
@@ -120,5 +119,6 @@ def _installed() -> dict[str, str]:
 
 def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:
     """Return what is allowed in place of an unknown name."""
-    names = nearest(model, known, "model")
-    return names if replacement("model", model) else f"code of your own is given with --add FILE.py:CLASS; {names}"
+    if model in REPLACED:
+        return f"this method is gone: take {REPLACED[model]!r}"
+    return f"code of your own is given with --add FILE.py:CLASS; {nearest(model, known)}"

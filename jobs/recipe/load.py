@@ -16,7 +16,6 @@ from reports.options import BenchOptions
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import population_fabrics
-from weaves.renamed import SCENE
 from weaves.validation import read_toml, validated
 
 RECIPES = Path(__file__).parents[1] / "recipes"
@@ -123,7 +122,7 @@ def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
         path = recipe.parent / name if "\0" not in name else Path()
         if name not in SHIPPED and not (path.suffix in (".toml", ".xml") and path.is_file()):
             allowed = "a scene of the package or the path of a .toml or .xml file beside the recipe is needed; "
-            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED, SCENE))
+            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED))
         found.append(name if name in SHIPPED else str(path.resolve()))
     scenes = [load_scene(name).name for name in found]
     for index, name in enumerate(scenes):

@@ -89,7 +89,7 @@ def _taken_over(
     name = entry.get("name", entry.get("model"))
     if not isinstance(name, str) or name not in known:
         called = "name" if "name" in entry else "model"
-        allowed = f"must be a model of the recipe {trainer.name}; {nearest_name(str(name), list(known), 'model')}"
+        allowed = f"must be a model of the recipe {trainer.name}; {nearest_name(str(name), list(known))}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
     model, options = known[name], known[name].options
     kind = options.name if options.model == ADDED else options.model

@@ -21,7 +21,7 @@ MOST_SHARDS: Final = 250_000
 """Most shards of a data set, each a task: 2 * 10^9 rows by default. The manifest then has 60 MB."""
 
 _PLAIN = TruthOptions()
-_LEARNT = ("frame", "normaliser", "shadows", "variation")  # physics that not every model can learn
+_LEARNT = ("frame", "normaliser", "shadows")  # physics that not every model can learn
 
 
 def validate_recipe(recipe: Recipe, where: str) -> None:
@@ -50,8 +50,8 @@ def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[
     `node_table` answers from its nodes or not at all, so that tests and timings know what they compare. `auto` takes
     the same table where it is good enough and samples the rest; with a large `relative_error` it costs the same.
     """
-    if any(getattr(truth, name) != getattr(_PLAIN, name) for name in ("frame", "shadows", "variation")):
-        return "it knows the default frame, shadows and variation only"
+    if any(getattr(truth, name) != getattr(_PLAIN, name) for name in ("frame", "shadows")):
+        return "it knows the default frame and shadows only"
     if queries.sigma[0] < TABLE_SIGMA:
         return f"it knows footprints from {TABLE_SIGMA:.3g} yarn spacings on, the queries begin at {queries.sigma[0]:g}"
     if queries.stretch > 1.0 or queries.curvature[1] > 0.0:

@@ -21,13 +21,13 @@ _Kind = TypeVar("_Kind")
 
 _ROWS: Final = 8
 
-_SAMPLED: Final = ("mc", "jittered", "r2")
+_SAMPLED: Final = ("mc", "r2")
 """Estimators with the kernels of `owen`."""
 
 _FALLBACK: Final = ("node_table", "quadrature")
 """Estimators that answer queries outside the domain of a method."""
 
-_LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "gauss_nodes", "owen")
+_LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "owen")
 
 
 class KernelGroup(NamedTuple):

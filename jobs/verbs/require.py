@@ -120,7 +120,7 @@ def require(
         raise BadInput("require", "limits", limits, f"no method meets them; the nearest points of the front are {near}")
     if chosen.method not in names:
         allowed = "the page shows it, the recipe has no such method: run the recipe again, or choose one with --method"
-        told = nearest_name(chosen.method, names, "model")
+        told = nearest_name(chosen.method, names)
         raise BadInput(f"the page of {general.name}", "method", chosen.method, f"{allowed}; {told}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
     write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options, add)

@@ -22,7 +22,7 @@ class PointSampler:
     fabric : Fabric
         The cloth.
     options : TruthOptions
-        Footprint, frame, normaliser, shadows and variation; the estimator and its limits play no part. Left out: the
+        Footprint, frame, normaliser and shadows; the estimator and its limits play no part. Left out: the
         defaults.
     """
 

@@ -6,7 +6,7 @@ angles (the shares multiply) or opposite (the hidden parts exclude each other).
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -14,33 +14,8 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-_RAMP, _RAMP_SLOPE = (
-    np.float32(0.02),
-    np.float32(0.4),
-)  # width of the ramp of a point, and its growth with the deviation
+_RAMP, _RAMP_SLOPE = np.float32(0.02), np.float32(0.4)  # width of a point's ramp, and its growth with the deviation
 _TINY: Final = np.float32(1e-20)
-
-
-class SoftHorizons(NamedTuple):
-    """Horizons of N nodes towards a direction.
-
-    Attributes
-    ----------
-    first, second : float32 (N,)
-        Mean sine of the elevation at the two azimuths around the direction.
-    turn : float32
-        The direction's place between them, 0 to 1.
-    z : float32
-        Sine of its own elevation.
-    steepness : float32 (N,)
-        1 over the width of the ramp.
-    """
-
-    first: Float32
-    second: Float32
-    turn: np.float32
-    z: np.float32
-    steepness: Float32
 
 
 def over_boxes(

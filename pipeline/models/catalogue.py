@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Union, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Union, cast
 
 from pydantic import Field
 
@@ -33,6 +33,9 @@ CLASSES: dict[str, type[Options]] = {
     folder.parent.name: _options_of(folder.parent.name) for folder in sorted(Path(__file__).parent.glob("*/options.py"))
 }
 """The options' class of every model of the package, by the name of its folder."""
+
+REPLACED: Final = {"gauss_nodes": "soft_nodes"}
+"""Models of earlier versions, and those to take in their place."""
 
 if TYPE_CHECKING:
     ModelOptions = Options

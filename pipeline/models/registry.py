@@ -38,7 +38,7 @@ class _Card(BaseModel):
 def module_of(model: str) -> ModuleType:
     """Import the file of a model; BadInput, with the nearest name, if there is none."""
     if model not in CLASSES:
-        raise BadInput("models", "model", model, nearest(model, CLASSES, "model"))
+        raise BadInput("models", "model", model, nearest(model, CLASSES))
     return import_module(f"pipeline.models.{model}.model")
 
 

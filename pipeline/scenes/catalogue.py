@@ -18,7 +18,6 @@ from pathlib import Path
 from pipeline.scenes.scene import Scene
 from pipeline.scenes.shipped import SHIPPED
 from weaves.errors import BadInput, nearest
-from weaves.renamed import SCENE
 from weaves.validation import read_toml, validated
 
 
@@ -53,7 +52,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
         name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60]
         return Scene(name=name, source=path)
     allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "
-    raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED, SCENE))
+    raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED))
 
 
 def _with_fabrics(scene: Scene, folder: Path) -> Scene:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.truth.footprint.place import BOX, GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField, height_field
-from pipeline.truth.options import TruthOptions, Variation
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices
 from weaves.fabric import Fabric
@@ -38,8 +38,6 @@ class ClothSide(NamedTuple):
         GAUSSIAN or BOX.
     projected : bool
         Whether the denominator is the footprint's projected area.
-    varied : bool
-        Whether floats differ in gloss.
     """
 
     front: HeightField
@@ -47,7 +45,6 @@ class ClothSide(NamedTuple):
     choices: Choices
     shape: int
     projected: bool
-    varied: bool
 
 
 class Columns(NamedTuple):
@@ -110,18 +107,17 @@ def columns_of(queries: Queries, behind: bool = False) -> Columns:
 
 def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> ClothSide:
     """Return the front of a fabric for kernels, or its back if the viewer is `behind` it."""
-    front, back = _sides(fabric, options.variation)
+    front, back = _sides(fabric)
     return ClothSide(
         back if behind else front,
         front if behind else back,
         Choices(options.frame == "macro", options.shadows),
         FOOTPRINTS[options.footprint],
         options.normaliser == "projected",
-        options.variation is not None,
     )
 
 
 @lru_cache(maxsize=64)
-def _sides(fabric: Fabric, variation: Variation | None) -> tuple[HeightField, HeightField]:
+def _sides(fabric: Fabric) -> tuple[HeightField, HeightField]:
     """Tabulate both sides, once for each fabric; the draft of a back repeats as that of the front does."""
-    return height_field(fabric, variation), height_field(fabric.back(), variation)
+    return height_field(fabric), height_field(fabric.back())

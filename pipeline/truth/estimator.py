@@ -1,6 +1,6 @@
 """The estimators of the patch BSDF behind one interface: means, calibrated errors, points used.
 
-`mc`, `jittered`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
+`mc`, `r2`, `owen` sample the footprint (monte_carlo); `quadrature` is Gauss-Legendre on every float;
 `node_table` sums over nodes with horizons; `auto` takes `node_table` where its error is small enough, and samples the
 other queries (node_table.cascade).
 """
@@ -43,7 +43,6 @@ Estimator = Callable[[ClothSide, Columns, Index, TruthOptions, int], Raw]
 
 ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "mc": partial(_sampled, monte_carlo.INDEPENDENT),
-    "jittered": partial(_sampled, monte_carlo.JITTERED),
     "r2": partial(_sampled, monte_carlo.R2),
     "owen": partial(_sampled, monte_carlo.OWEN),
     "quadrature": quadrature_rows,

@@ -19,7 +19,7 @@ from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kern
 from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns
 from pipeline.truth.footprint.hidden import conceal
 from pipeline.truth.footprint.place import place_pair
-from pipeline.truth.footprint.sequences import derive, independent_pair, jittered_pair, owen_pair, r2_pair
+from pipeline.truth.footprint.sequences import derive, independent_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.scattering.point import Directions, directions_of, point_share
 
@@ -28,7 +28,7 @@ RANDOMISATIONS: Final = 16
 HIDDEN_PATIENCE: Final = 16
 """Times `max_count` that a patch may spend of which some randomisation has not seen a single point."""
 
-INDEPENDENT, JITTERED, R2, OWEN = range(4)
+INDEPENDENT, R2, OWEN = range(3)
 
 
 @inlined_kernel
@@ -131,7 +131,7 @@ def sample_rows(
     index : int (N,)
         Name of each row: its random numbers are a function of (seed, index).
     method : int
-        INDEPENDENT, JITTERED, R2 or OWEN.
+        INDEPENDENT, R2 or OWEN.
     relative_error, absolute_error, min_count, max_count, seed
         As in `TruthOptions` and `estimate`.
     """
@@ -154,8 +154,6 @@ def sample_rows(
                         first, second = owen_pair(randomisation, k)
                     elif method == R2:
                         first, second = r2_pair(randomisation, k)
-                    elif method == JITTERED:
-                        first, second = jittered_pair(randomisation, k, k - done, target - done)
                     else:
                         first, second = independent_pair(randomisation, k)
                     x, y, weight = place_point(columns, row, cloth, first, second)

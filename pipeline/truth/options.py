@@ -4,28 +4,18 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-EstimatorName = Literal["mc", "jittered", "r2", "owen", "quadrature", "node_table", "auto"]
+EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
+
+REPLACED: Final = {"jittered": "r2"}
+"""Estimators of earlier versions, and those to take in their place."""
 
 TABLE_CELLS: Final = 96
 """Most different cells of a cloth that the estimator `node_table` knows; larger tables take too long to build."""
 
 TABLE_SIGMA: Final = 1.25 / 32
 """Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
-
-
-class Variation(BaseModel):
-    """Random differences in gloss between floats."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
-
-    spread: float = Field(gt=0, le=2)
-    """Standard deviation of the logarithm of the factor."""
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    """Seed of the factors."""
-    repeats: int = Field(default=4, ge=1, le=32)
-    """Repeats of the draft, in each direction, until the factors begin again."""
 
 
 class TruthOptions(BaseModel):
@@ -54,8 +44,15 @@ class TruthOptions(BaseModel):
     area of the footprint, which restores reciprocity."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
-    variation: Variation | None = None
-    """Random gloss of every float; left out: all yarns of a family are alike."""
+    variation: None = None
+    """All yarns of a family are alike. Part of the identity of shards and of the physics on model cards."""
+
+    @field_validator("estimator", mode="before")
+    @classmethod
+    def _named_anew(cls, name: object) -> object:
+        if isinstance(name, str) and name in REPLACED:
+            raise ValueError(f"this estimator is gone: take {REPLACED[name]!r}")
+        return name
 
     @model_validator(mode="after")
     def _powers_of_two(self) -> TruthOptions:

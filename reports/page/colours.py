@@ -30,7 +30,6 @@ MARKERS: Final[Mapping[str, Marker]] = {
     "r2_points": "D",
     "prefiltered": "P",
     "map_material": (8, 1, 0),
-    "gauss_nodes": "^",
     "soft_nodes": ">",
     "summed_area": (5, 0, 0),
 }
@@ -103,7 +102,6 @@ LIGHT: Final = Scheme(
         "r2_points": "#a67806",
         "prefiltered": "#6f7484",
         "map_material": "#b3263f",
-        "gauss_nodes": "#8e44ad",
         "soft_nodes": "#d24fa2",
         "summed_area": "#2e8b3c",
     },
@@ -132,7 +130,6 @@ DARK: Final = Scheme(
         "r2_points": "#e3bf4e",
         "prefiltered": "#a7adbd",
         "map_material": "#ff8fa3",
-        "gauss_nodes": "#d29bf0",
         "soft_nodes": "#f9a8d8",
         "summed_area": "#7fe08c",
     },

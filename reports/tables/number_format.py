@@ -18,7 +18,6 @@ IN_THE_NOISE: Final = "in the noise"
 
 NAMES: Final = {
     "neumip": "NeuMIP",
-    "gauss_nodes": "Gauss nodes",
     "point_sampled": "points",
     "r2_points": "R2 points",
     "unified_btf": "unified BTF",

@@ -71,7 +71,7 @@ def fixed(estimator: EstimatorName, count: int) -> TruthOptions:
     return TruthOptions(estimator=estimator, relative_error=1e-9, absolute_error=0.0, min_count=count, max_count=count)
 
 
-_SAMPLED: Final[tuple[EstimatorName, ...]] = ("mc", "jittered", "r2", "owen")
+_SAMPLED: Final[tuple[EstimatorName, ...]] = ("mc", "r2", "owen")
 SETTINGS: Final[dict[str, TruthOptions]] = {
     **{f"{name}, {count} points": fixed(name, count) for name in _SAMPLED for count in COUNTS},
     "quadrature at 2 %": TruthOptions(estimator="quadrature", relative_error=0.02),

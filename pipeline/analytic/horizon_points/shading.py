@@ -214,12 +214,3 @@ def gather(
         c_warp += diffuse[k] * warpness[k]
         c_weft += diffuse[k] * weftness[k]
     return a, s_warp, s_weft, c_warp, c_weft
-
-
-@fast_kernel
-def plain_sum(values: Float32, count: int) -> np.float32:
-    """Return the sum of the first `count` values."""
-    total = _0
-    for k in range(count):
-        total += values[k]
-    return total

@@ -2,9 +2,8 @@
 
 There is no state: any worker, in any order, computes the same number from the same key, index and dimension. The
 generator is SplitMix64's finaliser over a Weyl sequence [Steele2014SplitMix]. Points in the unit square: independent;
-jittered, one in each stratum of a grid; R2, the additive sequence of the plastic number with a random shift
-[Roberts2018R2]; and the first two Sobol dimensions [Sobol1967] with nested uniform (Owen) scrambling by the
-Laine-Karras hash in Vegdahl's constants [Burley2020Owen].
+R2, the additive sequence of the plastic number with a random shift [Roberts2018R2]; and the first two Sobol dimensions
+[Sobol1967] with nested uniform (Owen) scrambling by the Laine-Karras hash in Vegdahl's constants [Burley2020Owen].
 """
 
 from __future__ import annotations
@@ -99,18 +98,6 @@ def r2_pair(key: np.uint64, index: int) -> tuple[float, float]:
     first = uniform(key, 0, 0) + index * _R2_FIRST
     second = uniform(key, 0, 1) + index * _R2_SECOND
     return max(first - math.floor(first), _LEAST), max(second - math.floor(second), _LEAST)
-
-
-@kernel
-def jittered_pair(key: np.uint64, index: int, strata: int, of: int) -> tuple[float, float]:
-    """Return the random point in stratum `strata` of a grid of `of` strata, a power of two; `index` names it."""
-    columns = 1
-    while columns * columns < of:
-        columns *= 2
-    row, column = strata // columns, strata % columns
-    first = (column + uniform(key, index, 0)) / columns
-    second = (row + uniform(key, index, 1)) * columns / of
-    return max(first, _LEAST), max(second, _LEAST)
 
 
 @kernel

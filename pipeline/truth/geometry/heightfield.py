@@ -15,8 +15,6 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.geometry.gloss import gloss
-from pipeline.truth.options import Variation
 from weaves.draft import cells
 from weaves.fabric import Fabric
 
@@ -26,7 +24,7 @@ WARP, WEFT, GAP = 0, 1, 2
 RADIUS, INVERSE_RADIUS, SIN_TWIST, COS_TWIST, ALPHA, BETA, BLEND, BEND = range(8)
 # Columns of `HeightField.floats`: [pick, end, TOP or UNDER, column]; a bend radius of 0 marks a float drawn flat.
 TOP, UNDER = 0, 1
-OFFSET, BEND_RADIUS, HALF_LENGTH, AXIS_DROP, GLOSS = range(5)
+OFFSET, BEND_RADIUS, HALF_LENGTH, AXIS_DROP = range(4)
 
 _EDGE = 1e-9  # cosine across a yarn below which the slope counts as vertical
 
@@ -60,12 +58,9 @@ class HeightField(NamedTuple):
     thickness: float
 
 
-def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightField:
-    """Tabulate a fabric for the kernels; with a `variation`, so many repeats of it that its yarns can differ."""
-    draft = fabric.weave
-    if variation is not None:
-        draft = draft.tiled(variation.repeats)
-    table = cells(draft)
+def height_field(fabric: Fabric) -> HeightField:
+    """Tabulate a fabric for the kernels."""
+    table = cells(fabric.weave)
     families = (fabric.warp, fabric.weft)
     yarn = np.array(
         [
@@ -82,7 +77,7 @@ def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightFi
             for y in families
         ]
     )
-    floats = np.zeros((*table.top.shape, 2, 5))
+    floats = np.zeros((*table.top.shape, 2, 4))
     crown = np.zeros(table.top.shape)
     for pick, end in np.ndindex(*table.top.shape):
         for side, offset, length in (
@@ -91,10 +86,7 @@ def height_field(fabric: Fabric, variation: Variation | None = None) -> HeightFi
         ):
             family = int(table.top[pick, end]) if side == TOP else 1 - int(table.top[pick, end])
             row = _float_row(float(offset), float(length), families[family].width, families[family].bend)
-            factor = 1.0
-            if variation is not None:
-                factor = gloss(variation, family, side, pick, end, float(offset), float(length), draft.repeat)
-            floats[pick, end, side] = (*row, factor)
+            floats[pick, end, side] = row
             if side == TOP or families[1 - family].width < 1.0:
                 crown[pick, end] = max(
                     float(crown[pick, end]), families[family].relief * _rise(side, row, yarn[family, RADIUS])

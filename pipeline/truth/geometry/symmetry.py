@@ -1,7 +1,7 @@
 """Symmetry of a cloth: the translations that map it onto itself, and the cells that remain different.
 
 A satin of 8 ends has 64 cells a repeat, of which 8 differ. Cells that a translation carries into one another form an
-orbit: their pieces, horizons and nodes are those of one of them. Floats that differ in gloss break the symmetry.
+orbit: their pieces, horizons and nodes are those of one of them.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def rectangles(field: HeightField, wanted_cells: Mask) -> Float64:
                 half, offset = field.floats[pick, end, side, HALF_LENGTH], field.floats[pick, end, side, OFFSET]
                 middle = (end if family == WARP else pick) + 0.5
                 cell = float(pick if family == WARP else end)
-                # A yarn that never changes side is cut at the cells, whose gloss may differ.
+                # A yarn that never changes side has floats without end: it is cut at the cells.
                 first = half == math.inf or offset < 0.75 - half
                 last = half == math.inf or offset > half - 0.75
                 for strip in range(2):

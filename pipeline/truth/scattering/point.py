@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, GLOSS, UNDER, HeightField, surface_at
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
 from pipeline.truth.geometry.visibility import Ray, ray, visible
 from pipeline.truth.scattering.microflake import density, sigma
 from pipeline.truth.scattering.slab import reflection, transmission, unscattered
@@ -133,7 +133,6 @@ def point_share(
         specular = slab_i * transmission(flakes, sigma_i, sigma_o, slab_i, cos_o, front.thickness)
     else:
         specular = slab_i * reflection(flakes, sigma_i, sigma_o, slab_i, cos_o, front.thickness)
-    specular *= front.floats[int(y), int(x), side, GLOSS]
     diffuse = (blend * facing + (1.0 - blend) * (abs(light.z) if transmitted else max(light.z, 0.0))) / math.pi
     return family, area, specular * area, diffuse * area, through
 

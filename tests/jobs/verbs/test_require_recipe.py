@@ -101,10 +101,10 @@ def test_what_is_saved_is_counted(tmp_path):
     assert "512,000 queries to learn from in place of 9,216,000 (18.0 times)" in said
 
 
-@pytest.mark.parametrize(("method", "parameter"), [("point_sampled", "counts"), ("gauss_nodes", "nodes")])
-def test_one_setting_is_enough(tmp_path, method, parameter):
-    own = narrowed(tmp_path / "r.toml", method=method, setting="k = 16")
-    assert getattr(own.models[0].options, parameter) == [16]
+@pytest.mark.parametrize(("method", "parameter", "k"), [("point_sampled", "counts", 16), ("soft_nodes", "levels", 8)])
+def test_one_setting_is_enough(tmp_path, method, parameter, k):
+    own = narrowed(tmp_path / "r.toml", method=method, setting=f"k = {k}")
+    assert getattr(own.models[0].options, parameter) == [k]
     assert len(own.models) == (1 if method == "point_sampled" else 2)
     assert "nothing to train" in savings(tmp_path / "r.toml", QUICK)
 

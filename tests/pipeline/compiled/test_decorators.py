@@ -86,8 +86,6 @@ REAL = """
 import hashlib
 import sys
 import numpy as np
-from pipeline.models.gauss_nodes.options import GaussNodesOptions
-from pipeline.models.gauss_nodes.model import GaussNodes
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -99,7 +97,6 @@ fabric = load_fabric("denim")
 queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "node_table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)[:2]),
-    "gauss_nodes": lambda: GaussNodes(4, GaussNodesOptions(model="gauss_nodes")).predict(fabric, queries),
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
     "points": lambda: HorizonSampler(fabric).sample(queries, 16, True, 1),
 }
@@ -304,7 +301,7 @@ def test_real_kernels_answer_the_same_cold_and_warm_in_any_order(tmp_path):
     for name in "ab":
         for package in ("weaves", "pipeline"):
             shutil.copytree(ROOT / package, tmp_path / name / package, ignore=shutil.ignore_patterns("__pycache__"))
-    order = ("node_table", "gauss_nodes", "soft_nodes", "points")
+    order = ("node_table", "soft_nodes", "points")
     cold = answers(start(tmp_path / "a", REAL, *order))
     assert answers(start(tmp_path / "a", REAL, *order[::-1])) == cold
     assert answers(start(tmp_path / "b", REAL, *order[::-1])) == cold

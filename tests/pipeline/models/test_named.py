@@ -22,7 +22,6 @@ LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
         ("prefiltered", ("prefiltered", "")),
         ("point_sampled", ("point_sampled", "k = 64")),
         ("point_sampled:3", ("point_sampled", "k = 3")),
-        ("gauss_nodes:4", ("gauss_nodes", "k = 4")),
     ],
 )
 def test_a_name_and_a_setting_load_a_method(name, found):
@@ -60,8 +59,8 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
         ("woven", "must be trained first"),
         ("soft_nodes:3", "1, 2, 4 or 8"),
         ("prefiltered:4", "prefiltered has no settings"),
-        ("gauss_nodes:99", "less than or equal to 16"),
-        ("gauss_nodes:x", "a number k after the colon"),
+        ("summed_area:1000", "less than or equal to 512"),
+        ("summed_area:x", "a number k after the colon"),
         ("", "the folder of a trained model or a name"),
     ],
 )

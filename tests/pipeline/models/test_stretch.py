@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pipeline.models.fallback import Fallback
-from pipeline.models.gauss_nodes.options import GaussNodesOptions
 from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods
 from pipeline.models.soft_nodes.options import SoftNodesOptions
@@ -23,12 +22,11 @@ COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
     ("options", "bound"),
     [
         (SoftNodesOptions(levels=[2]), 0.04),
-        (GaussNodesOptions(nodes=[8]), 0.04),
         (SummedAreaOptions(clusters=[64]), 0.05),
         (PointSampledOptions(counts=[4096], sequence="r2", visibility="horizon"), 0.03),
         (PointSampledOptions(counts=[4096], sequence="r2"), 0.03),
     ],
-    ids=["soft nodes", "Gauss nodes", "clusters", "points, horizons", "points"],
+    ids=["soft nodes", "clusters", "points, horizons", "points"],
 )
 def test_ellipses_are_answered_as_such(options, bound):
     """RMSE of the colour over the mean; asked for the round footprint of equal area half as much again at least."""

@@ -160,7 +160,7 @@ def test_the_front_is_named_and_shown(written):
 
 @pytest.mark.usefixtures("undrawn")
 def test_methods_that_learn_nothing_make_no_headline(page_input, tmp_path):
-    note = ModelNote("woven", "a rule", kind="gauss_nodes")
+    note = ModelNote("woven", "a rule", kind="soft_nodes")
     models = [note, *page_input.models[1:]]
     page = Page(write_page(tmp_path, replace(page_input, models=models)).read_text(encoding="utf-8"))
     assert "Woven reaches" not in page.words and "NeuMIP reaches" in page.words

@@ -9,7 +9,7 @@ def test_the_cheapest_is_said_of_what_was_measured():
     table = pd.DataFrame(
         {
             "role": ["seen", "seen", "seen", "unseen"],
-            "method": ["point_sampled", "gauss_nodes", "woven", "woven"],
+            "method": ["point_sampled", "soft_nodes", "woven", "woven"],
             "setting": ["k = 2", "k = 4", "", ""],
             "ns": [500.0, 1500.0, 4000.0, 4000.0],
             "error": [0.3, 0.04, 0.05, 0.011],
@@ -19,7 +19,7 @@ def test_the_cheapest_is_said_of_what_was_measured():
     seen, unseen = (text.replace("\u00a0", " ") for text in cheapest_sentences(table, (0.5, 0.1, 0.05, 0.02, 0.01)))
     assert seen == (
         "Seen fabrics, error of the colour: cheapest within 50 %: points, k = 2 (500 ns); cheapest within 10 % and 5 "
-        "%: Gauss nodes, k = 4 (1,500 ns); no method reaches 2 % or 1 %."
+        "%: soft nodes, k = 4 (1,500 ns); no method reaches 2 % or 1 %."
     )
     assert unseen.endswith("cheapest within 50 %, 10 %, 5 % and 2 %: woven (4,000 ns); no method reaches 1 %.")
     assert beaten(table) == {"seen": ["woven"], "unseen": []}
@@ -46,8 +46,8 @@ def test_the_cheapest_within_a_flicker_is_said():
 SCENES = pd.DataFrame(
     [
         ("attic", "point_sampled", "k = 2", 0.3, 0.4, -0.4, 3.0),
-        ("attic", "gauss_nodes", "k = 4", 0.0, 0.06, 0.2, 10.0),
-        ("attic", "gauss_nodes", "k = 8", 0.0, 0.019, 0.0005, 45.6),
+        ("attic", "soft_nodes", "k = 4", 0.0, 0.06, 0.2, 10.0),
+        ("attic", "soft_nodes", "k = 8", 0.0, 0.019, 0.0005, 45.6),
         ("attic", "woven", "", 0.04, 0.06, -0.008, 20.0),
         ("cellar", "woven", "", 0.04, 0.06, 0.008, math.nan),
     ],
@@ -59,11 +59,11 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
     """An error lost in the noise counts as the end of its interval; a flicker below the truth's is as far as above."""
     found = {scene: [t.replace("\u00a0", " ") for t in texts] for scene, texts in scene_sentences(SCENES).items()}
     assert found["attic"] == [
-        "Error of the colour: cheapest within 10 %: Gauss nodes, k = 4 (10.0 ms); cheapest within 5 %: woven (20.0 "
-        "ms); cheapest within 2 %: Gauss nodes, k = 8 (45.6 ms).",
-        "Flicker: cheapest within .1 and .01 of the truth: woven (20.0 ms); cheapest within .001 of the truth: Gauss "
+        "Error of the colour: cheapest within 10 %: soft nodes, k = 4 (10.0 ms); cheapest within 5 %: woven (20.0 "
+        "ms); cheapest within 2 %: soft nodes, k = 8 (45.6 ms).",
+        "Flicker: cheapest within .1 and .01 of the truth: woven (20.0 ms); cheapest within .001 of the truth: soft "
         "nodes, k = 8 (45.6 ms).",
-        "In the noise of the truth: the error of Gauss nodes, k = 4 and Gauss nodes, k = 8.",
+        "In the noise of the truth: the error of soft nodes, k = 4 and soft nodes, k = 8.",
     ]
     assert found["cellar"] == []  # nobody was timed there
     assert scene_sentences(SCENES[:0]) == {}

@@ -1,13 +1,9 @@
 """The kernels' surface against the NumPy oracle, and its slopes against finite differences."""
 
-import math
-
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.heightfield import GLOSS, TOP, UNDER, height_along, height_field, surface_at
-from pipeline.truth.options import Variation
-from weaves.draft import Matrix
+from pipeline.truth.geometry.heightfield import TOP, UNDER, height_along, height_field, surface_at
 from weaves.fabric import load_fabric
 from weaves.surface import GAP
 from weaves.surface import surface_at as oracle
@@ -68,21 +64,3 @@ def test_the_place_in_the_endless_fabric_does_not_matter():
     near = height_along(field, TOP, 1.3, 2.6, 0.6, 0.8, 1, 2, 1, 2)
     far = height_along(field, TOP, 1.3 - 8, 2.6 + 12, 0.6, 0.8, 1, 2, 1 - 8, 2 + 12)
     np.testing.assert_allclose(near, far, atol=1e-12)
-
-
-def test_every_float_has_a_gloss_of_its_own_and_their_mean_is_one():
-    variation = Variation(spread=0.5, seed=3, repeats=8)
-    field = height_field(load_fabric("denim"), variation)
-    gloss = field.floats[:, :, TOP, GLOSS]
-    assert gloss.shape == (32, 32)
-    # Denim's warp floats over three picks: the cells of a float share one factor.
-    warp = gloss[field.top == 0]
-    assert len(np.unique(warp)) == 32 * 8
-    assert np.mean(np.unique(warp)) == pytest.approx(1.0, abs=4 * 0.55 / math.sqrt(256))
-    np.testing.assert_array_equal(gloss, height_field(load_fabric("denim"), variation).floats[:, :, TOP, GLOSS])
-
-
-def test_a_yarn_that_never_changes_side_has_one_gloss():
-    all_warp = load_fabric("denim").model_copy(update={"draft": Matrix(rows=("##", "##"))})
-    gloss = height_field(all_warp, Variation(spread=0.5, repeats=3)).floats[:, :, TOP, GLOSS]
-    assert all(len(np.unique(column)) == 1 for column in gloss.T) and len(np.unique(gloss)) == 6

@@ -7,7 +7,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.footprint.mixture import COARSE_LINE, FINE_LINE
 from pipeline.truth.node_table.tables import NodeTable
-from pipeline.truth.options import TruthOptions, Variation
+from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
 
@@ -28,9 +28,7 @@ def test_a_table_is_built_once_and_again_only_for_light_from_behind():
     assert table.table(cloth, False) is both
 
 
-@pytest.mark.parametrize(
-    "options", [{"frame": "macro"}, {"shadows": False}, {"variation": Variation(spread=0.5, repeats=2)}], ids=str
-)
+@pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
 def test_other_models_than_the_default_are_unknown(options):
     fabric = load_fabric("denim")
     assert _table().knows(cloth_side(fabric, TruthOptions()), _columns(fabric)).all()

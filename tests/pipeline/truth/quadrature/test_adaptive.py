@@ -11,7 +11,7 @@ from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.symmetry import first_cells
-from pipeline.truth.options import TruthOptions, Variation
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.parts import rectangles
 from pipeline.truth.query import Queries
@@ -111,7 +111,6 @@ def _cases():
     yield "along", "cotton_twill", {}, {}, thin
     yield "across", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, math.pi / 2, np.float32))
     yield "aslant", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, 0.5, np.float32))
-    yield "varied", "polyester_lining", {}, {"variation": Variation(spread=0.5, repeats=2)}, _queries(*aslant)
 
 
 @pytest.mark.parametrize("case", list(_cases()), ids=lambda case: case[0])
