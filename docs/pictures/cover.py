@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 import twillight_mitsuba  # noqa: F401, it enters the material and the integrator
-from pipeline.scenes.shipped.sheet import developed, sheet
+from pipeline.scenes.shipped import developed, sheet
 
 HANGING: Final = {
     "tartan": ((-1.25, 0.15), 0.62, 150.0),

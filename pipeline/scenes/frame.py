@@ -9,22 +9,25 @@ one pixel to the right and one downwards, on the tangent plane [Igehy1999RayDiff
 Light: a light in sight of the place, along a straight ray, is a query; one that another surface hides is none. Cloth
 blocks such a ray as if it were opaque. A light on one side of the surface and on the other of its shading normal is
 none either.
+
+Backdrop: other shapes are matte in their albedo; the environment is seen where a pixel's ray leaves the scene.
+Radiance of a shape = albedo / pi times the sum over the lights in sight of irradiance times cosine, both sides alike:
+the lights and shadows of the cloth itself, without noise. Light that shapes or cloth throw on each other is left out.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+import math
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.scenes.aovs import aovs_of
-from pipeline.scenes.backdrop import backdrop
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, Loaded, Window
-from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted
-from pipeline.scenes.rays import blocked, first_hits, off
+from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted, unit
+from pipeline.scenes.rays import aovs_of, blocked, first_hits, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
 
@@ -42,6 +45,9 @@ _AOVS: Final = {
     "shape_index": 1,
 }
 """AOVs rendered by Mitsuba, and the number of channels of each."""
+_AOVS_BESIDE: Final = {
+    name: _AOVS.get(name, 3) for name in ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
+}
 _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
@@ -94,7 +100,7 @@ def render(
     something = aovs["shape_index"][..., 0] > 0
     forward = camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
     depth = np.where(something, (aovs["position"] - camera.to_world[:3, 3]) @ forward, 0.0)
-    return Frame(gbuffers, backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
+    return Frame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
 
 
 def _gbuffer(
@@ -170,3 +176,37 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
     if touching.any() or (dot(hits.normal, around) > 0.0).all():
         place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
         raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
+
+
+def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: npt.NDArray[np.bool_]) -> Floats:
+    """Return the linear RGB of a frame without its cloth, (H, W, 3).
+
+    Where `cloth` (H, W) is seen, it is what lies behind, without the cloth's shadows.
+    """
+    picture = _seen(loaded, loaded.world, camera, sensor, ~cloth)
+    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, sensor, cloth), picture)
+
+
+def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.NDArray[np.bool_]) -> Floats:
+    """Return the radiance of the wanted pixels, and that of the environment where a ray leaves the scene."""
+    mi = loaded.mi
+    integrator = mi.load_dict({"type": "direct"})
+    # Where a ray leaves the scene, Mitsuba returns the environment as it is.
+    picture = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3].copy()
+    aovs = aovs_of(mi, world, sensor, _AOVS_BESIDE)
+    mask = wanted & (aovs["shape_index"][..., 0] > 0)
+    position, geometric, normal, albedo = (
+        aovs[name][mask] for name in ("position", "geo_normal", "sh_normal", "albedo")
+    )
+    viewer = camera.to_viewer(position)
+    geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
+    total = np.zeros_like(position)
+    for light in loaded.lights:
+        direction, distance, irradiance = light.reach(position)
+        cosine = np.maximum(dot(normal, direction), 0.0)
+        facing = np.flatnonzero((cosine > 0.0) & (dot(geometric, direction) > 0.0))
+        start = position[facing] + off(position[facing])[:, None] * geometric[facing]
+        free = facing[~blocked(mi, world, start, direction[facing], distance[facing] * (1.0 - 1e-4))]
+        total[free] += irradiance[free] * cosine[free, None]
+    picture[mask] = albedo * total / math.pi
+    return picture

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.scenes.aovs import shape_numbers
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.rays import shape_numbers
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
 from pipeline.scenes.sources import elements
 from pipeline.scenes.variant import instantiate, mitsuba
@@ -105,7 +105,7 @@ class Loaded:
     cloths : dict
         The cloth of each key, and its fabric.
     worn : dict
-        For every key the numbers of the shapes that wear it (`pipeline.scenes.aovs.shape_numbers`).
+        For every key the numbers of the shapes that wear it (`pipeline.scenes.rays.shape_numbers`).
     lights : list of Light
         What shines.
     camera : Camera

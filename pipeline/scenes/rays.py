@@ -1,14 +1,14 @@
-"""Rays in bulk through a Mitsuba scene, whichever variant is set: one at a time where it is scalar."""
+"""Rays in bulk through a Mitsuba scene, whichever variant is set, and AOVs: what is known of the surface they meet."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-
 
 _OFF = 2e-5  # float32 knows a position to 6e-8 of its size
 
@@ -75,3 +75,38 @@ def off(position: Floats) -> Floats:
 def _rays(mi: Any, origin: Floats, direction: Floats, distance: Floats) -> Any:
     o, d = (vector.T.astype(np.float32) for vector in (origin, direction))
     return mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), mi.Float(distance.astype(np.float32)), 0.0, [])
+
+
+def aovs_of(mi: Any, world: Any, sensor: Any, channels: Mapping[str, int]) -> dict[str, Floats]:
+    """Render AOVs with one ray a pixel.
+
+    Parameters
+    ----------
+    mi, world, sensor : Any
+        The module mitsuba, a scene, and a camera whose filter is a box.
+    channels : dict
+        Which AOVs, and how many channels each has.
+
+    Returns
+    -------
+    dict of float64 (H, W, channels)
+        By name; 0 where a ray hits nothing.
+    """
+    integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in channels)})
+    planes = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)
+    ends = np.cumsum(list(channels.values()))[:-1]
+    return dict(zip(channels, np.split(planes, ends, axis=-1), strict=True))
+
+
+def shape_numbers(mi: Any, shapes: Sequence[Any]) -> list[int]:
+    """Return the number that the AOV `shape_index` has where each of a scene's shapes is seen.
+
+    That is 1, 2, … in the order of the scene in Mitsuba's scalar variants. In the others it is the number under which
+    Mitsuba has registered the shape, which depends on what was made first.
+    """
+    if mi.variant().startswith("scalar"):
+        return list(range(1, len(shapes) + 1))
+    import drjit
+
+    numbers: list[Any] = [drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes]
+    return [int(number[0]) for number in numbers]

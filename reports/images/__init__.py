@@ -1,1 +1,1 @@
-"""Pictures as files and bytes: exr, film (frames as layers), tiles (PNG), tone (tone curves), video (MP4)."""
+"""Pictures as files and bytes: exr (frames as layers), tiles (PNG, tone curves), video (MP4)."""

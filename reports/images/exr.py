@@ -3,13 +3,16 @@
 Channels are float32; of what is only looked at, float16 holds three digits in half the bytes.
 
 OpenEXR writes non-contiguous arrays silently wrong, so every channel is made contiguous here.
+
+A film is one file: frame 0 is the picture itself, the others are layers with channels ``frame_1.R`` and so on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from itertools import count, takewhile
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +22,6 @@ from pipeline.atomic import atomic_path
 from weaves.errors import BadInput
 
 Picture = npt.NDArray[np.float32]
-
 
 RGB: Final = ("R", "G", "B")
 """Channels of the colour."""
@@ -80,3 +82,18 @@ def read_exr(path: Path) -> Exr:
     except (RuntimeError, ValueError) as error:
         raise BadInput(str(path), "", "cannot be read", "an OpenEXR picture is needed") from error
     return Exr(channels, attributes)
+
+
+def frame_layers(frames: npt.NDArray[np.floating]) -> dict[str, npt.NDArray[Any]]:
+    """Return frames (F, H, W, 3) but the first as planes by name, for `reports.measure.pictures.write_picture`."""
+    names = [
+        (index, channel, f"frame_{index}.{name}") for index in range(1, len(frames)) for channel, name in enumerate(RGB)
+    ]
+    return {name: frames[index, ..., channel] for index, channel, name in names}
+
+
+def film(exr: Exr) -> npt.NDArray[np.float32]:
+    """Return all frames that a file holds, (F, H, W, 3); the picture alone where it has no layers."""
+    further = takewhile(lambda index: f"frame_{index}.R" in exr.channels, count(1))
+    layers = [exr.stack(*(f"frame_{index}.{name}" for name in RGB)) for index in further]
+    return np.stack([exr.stack(*RGB), *layers])

@@ -2,14 +2,19 @@
 
 Renderings are tone mapped alike: times `EXPOSURE`, cut at 1, sRGB encoding (from colour-science, by way of
 `weaves.colour`); pixels without cloth are transparent. Every pixel becomes a square of `SCALE`.
+
+Tone curves of renderings of one's own, `EXPOSURE` 2^exposure times brighter, before the sRGB encoding:
+
+    srgb        x cut at 1; as on the page
+    reinhard    x / (1 + L), L the luminance: nothing is cut but saturated colours [Reinhard2002Tone, equation 3]
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import matplotlib as mpl
 import matplotlib.image
@@ -159,3 +164,35 @@ def png(rgba: Bytes8, scale: int = SCALE) -> bytes:
     metadata: Any = {"Software": None}  # else the bytes change with matplotlib's version
     matplotlib.image.imsave(buffer, enlarged, format="png", metadata=metadata)
     return buffer.getvalue()
+
+
+Tone = Literal["srgb", "reinhard"]
+"""Name of a tone curve."""
+
+STOPS: Final = 20.0
+"""Largest exposure in either direction, in stops."""
+
+
+def _reinhard(rgb: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.asarray(rgb / (1.0 + (rgb @ np.array(LUMINANCE))[..., None]))
+
+
+_CURVES: Final[dict[Tone, Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]]]] = {
+    "srgb": lambda rgb: rgb,
+    "reinhard": _reinhard,
+}
+
+
+def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: float = 0.0) -> Bytes8:
+    """Return linear RGB (…, 3) as sRGB codes.
+
+    Parameters
+    ----------
+    linear : float (…, 3)
+        Linear RGB, at least 0.
+    tone : str
+        Name of the curve.
+    exposure : float
+        Stops above the exposure of the page.
+    """
+    return encoded(_CURVES[tone](EXPOSURE * 2.0**exposure * np.asarray(linear, np.float64)))

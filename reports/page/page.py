@@ -17,8 +17,7 @@ import pandas as pd
 from pipeline.atomic import atomic_write
 from reports.catalogue import OTHER
 from reports.images import tiles
-from reports.images.exr import read_exr
-from reports.images.film import film
+from reports.images.exr import film, read_exr
 from reports.measure.extremes import extremes_table
 from reports.measure.silhouette import silhouette_table
 from reports.page import figures, front_figures

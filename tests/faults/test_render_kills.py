@@ -12,8 +12,8 @@ pytestmark = pytest.mark.faults
 
 KILLED = """
 import os, signal, sys
-import reports.images.tone, jobs.verbs.render.film_maker as film_maker
-shown, left = reports.images.tone.displayed, [int(sys.argv[1])]
+import reports.images.tiles, jobs.verbs.render.film_maker as film_maker
+shown, left = reports.images.tiles.displayed, [int(sys.argv[1])]
 def displayed(*given):
     if not left[0]:
         os.kill(os.getpid(), signal.SIGKILL)

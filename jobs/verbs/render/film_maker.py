@@ -21,8 +21,7 @@ from pipeline.scenes.loading import Loaded
 from pipeline.scenes.picture import Answerer, Part, Plane, picture
 from pipeline.truth.conventions import COMPONENTS
 from reports.images.exr import RGB, write_exr
-from reports.images.tiles import Bytes8, png
-from reports.images.tone import displayed
+from reports.images.tiles import Bytes8, displayed, png
 from reports.images.video import write_film
 
 RATE: Final = 24

@@ -8,7 +8,7 @@ from typing import Final
 
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import MOST_SAMPLES
-from reports.images.tone import STOPS, Tone
+from reports.images.tiles import STOPS, Tone
 from weaves.errors import BadInput
 from weaves.validation import validated
 

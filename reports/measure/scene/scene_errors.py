@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from pipeline.models.fallback import Fallback
 from reports.error import COLOUR_WEIGHTS, squared_error
-from reports.images.film import frame_layers
+from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
@@ -84,7 +84,7 @@ def measure_scene(
         Options of the comparison, and the seed of random methods.
     pictures : mapping
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
-        of its differences from the truth as layers (`reports.images.film`, `reports.measure.scene.difference_maps`).
+        of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.difference_maps`).
     """
     image, reference = options.image, _reference(shot, options.image)
     truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]

@@ -10,8 +10,7 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
-from pipeline.scenes.shipped.dinner_table import TABLE
-from pipeline.scenes.shipped.sphere import SPHERE
+from pipeline.scenes.shipped import SHIPPED
 from pipeline.scenes.variant import llvm_works
 from pipeline.truth.query import faults
 
@@ -134,7 +133,7 @@ def test_a_cylinders_curvature_is_eulers(turn, askew):
 
 def test_a_mesh_sphere_has_the_curvature_of_its_radius():
     """Interpolated normals of a 320 by 320 mesh: 1 % allowed. The conformal spacing is 4 / (4 + u^2 + v^2) / 24."""
-    gbuffer = render(load(SPHERE, SCALAR), size=SIZE).gbuffers["silk_charmeuse"]
+    gbuffer = render(load(SHIPPED["sphere"], SCALAR), size=SIZE).gbuffers["silk_charmeuse"]
     inner = gbuffer.wo[:, 2] > 0.1
     square = (np.square(gbuffer.u) + np.square(gbuffer.v)) / 24**2
     np.testing.assert_allclose(gbuffer.curvature[inner], 4 / (4 + square[inner]) / 24, rtol=0.01)
@@ -225,7 +224,7 @@ def test_frames_move_the_camera_to_the_right():
 @pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 def test_variants_agree():
     one, other = (
-        render(load(SPHERE, o), size=SIZE).gbuffers["silk_charmeuse"]
+        render(load(SHIPPED["sphere"], o), size=SIZE).gbuffers["silk_charmeuse"]
         for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
     )
     assert (one.pixel == other.pixel).all()
@@ -240,7 +239,8 @@ def test_variants_agree():
 def test_variants_agree_on_who_wears_what_and_on_the_lamp():
     """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""
     one, other = (
-        render(load(TABLE, o), size=SIZE) for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
+        render(load(SHIPPED["dinner_table"], o), size=SIZE)
+        for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
     )
     for key, gbuffer in one.gbuffers.items():
         assert (gbuffer.mask == other.gbuffers[key].mask).mean() > 0.999 and gbuffer.mask.any(), key

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.images.exr import write_exr
-from reports.images.film import frame_layers
+from reports.images.exr import frame_layers, write_exr
 from reports.measure.latents import SHARES
 from reports.measure.pictures import write_picture
 from reports.measure.scene.difference_maps import difference_maps

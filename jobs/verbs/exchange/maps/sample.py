@@ -17,7 +17,7 @@ from jobs.verbs.exchange.maps.about import spacing_cm, yarns_per_cm
 from pipeline.materials.layout import Layout
 from pipeline.materials.lobes import SHEEN_ROUGHNESS
 from pipeline.materials.textures import Constants, Textures, across_direction, gltf_strength
-from pipeline.scenes.shipped.drape import DRAPE_YARNS, drape_surface
+from pipeline.scenes.shipped import DRAPE_YARNS, drape_surface
 from reports.images.texture import png_bytes
 from weaves.fabric import Fabric
 

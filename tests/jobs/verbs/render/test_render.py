@@ -16,7 +16,7 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
 from reports.images.exr import read_exr
-from reports.images.tone import displayed
+from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
 from weaves.fabric import load_fabric

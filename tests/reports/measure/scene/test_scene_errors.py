@@ -10,8 +10,7 @@ from pipeline.models.fallback import Fallback
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.images.exr import read_exr
-from reports.images.film import film
+from reports.images.exr import film, read_exr
 from reports.measure.scene import scene_errors
 from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
 from reports.measure.scene.shot import read_shot, shoot

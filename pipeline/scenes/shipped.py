@@ -1,0 +1,311 @@
+"""The scenes that come with the package; lengths in metres, the yarns larger than life.
+
+Cloth bends and does not stretch: it is a surface that unrolls into the plane, a wave swept along a line or a general
+cone, and uv are the flat cloth's own lengths. The sphere alone is stretched.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scenes.scene import Cloth, Scene
+
+Floats = npt.NDArray[np.float64]
+
+DRAPE_YARNS: Final = 80.0
+"""Yarns along a unit of uv of the scene `drape`."""
+
+_SIZE: Final = (256, 192)
+_PLANE_SIDE: Final = 1200.0
+_ROLL_RADIUS, _ROLL_LENGTH = 0.5, 4.0
+_ROLL_AROUND: Final = 128  # yarns: whole repeats, so that there is no seam
+_SPACING: Final = 0.012  # of the dinner table's yarns
+_NEAR, _FAR, _NAPKIN_RADIUS = (0.05, -0.5, 0.075), (0.62, -0.28, 0.075), 0.07
+
+
+def _plane(mi: Any) -> dict[str, Any]:
+    """Return denim to the horizon: from resolved yarns to many repeats a pixel, where everything aliases that can."""
+    ground = mi.ScalarTransform4f().translate([0, 0.45 * _PLANE_SIDE, 0]).scale(0.5 * _PLANE_SIDE)
+    return {
+        "type": "scene",
+        "ground": {"type": "rectangle", "to_world": ground, "cloth": wears("denim")},
+        "below": {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]) @ ground},
+        "sun": sun([0.5, 0.55, 0.7], 3.0),
+        "sky": _sky(0.10, 0.12, 0.16),
+        "camera": camera(mi, [0, 0, 1.6], [0.0, 5.0, 0.35], 50),
+    }
+
+
+def _sphere(mi: Any) -> dict[str, Any]:
+    """Return charmeuse at every angle of view and light, the sun over the left shoulder.
+
+    The fabric's plane is wrapped around by the inverse stereographic projection from the far pole, which is conformal:
+    yarns cross at right angles everywhere, and their spacing shrinks to half from the centre to the far side's edge.
+    """
+    line = np.linspace(-2.4, 2.4, 321)  # the equator lies at 2
+    u, v = np.meshgrid(line, line)
+    square = u * u + v * v
+    # The near pole looks to -y, where the camera is; z is up.
+    points = np.stack([4.0 * u, square - 4.0, 4.0 * v], axis=-1) / (4.0 + square)[..., None]
+    return {
+        "type": "scene",
+        "ball": sheet(mi, "silk_charmeuse", points, points, np.stack([u, v], axis=-1)),
+        "core": {"type": "sphere", "radius": 0.98},
+        "sun": sun([-0.45, -0.7, 0.55], 2.6),
+        "sky": _sky(0.08, 0.09, 0.11),
+        "camera": camera(mi, [0, -4, 0], [0, 0, 0], 38),
+    }
+
+
+def drape_surface() -> tuple[Floats, Floats, Floats]:
+    """Return points (R, C, 3), unit normals (R, C, 3) and uv (R, C, 2) of cloth held at one place; z is up.
+
+    Every surface of straight lines through one point unrolls: at the distance r from the point it is r c(t), with c a
+    closed curve on the unit sphere, and its place in the flat cloth has the polar coordinates r and arc length of c.
+    The curve is a circle of latitude with waves: folds that grow towards the hem, that hide light and view.
+    """
+    folds = 7
+    turn = np.linspace(0.0, 2.0 * np.pi, 2049)
+    # Latitude from straight down; the waves are uneven, as folds are.
+    wave = np.cos(folds * turn + 0.8 * np.sin(2.0 * turn)) * (1.0 + 0.3 * np.sin(3.0 * turn + 1.0))
+    polar, azimuth = 0.55 + 0.12 * wave, turn + 0.07 * np.sin(2.0 * folds * turn)
+    curve = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), -np.cos(polar)], axis=-1)
+    angle, along = developed(curve)
+    normal = np.cross(along, -curve)
+    radius = np.linspace(0.25, 1.6, 25)[::-1, None]
+    points = radius[..., None] * curve
+    uv = np.stack([radius * np.sin(angle), -radius * np.cos(angle)], axis=-1)
+    return points, np.broadcast_to(normal, points.shape), uv
+
+
+def _drape(mi: Any) -> dict[str, Any]:
+    """Return gabardine in folds, a sun from the side that leaves half of every fold in shadow."""
+    return {
+        "type": "scene",
+        "cloth": sheet(mi, "wool_gabardine", *drape_surface()),
+        "sun": sun([-0.75, -0.6, 0.45], 3.0),
+        "sky": _sky(0.12, 0.13, 0.15),
+        "camera": camera(mi, [0, -3.6, -0.55], [0, 0, -0.88], 24),
+    }
+
+
+def _roll(mi: Any) -> dict[str, Any]:
+    """Return a roll of cotton twill at its silhouette: some twenty yarn spacings to the radius."""
+    ends = {"p0": [-0.5 * _ROLL_LENGTH, 0, 0], "p1": [0.5 * _ROLL_LENGTH, 0, 0]}
+    return {
+        "type": "scene",
+        "roll": {"type": "cylinder", **ends, "radius": _ROLL_RADIUS, "cloth": wears("cotton_twill")},
+        "core": {"type": "cylinder", **ends, "radius": 0.98 * _ROLL_RADIUS},
+        "sun": sun([-0.5, -0.45, 0.75], 3.0),
+        "sky": _sky(0.10, 0.12, 0.16),
+        "camera": camera(mi, [0.25, -2.2, 0.35], [0, 0, 0.3], 25),
+    }
+
+
+def _curtain(mi: Any) -> dict[str, Any]:
+    """Return voile with the sun behind it, and the bars of a window, whose shadows fall on it."""
+    x = np.linspace(-1.3, 1.3, 1601)
+    curve = np.stack([x, 0.075 * np.sin(14.0 * x + 0.9 * np.sin(3.1 * x))], axis=-1)
+    length, along = developed(curve)
+    normal = np.stack([along[:, 1], -along[:, 0], np.zeros_like(x)], axis=-1)
+    height = np.linspace(-0.9, 0.9, 3)[:, None]
+    points = np.stack(np.broadcast_arrays(curve[:, 0], curve[:, 1], height), axis=-1)
+    uv = np.stack(np.broadcast_arrays(length, height), axis=-1)
+    wood = {"type": "diffuse", "reflectance": _rgb(0.25, 0.18, 0.12)}
+    bars = {"upright": ([0.0, 0.4, 0.0], [0.05, 0.03, 2.0]), "across": ([0.0, 0.4, 0.1], [2.0, 0.03, 0.05])}
+    window = {
+        name: {"type": "cube", "to_world": mi.ScalarTransform4f().translate(place).scale(half), "wood": wood}
+        for name, (place, half) in bars.items()
+    }
+    return {
+        "type": "scene",
+        "curtain": sheet(mi, "voile", points, np.broadcast_to(normal, points.shape), uv),
+        **window,
+        "sun": sun([0.35, 0.8, 0.45], 3.0),
+        "sky": _sky(0.30, 0.36, 0.45),
+        "camera": camera(mi, [0, -2.6, 0.0], [0, 0, 0], 34),
+    }
+
+
+def _dinner_table(mi: Any) -> dict[str, Any]:
+    """Return a table under a lamp: a cloth, a mat, a runner in waves, and a rolled napkin, at many scales."""
+    move = mi.ScalarTransform4f
+    mat = move().translate([0.38, 0.25, 0.01]).rotate([0, 0, 1], 12).scale([0.36, 0.26, 1])
+    y = np.linspace(-0.85, 0.85, 801)
+    wave = 0.03 + 0.05 * np.square(np.cos(4.0 * y)) * (1.0 + y)
+    napkin = {"type": "cylinder", "p0": list(_NEAR), "p1": list(_FAR), "radius": _NAPKIN_RADIUS}
+    outwards = 2.0 * np.array(_NEAR) - _FAR
+    end = move().look_at(list(_NEAR), outwards.tolist(), [0, 0, 1]).scale(_NAPKIN_RADIUS)
+    return {
+        "type": "scene",
+        "top": {"type": "rectangle", "to_world": move().scale([1.3, 1.0, 1]), "cloth": wears("table_cloth")},
+        "mat": {"type": "rectangle", "to_world": mat, "cloth": wears("mat")},
+        "runner": _waves(mi, "runner", np.linspace(-0.75, -0.25, 3), y, wave),
+        "napkin": {**napkin, "cloth": wears("napkin")},
+        "board": {"type": "rectangle", "to_world": move().translate([0, 0, -0.01]).scale([1.3, 1.0, 1])},
+        "core": {"type": "disk", "to_world": end, "paper": {"type": "twosided", "a": {"type": "diffuse"}}},
+        "lamp": {"type": "point", "position": [-0.7, 0.5, 1.5], "intensity": _rgb(5.2, 4.8, 4.3)},
+        "room": _sky(0.05, 0.05, 0.06),
+        "camera": camera(mi, [0.1, -2.0, 1.25], [0.02, -0.05, 0.0], 37),
+    }
+
+
+def _swatch(mi: Any) -> dict[str, Any]:
+    """Return a square of herringbone with one soft fold on a board, under a lamp and a weak second one.
+
+    Every angle of light and view between the crest and the valley is seen, and highlights show the floats.
+    `twillight show` puts its fabric there.
+    """
+    y = np.linspace(-0.5, 0.5, 801)
+    wave = 0.01 + 0.05 * (1.0 + np.cos(2.0 * np.pi * y))
+    board = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.25}}
+    return {
+        "type": "scene",
+        "cloth": _waves(mi, "swatch", np.linspace(-0.5, 0.5, 3), y, wave),
+        "board": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(20), "paint": board},
+        "lamp": sun([-0.55, 0.75, 0.75], 2.4),
+        "fill": sun([0.6, -0.5, 1.0], 0.5),
+        "camera": camera(mi, [0.0, -1.5, 1.6], [0.0, -0.02, 0.03], 34),
+    }
+
+
+def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
+    """Return a strip with the waves z(y), swept along x."""
+    length, along = developed(np.stack([y, z], axis=-1))
+    normal = np.stack([np.zeros_like(y), -along[:, 1], along[:, 0]], axis=-1)[:, None]
+    points = np.stack(np.broadcast_arrays(x, y[:, None], z[:, None]), axis=-1)
+    uv = np.stack(np.broadcast_arrays(x, length[:, None]), axis=-1)
+    return sheet(mi, cloth, points, np.broadcast_to(normal, points.shape), uv)
+
+
+def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
+    """Return the mesh of a grid of points, two triangles a cell.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba.
+    cloth : str
+        Key of what it wears.
+    points, normals : float (R, C, 3)
+        Positions, and unit normals of the front.
+    uv : float (R, C, 2)
+        Lengths along the cloth: u along its weft, v along its warp.
+    """
+    rows, columns = points.shape[:2]
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    settings = mi.Properties()
+    settings["bsdf"] = mi.load_dict(wears(cloth))
+    mesh = mi.Mesh(
+        cloth,
+        vertex_count=rows * columns,
+        face_count=len(faces),
+        has_vertex_normals=True,
+        has_vertex_texcoords=True,
+        props=settings,
+    )
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = points.astype(np.float32).ravel()
+    parameters["vertex_normals"] = normals.astype(np.float32).ravel()
+    parameters["vertex_texcoords"] = uv.astype(np.float32).ravel()
+    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters.update()
+    return mesh
+
+
+def developed(curve: Floats) -> tuple[Floats, Floats]:
+    """Return arc length from the start along a curve of points (n, d), and unit tangents (n, d).
+
+    The curve must be finely sampled; tangents are central differences.
+    """
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=-1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    tangent = np.gradient(curve, axis=0)
+    return length, tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
+
+
+def wears(cloth: str) -> dict[str, Any]:
+    """Return the BSDF that dresses a shape."""
+    return {"type": "diffuse", "id": f"fabric_{cloth}"}
+
+
+def camera(mi: Any, place: list[float], target: list[float], fov: float) -> dict[str, Any]:
+    """Return a pinhole camera with z upwards."""
+    return {
+        "type": "perspective",
+        "fov": fov,
+        "fov_axis": "x",
+        "to_world": mi.ScalarTransform4f().look_at(place, target, [0, 0, 1]),
+        "film": {"type": "hdrfilm", "width": _SIZE[0], "height": _SIZE[1]},
+    }
+
+
+def sun(towards: list[float], irradiance: float) -> dict[str, Any]:
+    """Return a directional light from the direction `towards`."""
+    return {"type": "directional", "direction": [-x for x in towards], "irradiance": irradiance}
+
+
+def _sky(*radiance: float) -> dict[str, Any]:
+    """Return an environment that is alike everywhere."""
+    return {"type": "constant", "radiance": _rgb(*radiance)}
+
+
+def _rgb(*values: float) -> dict[str, Any]:
+    return {"type": "rgb", "value": list(values)}
+
+
+_SCENES: Final = (
+    Scene(
+        name="plane",
+        source=_plane,
+        cloths={"denim": Cloth(yarns=(_PLANE_SIDE / 0.12, _PLANE_SIDE / 0.12), turn=24.0)},
+        step=(0.003, 0.0, 0.002),
+    ),
+    Scene(
+        name="sphere",
+        source=_sphere,
+        cloths={"silk_charmeuse": Cloth(yarns=(24.0, 24.0), turn=24.0)},
+        step=(0.003, 0.002, 0.0),
+    ),
+    Scene(
+        name="drape",
+        source=_drape,
+        cloths={"wool_gabardine": Cloth(yarns=(DRAPE_YARNS, DRAPE_YARNS))},
+        step=(0.003, 0.001, 0.0),
+    ),
+    Scene(
+        name="roll",
+        source=_roll,
+        cloths={
+            "cotton_twill": Cloth(yarns=(_ROLL_AROUND, _ROLL_AROUND * _ROLL_LENGTH / (2.0 * math.pi * _ROLL_RADIUS)))
+        },
+        step=(0.001, 0.0008, 0.0),
+    ),
+    Scene(name="curtain", source=_curtain, cloths={"voile": Cloth(yarns=(60.0, 60.0))}, step=(0.002, 0.0015, 0.0)),
+    Scene(
+        name="dinner_table",
+        source=_dinner_table,
+        cloths={
+            "table_cloth": Cloth(fabric="polyester_lining", yarns=(2.6 / _SPACING, 2.0 / _SPACING)),
+            "mat": Cloth(fabric="basket", yarns=(0.72 / (2 * _SPACING), 0.52 / (2 * _SPACING))),
+            "runner": Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
+            "napkin": Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
+        },
+        step=(0.0015, 0.001, 0.0),
+    ),
+    Scene(
+        name="swatch",
+        source=_swatch,
+        cloths={"swatch": Cloth(fabric="herringbone", yarns=(48.0, 48.0))},
+        step=(0.001, 0.0005, 0.0),
+    ),
+)
+
+SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in _SCENES}
+"""Every shipped scene by its name."""
