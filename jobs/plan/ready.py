@@ -8,11 +8,8 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterable, Sequence
-from typing import Final
 
 from jobs.plan.task import Task, urgencies
-
-_SHORT: Final = "generate"  # stage whose tasks are of bounded size
 
 
 class Ready:
@@ -41,7 +38,7 @@ class Ready:
         for task in tasks:
             self._wait(task)
 
-    def take(self, slots: int, alone: bool = True, spare: int = 0) -> list[Task]:
+    def take(self, slots: int, alone: bool = True) -> list[Task]:
         """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs.
 
         Parameters
@@ -50,19 +47,12 @@ class Ready:
             Tasks that run at the same time.
         alone : bool
             False: only tasks that run beside others are returned.
-        spare : int
-            Shards that may be with a worker before it is free, so that it need not wait; none while anything else runs,
-            behind which they might wait for hours.
         """
         taken: list[Task] = []
         if self._one_alone in self._running:
             return taken
         while len(self._running) < slots and (task := self._pop(self._beside)):
             taken.append(task)
-        if spare and all(task.stage == _SHORT for task in self._running.values()):
-            while len(self._running) < slots + spare and (task := self._top(self._beside)) and task.stage == _SHORT:
-                taken.append(task)
-                self._pop(self._beside)
         if alone and slots > 0 and not self._running and (task := self._pop(self._alone)):
             taken.append(task)
             self._one_alone = task.id
@@ -129,18 +119,11 @@ class Ready:
         self._pushed += 1  # equally urgent tasks start in the order in which they became ready
         heapq.heappush(self._alone if task.alone else self._beside, (self._order[task.id], self._pushed, task))
 
-    def _top(self, heap: list[tuple[float, int, Task]]) -> Task | None:
-        """Return the most urgent task of a heap that can start."""
-        while heap:
-            task = heap[0][2]
-            if task.id in self._waiting and not self._unmet[task.id]:
-                return task
-            heapq.heappop(heap)
-        return None
-
     def _pop(self, heap: list[tuple[float, int, Task]]) -> Task | None:
-        """Start the most urgent task of a heap."""
-        if task := self._top(heap):
-            heapq.heappop(heap)
-            self._running[task.id] = self._waiting.pop(task.id)
-        return task
+        """Start the most urgent task of a heap that can start."""
+        while heap:
+            _, _, task = heapq.heappop(heap)
+            if task.id in self._waiting and not self._unmet[task.id]:
+                self._running[task.id] = self._waiting.pop(task.id)
+                return task
+        return None

@@ -19,7 +19,6 @@ from jobs.run.reasons import CHANGED, NEVER, reasons
 from jobs.run.receipt import Product
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
-from pipeline.storage import is_local
 from weaves.errors import BadInput
 
 Kind = Literal["missing", "outdated", "cut", "damaged", "odd", "foreign"]
@@ -82,9 +81,9 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
     name = f"{task.stage} {task.title}"
     if receipt is None:
         note = ledger.receipt_path(task)
-        if ledger.size(note) is not None:
+        if ledger.store.size(note) is not None:
             return [Fault("damaged", note, f"it is no valid receipt of {name}", task)]
-        if all(ledger.size(path) is None for path in task.products):
+        if all(ledger.store.size(path) is None for path in task.products):
             return [Fault("missing", task.products[0], f"it does not exist: {name} was not run", task, never_run=True)]
         if isinstance(task, Page):
             return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
@@ -109,7 +108,7 @@ def _product_fault(ledger: Ledger, path: str, expected: Product | None, task: Ta
     if expected is None:
         return Fault("outdated", path, "it is not on the receipt of its task", task)
     try:
-        bytes_ = ledger.size(path)
+        bytes_ = ledger.store.size(path)
         if bytes_ is None:
             return Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
         if bytes_ < expected.bytes:
@@ -119,7 +118,7 @@ def _product_fault(ledger: Ledger, path: str, expected: Product | None, task: Ta
         if file_sha256(ledger.out / path) != expected.sha256:
             return Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", task)
     except OSError as error:
-        if not is_local(ledger.out):
+        if not ledger.store.is_local:
             raise  # it is the storage that fails
         return Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
     return None
@@ -136,7 +135,7 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
         return
     for name, sha256 in listed.items():
         path = f"{page.folder}/{name}"
-        if not ledger.is_file(path):
+        if not ledger.store.is_file(path):
             yield Fault("missing", path, "it does not exist, although the page was written", page)
         elif file_sha256(ledger.out / path) != sha256:
             yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
@@ -225,7 +224,7 @@ def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, faulty: Set[
     for page in (task for task in tasks if isinstance(task, Page)):
         if not faulty.isdisjoint({page.products[1], ledger.receipt_path(page)}):
             folders.discard(page.folder)
-    named = {path for path in ledger.paths(folders) if not is_leftover(Path(path).name)}
+    named = {path for path in ledger.store.below(folders) if not is_leftover(Path(path).name)}
     foreign = sorted(named - known)
     return [Fault("foreign", path, "no task of this recipe made it") for path in foreign]
 

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from filelock import FileLock
+
+from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Progress, Task
 from jobs.run.receipt import Product, measure
-from jobs.run.workspace import workspace
+from jobs.run.store import workspace_of
+from pipeline import patience, storage
+from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.own_process import ProcessEnded, in_own_process
-from pipeline.patience import StorageFailed
-from pipeline.storage import explained, is_local
 from weaves.errors import BadInput, WorkFailed
 
 KILLED = "the process that ran it was killed several times over; is there enough memory?"
@@ -65,23 +69,24 @@ def work(
     progress : callable
         Receives the finished share.
     inputs : mapping
-        As for `jobs.run.workspace.workspace`.
+        Hashes of the products that it needs, by path; empty if the hash is not known. Read only for object
+        storage.
     threads : int
         Tasks that this process may do at the same time.
     """
     own = task.alone or (threads > 1 and not task.shares_process)
     start = time.perf_counter()
     try:
-        with workspace(task, out, inputs) as folder:
+        with _workspace(task, out, inputs) as folder:
             in_own_process(task.run, folder, progress=progress) if own else task.run(folder, progress)
             files = {Path(path).name: measure(folder / path) for path in task.products}
     except ProcessEnded as error:
         return Outcome({}, time.perf_counter() - start, str(error), traceback.format_exc())
     except (BadInput, WorkFailed) as error:
-        failed = isinstance(error, StorageFailed)
+        failed = isinstance(error, patience.StorageFailed)
         return Outcome({}, time.perf_counter() - start, str(error), storage_failed=failed)
     except Exception as error:
-        if not is_local(out) and (found := explained(error)):
+        if not storage.is_local(out) and (found := storage.explained(error)):
             return Outcome({}, time.perf_counter() - start, str(found), storage_failed=True)
         return Outcome({}, time.perf_counter() - start, one_line(error), traceback.format_exc())
     return Outcome(files, time.perf_counter() - start)
@@ -91,3 +96,43 @@ def one_line(error: BaseException) -> str:
     """Return an unexpected exception in one line."""
     lines = str(error).strip().splitlines() or [""]
     return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__
+
+
+@contextmanager
+def _workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Path]:
+    """Yield the folder in which a task runs; afterwards its products are where they belong.
+
+    If the products are in object storage, it is a folder of this machine and user: what the task needs is fetched into
+    it and compared with the receipts; WorkFailed if its bytes are others.
+    """
+    if storage.is_local(out):
+        yield out
+        return
+    from pipeline.shards.manifest import FILE
+
+    patience.expect()  # the driver was answered
+    folder = workspace_of(out)
+    for path, sha256 in inputs.items():
+        _fetch(out, folder, path, sha256)
+    for parent in sorted({str(Path(path).parent) for path in inputs if path.startswith(f"{DATASETS}/")}):
+        _fetch(out, folder, f"{parent}/{FILE}", "")  # it grows
+    yield folder
+    for path in task.written(folder):
+        storage.store(folder / path, out / path)
+
+
+def _fetch(out: Path, folder: Path, path: str, sha256: str) -> None:
+    """Fetch a file unless it is there; two processes of a machine fetch it once."""
+    target = folder / path
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(folder / f".lock-{fingerprint(path)}"):
+        if sha256 and target.is_file() and file_sha256(target) == sha256:
+            return
+        temporary = target.with_name(f".tmp-{target.name}")
+        try:
+            storage.fetch(out / path, temporary)
+        except FileNotFoundError as error:
+            raise WorkFailed(f"{out / path}: it is not there any more") from error
+        if sha256 and file_sha256(temporary) != sha256:
+            raise WorkFailed(f"{out / path}: its bytes are not those that were written (SHA-256 differs)")
+        temporary.replace(target)

@@ -1,4 +1,4 @@
-"""Progress of a run: numbers of tasks by stage, rate and time left, and a word when nothing is reported.
+"""Progress of a run as events, each with the numbers of its tasks, and a word when nothing is reported.
 
 How they are shown is the matter of `jobs.run.progress_forms`.
 """
@@ -8,27 +8,39 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from threading import Lock
 from types import TracebackType
-from typing import Any, Final, Protocol
+from typing import Any, Final, Literal, NamedTuple
 
-from rich.console import Console
-
+from jobs.plan.estimate import Estimate
 from jobs.plan.task import STAGES, Stage, Task
 from pipeline import patience
 
-TOPIC: Final = "progress"
-"""Dask topic on which workers report the progress of a task, {"task": id, "fraction": share done}, or a sentence."""
-
-KERNELS: Final = "kernels"
-"""Dask topic on which workers name each kernel that is compiled or read from the cache."""
-
-LOOK: Final = 5.0
-"""Seconds between two looks at how long nothing was reported."""
-
 _SILENCE: Final = 60.0  # seconds without a report until the first line says so
 _MOST_NAMED: Final = 5  # tasks in that line
+
+
+class Event(NamedTuple):
+    """Something that happened in a run.
+
+    Attributes
+    ----------
+    name : str
+        ``compile``: kernels are ready; ``start`` of the tasks; ``begin`` of a task, ``progress``, ``end``, ``failed``,
+        ``again``: it failed and is tried again; ``message``: a sentence; ``stop``: the end, also if it never began.
+    task : Task or None
+        The task that it is about.
+    share : float or None
+        Its finished share.
+    message : str or None
+        Reason of a failure, or a sentence.
+    """
+
+    name: Literal["compile", "start", "begin", "progress", "end", "failed", "again", "message", "stop"]
+    task: Task | None = None
+    share: float | None = None
+    message: str | None = None
 
 
 class Tally:
@@ -38,9 +50,11 @@ class Tally:
     ----------
     tasks : sequence of Task
         The tasks to do.
+    estimate : Estimate
+        Knows how long they take.
     """
 
-    def __init__(self, tasks: Sequence[Task]) -> None:
+    def __init__(self, tasks: Sequence[Task], estimate: Estimate) -> None:
         self.planned: Counter[Stage] = Counter()
         self.ended: Counter[Stage] = Counter()
         """Tasks by stage, done or failed."""
@@ -50,106 +64,74 @@ class Tally:
         """Expected cost of what is done, by stage."""
         self.all_work = dict(self.work)
         """Expected cost of everything, by stage."""
-        for task in tasks:
-            self.add(task)
         self.workers = 0
         self.dashboard: str | None = None
-        self._began = time.monotonic()
+        self._estimate = estimate
+        self._left: dict[str, Task] = {}
+        self._under_way: dict[str, tuple[float, float]] = {}  # begin and finished share, by id
+        self._began: float | None = None
+        for task in tasks:
+            self.add(task)
 
     def add(self, task: Task) -> None:
         """Count a task to do."""
         self.planned[task.stage] += 1
         self.all_work[task.stage] = self.all_work.get(task.stage, 0.0) + task.cost
         self.work.setdefault(task.stage, 0.0)
+        self._left[task.id] = task
 
-    def begin(self) -> None:
+    def start(self, workers: int, dashboard: str | None) -> None:
         """Start the clock."""
-        self._began = time.monotonic()
+        self._began, self.workers, self.dashboard = time.monotonic(), workers, dashboard
 
-    @property
-    def seconds(self) -> float:
-        """Seconds since the run began."""
-        return time.monotonic() - self._began
+    def advance(self, task: Task, share: float) -> None:
+        """Take the finished share of a task under way."""
+        began, before = self._under_way.get(task.id, (0.0, 0.0))
+        self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker
+        self.work[task.stage] += task.cost * (share - before)
+
+    def end(self, task: Task, *, failed: bool = False, again: bool = False) -> None:
+        """Take the end of a task; `again`: it is to be done once more."""
+        self.advance(task, 0.0 if again else 1.0)
+        self._under_way.pop(task.id)
+        if not again:
+            self.ended[task.stage] += 1
+            self.failed[task.stage] += failed
+            self._left.pop(task.id, None)
 
     @property
     def rate(self) -> float:
         """Tasks that ended, a second."""
-        return self.ended.total() / max(self.seconds, 1e-3)
+        began = math.inf if self._began is None else self._began
+        return self.ended.total() / max(time.monotonic() - began, 1e-3)
 
     @property
     def seconds_left(self) -> float | None:
-        """Time that the rest takes if the work goes on as fast as so far; None before any was done."""
-        if self.ended == self.planned:
-            return 0.0
-        done = sum(self.work.values())
-        return self.seconds * max(0.0, sum(self.all_work.values()) - done) / done if done > 0 else None
-
-
-class Form(Protocol):
-    """A way to show progress. Calls come from the driver's thread and from that of its dask client."""
-
-    def __init__(self, console: Console) -> None:
-        """Show it on this console."""
-
-    def compiling(self, tally: Tally, done: int, total: int, kernels: int, under_way: Sequence[str]) -> None:
-        """Show how many groups of kernels are compiled, and which are under way; `done` equals `total` at the end."""
-
-    def begin(self, tally: Tally) -> None:
-        """Show the start of the tasks."""
-
-    def task(self, event: str, tally: Tally, task: Task, reason: str = "") -> None:
-        """Show that a task has begun (``begin``), ended (``end``), ``failed`` or is tried ``again``."""
-
-    def advance(self, tally: Tally, task: Task, share: float) -> None:
-        """Show the finished share of a task under way."""
-
-    def say(self, tally: Tally, sentence: str) -> None:
-        """Show a sentence about the run."""
-
-    def end(self, tally: Tally) -> None:
-        """Show the end of the run, also if it was stopped or never began."""
-
-
-class Compiling:
-    """Numbers of kernels that are compiled before the tasks start."""
-
-    def __init__(self, groups: int, form: Form, tally: Tally) -> None:
-        self._form, self._tally = form, tally
-        self._total, self._ended = groups, 0
-        self._under_way: list[str] = []
-        self._ready: set[str] = set()
-
-    def begin(self, group: str) -> None:
-        """Show that a group of kernels is being compiled."""
-        self._under_way.append(group)
-        self._show()
-
-    def hear(self, event: tuple[float, Any]) -> None:
-        """Take the name of a kernel that is ready."""
-        self._ready.add(event[1])
-        self._show()
-
-    def end(self, group: str) -> None:
-        """Count a group as compiled."""
-        self._ended += 1
-        self._under_way.remove(group)
-        self._show()
-
-    def _show(self) -> None:
-        self._form.compiling(self._tally, self._ended, self._total, len(self._ready), list(self._under_way))
+        """Time that the rest takes on these workers, as far as is known; None before the tasks start."""
+        if self._began is None:
+            return None
+        return self._estimate.seconds_left(list(self._left.values()), dict(self._under_way), self.workers)
 
 
 class Board:
     """The tasks of a run as they begin, advance and end; a context manager that ends what is shown.
 
-    Shares of tasks may arrive from another thread than the driver's.
+    Parameters
+    ----------
+    tasks : sequence of Task
+        The tasks to do.
+    estimate : Estimate
+        Knows how long they take.
+    show : callable
+        Shows an event, with the numbers after it. Calls come from the driver's thread and from that of its dask client.
     """
 
-    def __init__(self, tasks: Sequence[Task], form: Form) -> None:
-        self.tally = Tally(tasks)
-        self._form = form
+    def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Tally], None]) -> None:
+        self.tally = Tally(tasks, estimate)
+        self._show = show
         self._tasks = {task.id: task for task in tasks}
-        self._shares: dict[str, float] = {}  # of the tasks under way
+        self._under_way: set[str] = set()
+        self._kernels: set[str] = set()
         self._heard, self._silence = time.monotonic(), _SILENCE
         self._said: dict[str, float] = {}  # when each sentence was last said
         self._lock = Lock()
@@ -162,21 +144,22 @@ class Board:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         patience.tell(None)
-        self._form.end(self.tally)
+        self._emit(Event("stop"))
 
     def start(self, workers: int, dashboard: str | None) -> None:
-        """Show the start of the tasks, and start the clock."""
-        self.tally.workers, self.tally.dashboard = workers, dashboard
-        self.tally.begin()
-        self._form.begin(self.tally)
+        """Show the start of the tasks."""
+        self.tally.start(workers, dashboard)
+        self._emit(Event("start"))
 
-    def compiling(self, groups: int) -> Compiling:
-        """Return what shows that groups of kernels are compiled before the tasks start."""
-        return Compiling(groups, self._form, self.tally)
+    def compiling(self, done: int, groups: int, under_way: Iterable[str]) -> None:
+        """Show how many groups of kernels are compiled, and which are under way."""
+        now = "" if done == groups else f"; now {', '.join(under_way)}"
+        kernels = f"{len(self._kernels)} ready, {done} of {groups} groups done"
+        self._emit(Event("compile", message=f"compiling kernels: {kernels}{now}"))
 
     def say(self, sentence: str) -> None:
         """Show a sentence about the run."""
-        self._form.say(self.tally, sentence)
+        self._emit(Event("message", message=sentence))
 
     def say_once(self, sentence: str) -> None:
         """Show a sentence that several processes may say, unless it was said in the last minute."""
@@ -187,49 +170,39 @@ class Board:
         if new:
             self.say(sentence)
 
+    def hear(self, message: Mapping[str, Any]) -> None:
+        """Take a message of a worker (`jobs.run.crew`)."""
+        self._reported()
+        if "sentence" in message:
+            self.say_once(message["sentence"])
+        elif "kernel" in message:
+            self._kernels.add(message["kernel"])
+        elif message["task"] in self._under_way:
+            task, share = self._tasks[message["task"]], min(1.0, message["share"])
+            with self._lock:
+                self.tally.advance(task, share)
+            self._emit(Event("progress", task, share))
+
     def add(self, task: Task) -> None:
         """Add a task that was done before and is made again."""
         self._tasks[task.id] = task
         self.tally.add(task)
-        self._form.advance(self.tally, task, 0.0)
 
     def begin(self, task: Task) -> None:
         """Show that a task begins."""
         self._reported()
-        self._shares[task.id] = 0.0
-        self._form.task("begin", self.tally, task)
+        self._under_way.add(task.id)
+        with self._lock:
+            self.tally.advance(task, 0.0)
+        self._emit(Event("begin", task))
 
-    def hear(self, event: tuple[float, Any]) -> None:
-        """Take a message of a worker: about a task under way, or a sentence."""
-        _, message = event
-        if "sentence" in message:
-            self.say_once(message["sentence"])
-            return
-        self.advance(message["task"], float(message["fraction"]))
-
-    def advance(self, id: str, share: float) -> None:
-        """Show the finished share of a task under way."""
+    def end(self, task: Task, reason: str = "", *, again: bool = False) -> None:
+        """Count a task as done, or as failed for a reason; `again`: it is tried once more."""
         self._reported()
-        if id in self._shares:
-            task = self._tasks[id]
-            self._count(task, min(1.0, share))
-            self._form.advance(self.tally, task, share)
-
-    def again(self, task: Task, reason: str) -> None:
-        """Show that a task failed and is tried again."""
-        self._reported()
-        self._count(task, 0.0)
-        self._shares.pop(task.id, None)
-        self._form.task("again", self.tally, task, reason)
-
-    def end(self, task: Task, reason: str = "") -> None:
-        """Count a task as done, or as failed for a reason."""
-        self._reported()
-        self._count(task, 1.0)
-        self._shares.pop(task.id, None)
-        self.tally.ended[task.stage] += 1
-        self.tally.failed[task.stage] += bool(reason)
-        self._form.task("failed" if reason else "end", self.tally, task, reason)
+        self._under_way.discard(task.id)
+        with self._lock:
+            self.tally.end(task, failed=bool(reason), again=again)
+        self._emit(Event("again" if again else "failed" if reason else "end", task, message=reason or None))
 
     def waiting_for(self, tasks: Iterable[Task], workers: int) -> None:
         """Name the tasks under way when nothing was reported for a minute, and again after 2, 4, … minutes."""
@@ -243,9 +216,8 @@ class Board:
         where = f"{workers} workers" if workers > 1 else "1 process" if workers else "no worker: the scheduler has none"
         self.say(f"nothing reported for {silence:.0f} s; under way: {titles} ({where})")
 
+    def _emit(self, event: Event) -> None:
+        self._show(event, self.tally)
+
     def _reported(self) -> None:
         self._heard, self._silence = time.monotonic(), _SILENCE
-
-    def _count(self, task: Task, share: float) -> None:
-        self.tally.work[task.stage] += task.cost * (share - self._shares.get(task.id, 0.0))
-        self._shares[task.id] = share

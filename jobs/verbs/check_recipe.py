@@ -66,7 +66,7 @@ def repair(
     ledger = Ledger(out)
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", f"`twillight run {name}` makes them")
-    with ledger.held():
+    with ledger.store.held():
         tasks, found = _found(name, out, add)
         _print(found, out)
         for fault in found:
@@ -113,10 +113,10 @@ def _remove(fault: Fault, ledger: Ledger) -> None:
     if fault.task is None or fault.kind not in ("cut", "damaged", "missing"):
         return
     if fault.path == ledger.receipt_path(fault.task):
-        ledger.remove(fault.path)
+        ledger.store.remove(fault.path)
     ledger.discard(fault.task)
     if isinstance(fault.task, Page):  # its other files are not on the receipt
-        ledger.remove(fault.task.products[0])
+        ledger.store.remove(fault.task.products[0])
 
 
 def _print(found: Sequence[Fault], out: Path) -> None:

@@ -17,6 +17,7 @@ from jobs.console import MOST_SENTENCES, number, print_line, table_of
 from jobs.plan.dataset import DATASETS
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product, Receipt
+from jobs.run.store import LEDGER
 from jobs.terminal import Terminal
 from jobs.verbs.compare import records_file
 from pipeline.atomic import link
@@ -54,8 +55,8 @@ def merge(sources: Sequence[Path], out: Path) -> int:
     for source in sources:
         if not (source / "ledger").is_dir():
             raise BadInput(str(source), "", "holds no products", "the output folder of a run is needed")
-    with Ledger(out).held():
-        target = Ledger(out)
+    target = Ledger(out)
+    with target.store.held():
         others = [Ledger(source) for source in sources if source.resolve() != out.resolve()]
         chosen: dict[str, Part] = {}
         damaged: dict[str, str] = {}
@@ -75,7 +76,7 @@ def merge(sources: Sequence[Path], out: Path) -> int:
             if part.ledger is not target:
                 for place in part.places:
                     link(part.ledger.out / place, out / place)
-                target.take(part.receipt)
+                target.store.write(f"{LEDGER}/{part.receipt.task}.json", part.receipt.encoded())
         for folder, manifest in manifests.items():
             there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
             manifest.without({shard.file for shard in manifest.shards} - there).save(folder)

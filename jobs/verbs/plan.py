@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Final, NamedTuple
 
 from rich.table import Table
 
 from jobs.console import duration, size, table_of
+from jobs.plan.estimate import Estimate
 from jobs.plan.plan import plan
 from jobs.plan.schedule import LEAST_GAIN, Schedule, doublings, longest_chain, schedule
 from jobs.plan.task import STAGES, Task
@@ -76,20 +76,17 @@ def facts_of(tasks: Sequence[Task], ledger: Ledger) -> Facts:
     why = reasons(tasks, ledger)
     receipts = {task.id: ledger.receipt(task) for task in tasks}
     measured = {id: receipt for id, receipt in receipts.items() if receipt}
-    ratios: dict[str, list[float]] = {}
+    estimate = Estimate()
     for task in tasks:
-        if (receipt := measured.get(task.id)) and task.cost > 0:
-            for kind in (task.stage, f"{task.stage} {task.group}"):
-                ratios.setdefault(kind, []).append(receipt.seconds / task.cost)
-    scale = {kind: median(found) for kind, found in ratios.items()}
+        if receipt := measured.get(task.id):
+            estimate.learn(task, receipt.seconds)
     seconds, bytes_ = {}, {}
     for task in tasks:
         if receipt := measured.get(task.id):
             seconds[task.id] = receipt.seconds
             bytes_[task.id] = sum(product.bytes for product in receipt.files.values())
         else:
-            own = scale.get(f"{task.stage} {task.group}", scale.get(task.stage, 1.0))
-            seconds[task.id], bytes_[task.id] = task.cost * own, task.size
+            seconds[task.id], bytes_[task.id] = estimate.seconds(task), task.size
     return Facts(why, seconds, bytes_, len(measured))
 
 

@@ -46,7 +46,7 @@ def prune(recipes: Sequence[str], out: Path, delete: bool, add: Sequence[str] = 
         raise BadInput("prune", "recipes", [], "name every recipe whose products are to be kept")
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", "--out must name a folder with products of a run")
-    with ledger.held():
+    with ledger.store.held():
         needed = _needed(recipes, out, add)
         stored = {} if is_local(out) else {path: one.bytes for path, one in listing(out).items()}
         files = (path for path in out.rglob("*") if path.is_file() or path.is_symlink()) if is_local(out) else ()

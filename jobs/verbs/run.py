@@ -49,7 +49,7 @@ def work(
     tasks = plan(recipe, measured_alone(out))
     console = Terminal()
     ledger = Ledger(out)
-    with ledger.held():
+    with ledger.store.held():
         manifests = [ManifestFile(one, _shards(one, tasks), ledger) for one in recipe.together]
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
@@ -66,7 +66,7 @@ def work(
 
         summary = execute(
             tasks,
-            out,
+            ledger,
             stages=stages,
             scheduler=scheduler,
             workers=workers,
@@ -75,7 +75,6 @@ def work(
             settle=settle,
             progress=progress,
         )
-    ledger = Ledger(out)  # it has not seen what was written
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:
         console.print(f"nothing to do: {len(chosen)} tasks done")
@@ -101,7 +100,7 @@ def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
     page = next(task for task in tasks if isinstance(task, Page))
     timed = [task for task in tasks if task.alone and task.id in page.needs]
     if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
-        ledger.remove(page.products[0])
+        ledger.store.remove(page.products[0])
 
 
 def _shards(recipe: Recipe, tasks: Sequence[Task]) -> list[Shard]:

@@ -64,7 +64,11 @@ def test_killed_workers(recipe, undisturbed, tmp_path):
         for _ in range(3):
             if not wait_for_a_moment(process, out, seeded):
                 break
-            workers = [one for one in family(process) if not children_of(one) and "spawn_main" in command(one)]
+            workers = [
+                one
+                for one in family(process)
+                if not children_of(one) and any(name in command(one) for name in ("spawn_main", "own_process"))
+            ]
             if workers:
                 seeded.choice(workers).kill()
                 kills += 1

@@ -124,5 +124,6 @@ if __name__ == "__main__":
     import fake_stages  # so that its classes have the name by which other processes import them
 
     from jobs.run.executor import execute
+    from jobs.run.ledger import Ledger
 
-    execute(getattr(fake_stages, sys.argv[2])(), Path(sys.argv[1]), workers=2)
+    execute(getattr(fake_stages, sys.argv[2])(), Ledger(Path(sys.argv[1])), workers=2)

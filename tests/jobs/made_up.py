@@ -12,7 +12,7 @@ from jobs.plan.plan import plan
 from jobs.plan.task import STAGES
 from jobs.plan.training import Training
 from jobs.recipe.load import load_recipe
-from jobs.run.executor import Summary
+from jobs.run.executor import RunSummary
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.receipt import measure
@@ -53,15 +53,15 @@ def make(task, out):
             path.write_text(json.dumps({"file": path.name, "date": now, "values": [0.5] * 20}))
 
 
-def execute(tasks, out, *, stages=STAGES, recorded=lambda task, files: None, settle=lambda: None, **rest):
+def execute(tasks, ledger, *, stages=STAGES, recorded=lambda task, files: None, settle=lambda: None, **rest):
     """Do the unfinished tasks one after the other in this process, as `jobs.run.executor.execute` would."""
-    ledger, summary = Ledger(out), Summary([], [], [], [])
+    summary = RunSummary([], [], [], [])
     for task in tasks:
         if ledger.state(task) == "done" or ledger.adopt(task):
             summary.before.append(task)
         elif task.stage in stages:
-            make(task, out)
-            files = {Path(path).name: measure(out / path) for path in task.products}
+            make(task, ledger.out)
+            files = {Path(path).name: measure(ledger.out / path) for path in task.products}
             ledger.finish(task, files, 1.5)
             recorded(task, files)
             summary.ran.append(task)
@@ -73,7 +73,7 @@ def finished(recipe, out, stages=STAGES):
     """Write all products of a recipe, and return its plan."""
     loaded = load_recipe(recipe)
     tasks = plan(loaded)
-    execute(tasks, out, stages=stages)
+    execute(tasks, Ledger(out), stages=stages)
     for one in loaded.together:
         ManifestFile(one, shards(one), Ledger(out)).save()
     return tasks

@@ -16,6 +16,7 @@ from rich.console import Console
 from jobs.cli import app
 from jobs.run.cluster import Scheduler
 from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parents[1]
@@ -69,7 +70,7 @@ def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, fake, monke
         assert command[0] == "twillight" and check
         app.parse_args(command[1:], exit_on_error=False, print_error=False)
         given = Scheduler(command[command.index("--scheduler") + 1])
-        summaries.append(execute(tasks, tmp_path, scheduler=given, console=Console(file=io.StringIO())))
+        summaries.append(execute(tasks, Ledger(tmp_path), scheduler=given, console=Console(file=io.StringIO())))
 
     started = types.SimpleNamespace(run=run)
     exec(code.replace("import subprocess\n", ""), {"subprocess": started})
@@ -89,10 +90,11 @@ from pathlib import Path
 from jobs.cli import app
 from jobs.run.cluster import Scheduler
 from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
 import fake_stages
 app.parse_args(sys.argv[1:], exit_on_error=False, print_error=False)
 given = Scheduler(sys.argv[sys.argv.index("--scheduler") + 1])
-execute([fake_stages.task(f"shard {{index}}", seconds=0.1) for index in range(6)], Path.cwd(), scheduler=given)
+execute([fake_stages.task(f"shard {{index}}", seconds=0.1) for index in range(6)], Ledger(Path.cwd()), scheduler=given)
 """
 
 DASK = f"""#!{sys.executable}

@@ -116,7 +116,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
             quiet = Console(file=io.StringIO())
             summary = execute(
                 tasks,
-                ledger.out,
+                ledger,
                 scheduler=connection,
                 workers=2,
                 recorded=manifest.add,

@@ -51,15 +51,15 @@ def main() -> None:
         tasks = [task for task in plan(load_recipe(folder / "overhead.toml")) if " train " in task.title]
         tasks = [task for task in tasks if task.stage == "generate"]
         log = io.StringIO()
+        ledger = Ledger(folder)
         execute(
             tasks,
-            folder,
+            ledger,
             workers=options.workers,
             prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
             console=Console(file=log),
             progress="json",
         )
-        ledger = Ledger(folder)
         seconds = {task.id: ledger.seconds(task) for task in tasks}
     events = [json.loads(line) for line in log.getvalue().splitlines()]
     ends = {event["task"]: event["time"] for event in events if event["event"] == "end"}

@@ -73,7 +73,7 @@ def main() -> None:
         out = place("s3://products/many")
 
         def resume() -> None:
-            summary = execute(tasks, out, console=Console(file=io.StringIO()))
+            summary = execute(tasks, Ledger(out), console=Console(file=io.StringIO()))
             assert len(summary.before) == len(tasks)
 
         looks: dict[str, Callable[[], object]] = {

@@ -103,25 +103,6 @@ def test_a_free_slot_is_filled_before_the_task_that_ended_is_done():
     assert ready.take(1, alone=False) == [] and ready.take(1) == [alone]
 
 
-class Training(Step):
-    stage: ClassVar = "train"
-
-
-def test_spare_tasks_are_shards_that_wait_behind_shards_alone():
-    shards = [Step(name=index) for index in range(6)]
-    net = Training(name=9, seconds=9.0, after=(shards[0].id,))
-    ready = Ready([*shards, net], [])
-    assert ready.take(1, spare=2) == shards[:3]  # the first is needed, so it comes first
-    ready.finish(shards[0])
-    assert ready.take(1, spare=2) == []  # a training would wait behind a shard
-    for shard in shards[1:3]:
-        ready.finish(shard)
-    assert ready.take(1, spare=2) == [net]
-    assert ready.take(2, spare=2) == shards[3:4]
-    ready.finish(net)
-    assert ready.take(1, spare=2) == shards[4:]
-
-
 def test_a_task_that_is_opened_again_comes_first_and_holds_back_what_needs_it():
     first, other = Step(name=1), Step(name=2, seconds=9.0)
     after = Step(name=3, after=(first.id,))

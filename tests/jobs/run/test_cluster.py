@@ -98,7 +98,7 @@ def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp
         process.kill()
 
     with pytest.raises(WorkFailed, match="the dask scheduler is gone"):
-        execute(tasks, tmp_path, scheduler=address, console=quiet(), recorded=kill)
+        execute(tasks, Ledger(tmp_path), scheduler=address, console=quiet(), recorded=kill)
     assert Ledger(tmp_path).state(tasks[0]) == "done"
     assert capfd.readouterr().err == ""
 
@@ -106,7 +106,7 @@ def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp
 def test_a_product_that_was_written_elsewhere_is_no_product(tmp_path, fake, scheduler):
     task = fake.task("hidden", hides=True)
     (tmp_path / "out").mkdir()
-    summary = execute([task], tmp_path / "out", scheduler=scheduler[0], console=quiet())
+    summary = execute([task], Ledger(tmp_path / "out"), scheduler=scheduler[0], console=quiet())
     assert summary.failed == [task]
     assert "every worker must see --out" in Ledger(tmp_path / "out").reason(task)
 
@@ -132,7 +132,7 @@ def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, f
     with pytest.raises(
         WorkFailed, match=rf"^every worker is refused; worker tcp://127\.0\.0\.1:\d+ gets no task: {difference}"
     ):
-        execute([fake.task("one")], tmp_path, scheduler=processes.given, console=quiet())
+        execute([fake.task("one")], Ledger(tmp_path), scheduler=processes.given, console=quiet())
     assert not (tmp_path / "log.jsonl").exists()
 
 
@@ -149,7 +149,7 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, fak
         before.append(task)
 
     console = quiet()
-    summary = execute(tasks, tmp_path, scheduler=processes.given, console=console, recorded=join)
+    summary = execute(tasks, Ledger(tmp_path), scheduler=processes.given, console=console, recorded=join)
     assert len(summary.ran) == 8
     assert len({event["pid"] for event in fake.events(tmp_path)}) == 1
     told = console.file.getvalue()
@@ -166,7 +166,7 @@ def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, fake, pro
         processes.wait_for(2)
         return ()
 
-    summary = execute(tasks, tmp_path, scheduler=processes.given, console=quiet(), prepare=prepare)
+    summary = execute(tasks, Ledger(tmp_path), scheduler=processes.given, console=quiet(), prepare=prepare)
     assert len(summary.ran) == 3 and not summary.failed
 
 
@@ -198,7 +198,7 @@ def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypa
             seen.append(count())
 
         given = Scheduler(cluster.scheduler_address)
-        summary = execute(tasks, tmp_path, scheduler=given, console=quiet(), recorded=change)
+        summary = execute(tasks, Ledger(tmp_path), scheduler=given, console=quiet(), recorded=change)
     assert len(summary.ran) == len(tasks) and not summary.failed and not summary.waiting
     assert all((tmp_path / task.products[0]).read_text() == f"{task.title}\n" * 100 for task in tasks)
     assert seen[2] > 1 and seen[10] == 1
@@ -208,18 +208,19 @@ def test_a_port_that_listens_and_never_answers_is_bad_input(fake, tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(BadInput, match="no dask scheduler answers"):
-            execute(fake.chain(), tmp_path, scheduler=Scheduler(address), console=quiet())
+            execute(fake.chain(), Ledger(tmp_path), scheduler=Scheduler(address), console=quiet())
 
 
 def test_files_of_certificates_must_be_there(fake, tmp_path):
+    given = Scheduler("tls://127.0.0.1:1", key="nowhere.pem")
     with pytest.raises(BadInput, match=r"--tls-key: nowhere\.pem: is no file"):
-        execute(fake.chain(), tmp_path, scheduler=Scheduler("tls://127.0.0.1:1", key="nowhere.pem"), console=quiet())
+        execute(fake.chain(), Ledger(tmp_path), scheduler=given, console=quiet())
 
 
 @pytest.mark.parametrize("workers", [-3, 1025, 10**6])
 def test_an_impossible_number_of_workers_is_bad_input(fake, tmp_path, workers):
     with pytest.raises(BadInput, match="--workers"):
-        execute(fake.chain(), tmp_path, workers=workers, console=quiet())
+        execute(fake.chain(), Ledger(tmp_path), workers=workers, console=quiet())
 
 
 STRANGER = """
@@ -318,4 +319,4 @@ def test_workers_that_cannot_start_are_no_bug(monkeypatch, fake, tmp_path):
 
     monkeypatch.setattr(distributed, "LocalCluster", broken)
     with pytest.raises(WorkFailed, match=r"could not start: Nanny failed to start\.$"):
-        execute(fake.chain(), tmp_path, console=quiet())
+        execute(fake.chain(), Ledger(tmp_path), console=quiet())

@@ -49,7 +49,7 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
     recorded = []
     summary = execute(
-        tasks, tmp_path, workers=2, recorded=lambda task, files: recorded.append(task.title), console=quiet()
+        tasks, Ledger(tmp_path), workers=2, recorded=lambda task, files: recorded.append(task.title), console=quiet()
     )
 
     assert {task.title for task in summary.ran} == {"good", "fine", "timed", "slow 0", "slow 1"} == set(recorded)
@@ -67,20 +67,20 @@ def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
     assert {event["threads"] for event in events} == {"1"}
 
     # A second run does the failed ones again and nothing else.
-    again = execute(tasks, tmp_path, workers=1, console=quiet())
+    again = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
     assert {task.title for task in again.ran + again.failed} == {"bad", "forgetful"}
     assert len(again.before) == 5
 
 
 def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake):
     done, bad = fake.task("done"), fake.task("bad", fails="ValueError('no kernel')")
-    execute([done], tmp_path, workers=1, console=quiet())
+    execute([done], Ledger(tmp_path), workers=1, console=quiet())
     tasks = [done, bad, *(fake.task(f"new {index}") for index in range(3))]
 
     def prepare(todo):
         return [Preparation(task.title, fake.prepare, (tmp_path, task)) for task in todo]
 
-    summary = execute(tasks, tmp_path, workers=2, prepare=prepare, console=quiet())
+    summary = execute(tasks, Ledger(tmp_path), workers=2, prepare=prepare, console=quiet())
     events = [(event["event"], event["name"]) for event in fake.events(tmp_path)][2:]
     assert {name for event, name in events[:3] if event == "prepared"} == {"new 0", "new 1", "new 2"}
     # What cannot be compiled is told by the task that needs it.
@@ -89,7 +89,7 @@ def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake)
 
 def test_a_killed_worker_costs_one_retry(tmp_path, fake):
     tasks = [fake.task("victim", dies=True, seconds=0.2), fake.task("other", seconds=0.4)]
-    summary = execute(tasks, tmp_path, workers=2, console=quiet())
+    summary = execute(tasks, Ledger(tmp_path), workers=2, console=quiet())
     assert {task.title for task in summary.ran} == {"victim", "other"}
     starts = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
     assert starts.count("victim") == 2
@@ -100,7 +100,7 @@ def test_a_task_that_kills_every_worker_fails_alone(tmp_path, fake):
     """The shards that wait at its worker die with it each time, and are done nevertheless."""
     killer = fake.task("killer", dies=True, always=True)
     tasks = [killer, *(fake.task(f"shard {index}") for index in range(2))]
-    summary = execute(tasks, tmp_path, workers=1, console=quiet())
+    summary = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
     assert summary.failed == [killer] and len(summary.ran) == 2
     assert "is there enough memory" in Ledger(tmp_path).reason(killer)
 
@@ -110,14 +110,14 @@ def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path, fake):
     """By default dask never replaces a worker that is not back when its time is over, and the run stands still."""
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "50ms"}):
         tasks = [fake.task(f"victim {index}", dies=True) for index in range(2)]
-        summary = execute(tasks, tmp_path, workers=1, console=quiet())
+        summary = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
     assert len(summary.ran) == 2
 
 
 def test_tasks_that_run_alone_have_a_process_each(tmp_path, fake):
     tasks = [fake.task(f"timed {index}", fake.FakeTiming, dies=index == 3) for index in range(5)]
     failing = fake.task("fails", fake.FakeTiming, fails="ValueError('late')")
-    summary = execute([*tasks, failing], tmp_path, workers=2, console=quiet())
+    summary = execute([*tasks, failing], Ledger(tmp_path), workers=2, console=quiet())
     assert {task.title for task in summary.ran} == {task.title for task in tasks}
     assert Ledger(tmp_path).reason(failing) == "ValueError: late; tried 3 times"
     starts = [event for event in fake.events(tmp_path) if event["event"] == "start"]
@@ -129,12 +129,12 @@ def test_tasks_that_run_alone_have_a_process_each(tmp_path, fake):
 
 def test_work_left_out_before_is_named(tmp_path, fake):
     with pytest.raises(WorkFailed, match="train: 8 tasks that it needs are not done; run `twillight generate` first"):
-        execute(fake.chain(), tmp_path, stages=["train"], console=quiet())
+        execute(fake.chain(), Ledger(tmp_path), stages=["train"], console=quiet())
 
 
 def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
     with pytest.raises(BadInput, match="no dask scheduler answers"):
-        execute(fake.chain(), tmp_path, scheduler=Scheduler("nonsense://"), console=quiet())
+        execute(fake.chain(), Ledger(tmp_path), scheduler=Scheduler("nonsense://"), console=quiet())
 
 
 def driver(out, plan="chain"):
@@ -170,7 +170,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path, fake):
     tasks = fake.chain()
     done = sum(Ledger(tmp_path).state(task) == "done" for task in tasks)
     assert 2 <= done < len(tasks)
-    summary = execute(tasks, tmp_path, workers=2, console=quiet())
+    summary = execute(tasks, Ledger(tmp_path), workers=2, console=quiet())
     assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
     expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
     assert hashes(tmp_path) == expected
@@ -193,10 +193,10 @@ def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
     ledger = Ledger(tmp_path)
     ledger.finish(first, {"x.txt": measure(tmp_path / first.products[0])}, 1.0)
     recorded = []
-    summary = execute([twin], tmp_path, recorded=lambda task, files: recorded.append(task), console=quiet())
+    summary = execute([twin], Ledger(tmp_path), recorded=lambda task, files: recorded.append(task), console=quiet())
     assert recorded == [twin] == summary.before and not summary.ran
     recorded.clear()
-    execute([twin], tmp_path, recorded=lambda task, files: recorded.append(task), console=quiet())
+    execute([twin], Ledger(tmp_path), recorded=lambda task, files: recorded.append(task), console=quiet())
     assert not recorded
 
 

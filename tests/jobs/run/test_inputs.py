@@ -8,7 +8,6 @@ import pytest
 from rich.console import Console
 
 from jobs.run.executor import execute
-from jobs.run.inputs import Inputs
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from weaves.errors import WorkFailed
@@ -52,11 +51,11 @@ def plan(fake):
 
 def test_each_need_is_read_once(tmp_path, fake, plan):
     done(fake, tmp_path, *plan[:3])
-    inputs = Inputs(plan, Ledger(tmp_path))
-    assert inputs.damaged(plan[3]) == []
+    ledger = Ledger(tmp_path)
+    assert ledger.damaged(plan[:3]) == []
     flip(tmp_path / plan[1].products[0])
-    assert inputs.damaged(plan[3]) == []
-    assert inputs.damaged(plan[3], anew=True) == [plan[1]]
+    assert ledger.damaged(plan[:3]) == []
+    assert ledger.damaged(plan[:3], anew=True) == [plan[1]]
     assert not (tmp_path / plan[1].products[0]).exists()
     assert Ledger(tmp_path).state(plan[1]) == "missing"
 
@@ -68,7 +67,7 @@ def test_a_damaged_shard_is_made_again_and_nothing_else(tmp_path, fake, plan):
     flip(shard)
     assert Ledger(tmp_path).state(plan[1]) == "done"  # its size is right
     console = quiet()
-    summary = execute(plan, tmp_path, workers=1, console=console)
+    summary = execute(plan, Ledger(tmp_path), workers=1, console=console)
     assert [task.title for task in summary.ran] == ["shard 1", "net", "error"]
     assert [task.title for task in summary.before] == ["shard 0", "shard 2"]
     assert shard.read_bytes() == whole
@@ -79,14 +78,14 @@ def test_a_chain_of_damaged_products_is_made_again(tmp_path, fake, plan):
     done(fake, tmp_path, *plan[:4])
     for task in (plan[0], plan[3]):
         flip(tmp_path / task.products[0])
-    summary = execute(plan, tmp_path, workers=1, console=quiet())
+    summary = execute(plan, Ledger(tmp_path), workers=1, console=quiet())
     assert [task.title for task in summary.ran] == ["shard 0", "net", "error"]
 
 
 def test_what_no_task_reads_is_not_looked_at(tmp_path, fake, plan):
     done(fake, tmp_path, *plan[:4])
     flip(tmp_path / plan[0].products[0])
-    assert [task.title for task in execute(plan, tmp_path, workers=1, console=quiet()).ran] == ["error"]
+    assert [task.title for task in execute(plan, Ledger(tmp_path), workers=1, console=quiet()).ran] == ["error"]
 
 
 def test_a_damaged_product_of_a_stage_that_does_not_run_is_named(tmp_path, fake, plan):
@@ -95,16 +94,16 @@ def test_a_damaged_product_of_a_stage_that_does_not_run_is_named(tmp_path, fake,
     with pytest.raises(
         WorkFailed, match="shard 1: its products were damaged and are removed; run `twillight generate`"
     ):
-        execute(plan, tmp_path, stages=["train"], workers=1, console=quiet())
+        execute(plan, Ledger(tmp_path), stages=["train"], workers=1, console=quiet())
     with pytest.raises(WorkFailed, match="1 tasks that it needs are not done; run `twillight generate` first"):
-        execute(plan, tmp_path, stages=["train"], workers=1, console=quiet())
+        execute(plan, Ledger(tmp_path), stages=["train"], workers=1, console=quiet())
 
 
 def test_a_task_that_fails_on_an_input_damaged_meanwhile_is_tried_once_more(tmp_path, fake):
     shards = [fake.task(f"shard {index}") for index in range(2)]
     victim = str(tmp_path / shards[0].products[0])
     net = fake.task("net", fake.FakeTraining, needs=shards, damages=victim)
-    summary = execute([*shards, net], tmp_path, workers=1, console=quiet())
+    summary = execute([*shards, net], Ledger(tmp_path), workers=1, console=quiet())
     assert [task.title for task in summary.ran] == ["shard 1", "shard 0", "net"]
     names = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
     assert names.count("shard 0") == names.count("net") == 2 and names.count("shard 1") == 1
@@ -113,5 +112,5 @@ def test_a_task_that_fails_on_an_input_damaged_meanwhile_is_tried_once_more(tmp_
 def test_a_task_that_damages_its_inputs_each_time_fails(tmp_path, fake):
     shard = fake.task("shard")
     net = fake.task("net", fake.FakeTraining, needs=[shard], damages=str(tmp_path / shard.products[0]), always=True)
-    summary = execute([shard, net], tmp_path, workers=1, console=quiet())
+    summary = execute([shard, net], Ledger(tmp_path), workers=1, console=quiet())
     assert [task.title for task in summary.failed] == ["net"]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from jobs.plan.task import Place, Task
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product, Receipt, leaves, measure, read_receipt
+from jobs.run.store import store_of
 from weaves.errors import BadInput, WorkFailed
 
 
@@ -51,14 +52,14 @@ def test_nothing_written_is_missing(tmp_path):
 def test_receipt_and_product_are_done(done):
     assert done.state(TASK) == "done"
     assert done.seconds(TASK) == 1.5
-    receipt = json.loads((done.folder / f"{TASK.id}.json").read_text())
+    receipt = json.loads((done.out / "ledger" / f"{TASK.id}.json").read_text())
     assert receipt["title"] == "a shard"
     assert receipt["files"]["part-x.parquet"]["bytes"] == 12
 
 
 @pytest.mark.parametrize("damage", ["gone", "cut", "receipt cut", "receipt empty"])
 def test_a_damaged_product_or_receipt_is_missing(done, damage):
-    product, receipt = done.out / TASK.products[0], done.folder / f"{TASK.id}.json"
+    product, receipt = done.out / TASK.products[0], done.out / "ledger" / f"{TASK.id}.json"
     match damage:
         case "gone":
             product.unlink()
@@ -73,7 +74,7 @@ def test_a_damaged_product_or_receipt_is_missing(done, damage):
 
 def rewrite(ledger, change):
     """Write the receipt of TASK with other content, in the form of receipts that have no checksum."""
-    path = ledger.folder / f"{TASK.id}.json"
+    path = ledger.out / "ledger" / f"{TASK.id}.json"
     content = json.loads(path.read_text()) | change
     del content["checksum"]
     path.write_text(json.dumps(content, indent=1) + "\n")
@@ -102,21 +103,21 @@ def test_an_odd_receipt_counts_as_missing(done, change):
 
 def test_a_receipt_of_before_checksums_is_read(done):
     rewrite(done, {"title": "rows 0–9", "identity": {"error": 1e-05}})
-    assert b"\\u2013" in (done.folder / f"{TASK.id}.json").read_bytes()
+    assert b"\\u2013" in (done.out / "ledger" / f"{TASK.id}.json").read_bytes()
     assert done.state(TASK) == "done"
 
 
 @pytest.mark.parametrize("content", [b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)])
 def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
-    (done.folder / f"{TASK.id}.json").write_bytes(content)
+    (done.out / "ledger" / f"{TASK.id}.json").write_bytes(content)
     assert done.state(TASK) == "missing" and not done.adopt(TASK)
-    (done.folder / f"{TASK.id}.failed.json").write_bytes(content)
+    (done.out / "ledger" / f"{TASK.id}.failed.json").write_bytes(content)
     assert done.reason(TASK) == ""
 
 
 def test_a_receipt_says_what_its_task_depended_on(done):
     assert done.receipt(TASK).identity == leaves(TASK.identity())
-    (done.folder / f"{'0' * 16}.json").write_text("{}")
+    (done.out / "ledger" / f"{'0' * 16}.json").write_text("{}")
     done.fail(TASK, "for the test")
     assert [receipt.task for receipt in done.receipts([])] == [TASK.id]
     assert not list(done.receipts([TASK.id]))
@@ -181,13 +182,14 @@ def test_a_changed_shard_is_not_adopted(done):
 
 
 def test_one_run_at_a_time(tmp_path):
-    with Ledger(tmp_path).held(), pytest.raises(WorkFailed, match="another run is at work"), Ledger(tmp_path).held():
+    first, second = store_of(tmp_path), store_of(tmp_path)
+    with first.held(), pytest.raises(WorkFailed, match="another run is at work"), second.held():
         pass
-    with Ledger(tmp_path).held():
+    with second.held():
         pass
 
 
 def test_a_folder_that_cannot_be_written_is_bad_input(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(BadInput, match="--out must name a folder"), Ledger(tmp_path / "file" / "out").held():
+    with pytest.raises(BadInput, match="--out must name a folder"), store_of(tmp_path / "file" / "out").held():
         pass

@@ -73,7 +73,7 @@ def test_what_was_put_off_is_done_before_a_task_that_needs_others(tmp_path, monk
     heard = []
     execute(
         [*shards_, net],
-        tmp_path,
+        Ledger(tmp_path),
         workers=1,
         recorded=lambda task, files: heard.append(task.title),
         settle=lambda: heard.append("settled"),

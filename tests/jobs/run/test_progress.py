@@ -3,6 +3,7 @@ import io
 import pytest
 from rich.console import Console
 
+from jobs.plan.estimate import Estimate
 from jobs.run import progress
 from jobs.run.progress import Board
 from jobs.run.progress_forms import form_of
@@ -21,8 +22,9 @@ def test_silence_is_told_after_a_minute_and_less_and_less_often(fake, monkeypatc
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     out = io.StringIO()
     task = fake.task("tweed")
-    with Board([task], form_of("plain", Console(file=out, width=200))) as board:
+    with Board([task], Estimate(), form_of("plain", Console(file=out, width=200))) as board:
         board.start(2, None)
+        board.begin(task)
         said = []
         for now in range(0, 600, 5):
             before = len(out.getvalue())
@@ -30,7 +32,7 @@ def test_silence_is_told_after_a_minute_and_less_and_less_often(fake, monkeypatc
             if "nothing reported" in out.getvalue()[before:]:
                 said.append(now)
         assert said == [60, 120, 240, 480]
-        board.advance(task.id, 0.5)
+        board.hear({"task": task.id, "share": 0.5})
         board.waiting_for([task], workers=0)
         now += 61
         board.waiting_for([task], workers=0)

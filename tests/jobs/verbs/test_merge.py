@@ -24,7 +24,7 @@ def parts(tmp_path, monkeypatch, capsys):
     tasks = made_up.plan(recipe)
     for first, name in enumerate("ab"):
         out = tmp_path / name
-        made_up.execute(tasks[first:10:2], out)
+        made_up.execute(tasks[first:10:2], Ledger(out))
         ManifestFile(recipe, shards(recipe), Ledger(out)).save()
 
     def merge(*tokens):
@@ -44,7 +44,7 @@ def test_parts_of_a_data_set_become_the_whole(parts, tmp_path):
     assert found.keys() == expected.keys()
     assert {path for path in found if found[path] != expected[path]} == set()
     assert len(Manifest.load(tmp_path / "c" / parts.folder).shards) == 10
-    assert made_up.execute(parts.tasks, tmp_path / "c", stages=["generate"]).ran == []
+    assert made_up.execute(parts.tasks, Ledger(tmp_path / "c"), stages=["generate"]).ran == []
 
 
 def test_a_folder_may_be_joined_to_another_and_twice(parts, tmp_path):
@@ -60,13 +60,13 @@ def test_a_damaged_product_is_left_out_unless_the_other_folder_has_it(parts, tmp
         path = tmp_path / name / task.products[0]
         content = path.read_bytes()
         path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
-    made_up.execute([second], tmp_path / "a")
+    made_up.execute([second], Ledger(tmp_path / "a"))
     code, said, told = parts("a", "b", "--out", "c")
     assert code == 2 and "9 finished tasks" in said
     assert told == f"a: generate {first.title}: a product is missing or damaged; it is left out\n"
     assert Ledger(tmp_path / "c").state(first) == "missing"
     assert len(Manifest.load(tmp_path / "c" / parts.folder).shards) == 9
-    assert made_up.execute(parts.tasks, tmp_path / "c", stages=["generate"]).ran == [first]
+    assert made_up.execute(parts.tasks, Ledger(tmp_path / "c"), stages=["generate"]).ran == [first]
 
 
 def test_models_and_records_come_along_and_pages_do_not(parts, tmp_path):
@@ -76,7 +76,7 @@ def test_models_and_records_come_along_and_pages_do_not(parts, tmp_path):
     page = parts.tasks[-1]
     left = {path for path in expected if path.startswith("report/")} | {f"ledger/{page.id}.json"}
     assert found == {path: content for path, content in expected.items() if path not in left}
-    assert made_up.execute(parts.tasks, tmp_path / "c").ran == [page]
+    assert made_up.execute(parts.tasks, Ledger(tmp_path / "c")).ran == [page]
 
 
 def test_other_bytes_of_one_task_are_refused(parts, tmp_path):

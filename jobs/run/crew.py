@@ -1,0 +1,228 @@
+"""Crew: the workers of a scheduler, and the tasks that are with them.
+
+Workers may come and go while a run is under way, as those of a cluster that adapts do. One whose software is not the
+driver's is refused: each new worker is checked before it counts, and a task that dask hands to one before that is not
+computed there.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+import uuid
+from collections.abc import Callable, Collection, Mapping
+from functools import cache
+from queue import Empty, SimpleQueue
+from typing import Any, Final
+
+from jobs.plan.task import Task
+from jobs.run.outcome import KILLED, Outcome, one_line, work
+from jobs.run.receipt import Product
+from jobs.run.software import difference, digest, software
+from pipeline import patience
+from pipeline.storage import place
+from weaves.errors import WorkFailed
+
+_SECONDS_BETWEEN_LOOKS: Final = 1.0
+_SECONDS_BETWEEN_SIGNS: Final = 0.2
+_SECONDS_FOR_AN_ERROR: Final = 5.0
+
+
+class Crew:
+    """The workers that may get tasks.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Client of the scheduler.
+    external : bool
+        True for a scheduler of somebody else: its workers are checked. Those of this run have the driver's software.
+    hear : callable
+        Receives the messages of workers: a dictionary with ``task`` and ``share``, ``sentence``, or ``kernel``. Calls
+        come from a thread of dask's.
+    """
+
+    def __init__(self, client: Any, external: bool, hear: Callable[[Mapping[str, Any]], None]) -> None:
+        self._client, self._external, self._hear = client, external, hear
+        self._digest = digest() if external else ""  # that workers must have; empty: any
+        self._threads: dict[str, int] = {}
+        self._checked: dict[str, str] = {}  # what differs, by address; empty: nothing
+        self._looked = -_SECONDS_BETWEEN_LOOKS
+        self.accepted: list[str] = []
+        """Addresses of the workers that may get tasks."""
+        # Topic and keys of this run: another run of the same task, with another folder, is not this one.
+        self._topic = f"twillight-{uuid.uuid4().hex}"
+        self._number = 0
+        self._running: dict[str, tuple[Task, Any]] = {}  # and their futures, by key
+        self._begun: set[str] = set()  # ids
+        # Keys with outcomes; without one: the future has ended. Filled by threads of dask's.
+        self._ended: SimpleQueue[tuple[str, Mapping[str, Any] | None]] = SimpleQueue()
+        client.subscribe_topic(self._topic, self._receive)
+        self.look(now=True)
+
+    def look(self, now: bool = False) -> None:
+        """Ask the scheduler for its workers, once a second at most or `now`, and check those that are new.
+
+        Raises
+        ------
+        WorkFailed
+            If every worker is refused.
+        """
+        if not now and time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS:
+            return
+        self._threads = self._client.nthreads()
+        self._looked = time.monotonic()
+        self._checked = {address: why for address, why in self._checked.items() if address in self._threads}
+        if new := [address for address in self._threads if address not in self._checked] if self._external else []:
+            self._check(new)
+        self.accepted = [one for one in self._threads if not self._external or self._checked.get(one) == ""]
+
+    @property
+    def slots(self) -> int:
+        """Tasks that should be with the scheduler: one a thread.
+
+        A scheduler of somebody else gets more, because a cluster that adapts grows only if it sees tasks that wait.
+        """
+        return 2 * self.threads + 2 if self._external else self.threads
+
+    @property
+    def threads(self) -> int:
+        """Threads of the workers that may get tasks; 1 if there is none."""
+        return max(1, sum(self._threads[address] for address in self.accepted))
+
+    @property
+    def running(self) -> list[Task]:
+        """Tasks that have not ended."""
+        return [task for task, _ in self._running.values()]
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Return the future of a function of ``(*arguments, tell)`` in a worker; `tell` sends a message."""
+        return self._client.submit(_told, function, arguments, self._topic, pure=False, **self._where(()))
+
+    def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
+        """Give a task to a worker.
+
+        Parameters
+        ----------
+        task : Task
+            The task.
+        out : str
+            Output folder, as every worker must see it.
+        inputs : mapping
+            Hashes of the products that it needs, by path.
+        avoided : collection of str
+            Addresses of workers that do not get it if there is a choice.
+        """
+        self._number += 1  # a second try must not get the first one's result
+        key = f"{task.stage}-{task.id}-{self._topic}-{self._number}"
+        given = task, out, inputs, self._topic, self._digest
+        future = self._client.submit(_work, *given, key=key, **self._where(avoided))
+        self._running[key] = task, future
+        future.add_done_callback(lambda future: self._ended.put((future.key, None)))
+
+    def ended(self, seconds: float) -> list[tuple[Task, Outcome]]:
+        """Wait for a task to end, so many seconds at most; return all that have ended, with their outcomes."""
+        outcomes: list[tuple[Task, Outcome]] = []
+        try:
+            key, content = self._ended.get(timeout=seconds)
+            while True:
+                if key in self._running:  # else its outcome came as a message, and now its future ends
+                    task, future = self._running.pop(key)
+                    outcomes.append((task, _outcome(content) if content else self._failure(task, future)))
+                    self._begun.discard(task.id)
+                key, content = self._ended.get_nowait()
+        except Empty:
+            return outcomes
+
+    def recheck(self, address: str) -> None:
+        """Check a worker again that did not accept a task, or look for another one."""
+        if self._external and not self._checked.get(address):
+            self._checked.pop(address, None)
+            self.look(now=True)
+
+    def _receive(self, event: tuple[float, Any]) -> None:
+        message: Mapping[str, Any] = event[1]
+        if "outcome" in message:
+            self._ended.put((message["key"], message["outcome"]))
+            return
+        if "task" in message:
+            self._begun.add(message["task"])
+        self._hear(message)
+
+    def _failure(self, task: Task, future: Any) -> Outcome:
+        """Return the outcome of a task that ended without a message.
+
+        Dask blames the death of a worker on all tasks that were with it; one that had not begun is innocent.
+        """
+        from distributed import KilledWorker
+
+        error = future.exception(timeout=_SECONDS_FOR_AN_ERROR)
+        if isinstance(error, KilledWorker):
+            innocent = Outcome({}, 0.0, "its worker died before it began", refused=True)
+            return Outcome({}, 0.0, KILLED) if task.id in self._begun else innocent
+        error = error or RuntimeError("its worker sent no outcome")
+        return Outcome({}, 0.0, one_line(error), "".join(traceback.format_exception(error)))
+
+    def _where(self, avoided: Collection[str]) -> dict[str, Any]:
+        """Return the arguments of `Client.submit` that keep a task from refused and from `avoided` workers."""
+        preferred = [address for address in self.accepted if address not in avoided]
+        if not preferred or len(preferred) == len(self._threads):
+            return {}
+        # A preference: a task bound to these alone would wait for ever when they have left.
+        return {"workers": preferred, "allow_other_workers": True}
+
+    def _check(self, new: list[str]) -> None:
+        for address, there in self._client.run(software, workers=new, on_error="return").items():
+            if isinstance(there, OSError):
+                continue  # it is gone, or the next look queries it again
+            self._checked[address] = difference(there)
+            if self._checked[address]:
+                self._hear({"sentence": self._refusal(address)})
+        if self._threads and all(self._checked.get(address) for address in self._threads):
+            raise WorkFailed(f"every worker is refused; {self._refusal(next(iter(self._checked)))}")
+
+    def _refusal(self, address: str) -> str:
+        return f"worker {address} gets no task: {self._checked[address]}; install the same version there"
+
+
+def _told(function: Callable[..., Any], arguments: tuple[Any, ...], topic: str) -> Any:
+    """Call a function in a worker."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    return function(*arguments, lambda message: worker.log_event(topic, message))
+
+
+def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected: str) -> None:
+    """Do a task in a worker, unless its software is not the `expected` one, and send the outcome as a message.
+
+    A message costs less than a result that dask gathers, and is not lost if the worker dies after it.
+    """
+    from distributed import get_worker
+
+    worker, last = get_worker(), time.monotonic()
+
+    def progress(share: float) -> None:
+        nonlocal last
+        if (now := time.monotonic()) - last >= _SECONDS_BETWEEN_SIGNS:
+            worker.log_event(topic, {"task": task.id, "share": float(share)})
+            last = now
+
+    patience.tell(lambda sentence: worker.log_event(topic, {"sentence": sentence}))
+    if expected and expected != _digest():
+        outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
+    else:
+        worker.log_event(topic, {"task": task.id, "share": 0.0})
+        outcome = work(task, place(out), progress, inputs, worker.state.nthreads)
+    files = {name: product.model_dump() for name, product in outcome.files.items()}
+    content = outcome._asdict() | {"files": files, "worker": worker.address}
+    worker.log_event(topic, {"key": worker.get_current_task(), "outcome": content})
+
+
+def _outcome(content: Mapping[str, Any]) -> Outcome:
+    """Return the outcome in a message."""
+    files = {name: Product(**product) for name, product in content["files"].items()}
+    return Outcome(**{**content, "files": files})
+
+
+_digest = cache(digest)

@@ -1,0 +1,260 @@
+"""Files of an output folder, by paths relative to it: in a folder of this machine, or in object storage.
+
+Each question to object storage is a request over the network. So its files are listed when they are first needed, 1000
+a request, and the receipts fetched, many at the same time, into a folder of this machine and user; later only those
+whose version has changed. That folder is also where tasks run (`jobs.run.outcome`). Nothing in it is needed again: it
+may be removed while no run uses it.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import tempfile
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
+from pathlib import Path
+from threading import Lock
+from typing import Final
+
+from filelock import FileLock, Timeout
+
+from jobs.plan.dataset import DATASETS
+from pipeline import storage
+from pipeline.atomic import atomic_write, link
+from pipeline.fingerprint import fingerprint
+from weaves.errors import BadInput, WorkFailed
+
+LEDGER: Final = "ledger"
+"""Folder of the receipts, relative to the output folder."""
+
+_FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "report")
+
+
+class Store(ABC):
+    """The files of an output folder; only one process at a time writes through it.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder.
+    """
+
+    is_local: bool
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+
+    @abstractmethod
+    def size(self, path: str) -> int | None:
+        """Return the size of a file in bytes; None if there is none."""
+
+    @abstractmethod
+    def is_file(self, path: str) -> bool:
+        """Return whether there is such a file."""
+
+    @abstractmethod
+    def named(self, folder: str, name: str) -> list[str]:
+        """Return the sorted paths of all files of a name in the folders of a pattern."""
+
+    @abstractmethod
+    def below(self, folders: Iterable[str]) -> Iterator[str]:
+        """Yield the paths of all files in or below some folders."""
+
+    @abstractmethod
+    def copy(self, path: str) -> Path:
+        """Return a file of this machine with the content of a file of the ledger; it exists if the file does."""
+
+    def write(self, path: str, content: bytes, *, durable: bool = True) -> None:
+        """Write a file of the ledger, whole or not at all; `durable` as for `pipeline.atomic.atomic_path`."""
+        atomic_write(self.out / path, content, durable=durable)
+
+    def wrote(self, path: str, size: int) -> None:  # noqa: B027, a folder is looked at each time
+        """Note that another process has written a file."""
+
+    def remove(self, path: str) -> None:
+        """Remove a file if it is there."""
+        (self.out / path).unlink(missing_ok=True)
+
+    def link(self, source: str, target: str, size: int) -> None:
+        """Let a second path name the bytes of a file, of this size."""
+        link(self.out / source, self.out / target)
+        self.wrote(target, size)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep other runs out for as long as this process lives: in object storage, those of this machine and user.
+
+        Raises
+        ------
+        BadInput
+            If the folder cannot be created or written.
+        WorkFailed
+            If another run is at work there.
+        """
+        try:
+            folder = self._lock_folder()
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = FileLock(folder / "lock", blocking=False)
+            lock.acquire()
+        except Timeout as error:
+            allowed = "another run is at work in this folder; wait for it, or choose another --out"
+            raise WorkFailed(f"{self.out}: {allowed}") from error
+        except OSError as error:
+            allowed = "--out must name a folder that can be written"
+            raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
+        try:
+            yield
+        finally:
+            lock.release()
+
+    @abstractmethod
+    def _lock_folder(self) -> Path:
+        """Return the folder of this machine in which runs lock each other out."""
+
+
+def store_of(out: Path) -> Store:
+    """Return the files of an output folder."""
+    return _LocalStore(out) if storage.is_local(out) else _RemoteStore(out)
+
+
+class _LocalStore(Store):
+    """Files in a folder of this machine."""
+
+    is_local = True
+
+    def size(self, path: str) -> int | None:
+        try:
+            return (self.out / path).stat().st_size
+        except OSError:
+            return None
+
+    def is_file(self, path: str) -> bool:
+        return (self.out / path).is_file()
+
+    def named(self, folder: str, name: str) -> list[str]:
+        return sorted(str(path.relative_to(self.out)) for path in self.out.glob(f"{folder}/{glob.escape(name)}"))
+
+    def below(self, folders: Iterable[str]) -> Iterator[str]:
+        for folder in folders:
+            yield from (str(path.relative_to(self.out)) for path in (self.out / folder).rglob("*") if path.is_file())
+
+    def copy(self, path: str) -> Path:
+        return self.out / path
+
+    def _lock_folder(self) -> Path:
+        return self.out / LEDGER
+
+
+class _RemoteStore(Store):
+    """Files in object storage as they were when they were first needed, and what this process has written since."""
+
+    is_local = False
+
+    def __init__(self, out: Path) -> None:
+        super().__init__(out)
+        self._lock = Lock()
+        self._known: dict[str, int] = {}  # sizes
+        self._copies: dict[str, Path] = {}  # of the files of the ledger
+        self._places: dict[str, list[str]] = {}  # paths by file name
+        self._is_read = False
+
+    def size(self, path: str) -> int | None:
+        return self._sizes.get(path)
+
+    def is_file(self, path: str) -> bool:
+        return path in self._sizes
+
+    def named(self, folder: str, name: str) -> list[str]:
+        self._read()
+        return sorted(path for path in self._places.get(name, ()) if fnmatchcase(str(Path(path).parent), folder))
+
+    def below(self, folders: Iterable[str]) -> Iterator[str]:
+        wanted = set(folders)
+        yield from [path for path in self._sizes if any(str(parent) in wanted for parent in Path(path).parents)]
+
+    def copy(self, path: str) -> Path:
+        self._read()
+        return self._copies.get(path, self._folder / "none")
+
+    def write(self, path: str, content: bytes, *, durable: bool = True) -> None:
+        super().write(path, content)
+        self.wrote(path, len(content))
+        copy = self._folder / "new" / Path(path).name  # its version is not known
+        atomic_write(copy, content, durable=False)
+        self._copies[path] = copy
+
+    def wrote(self, path: str, size: int) -> None:
+        if path not in self._sizes:
+            self._places.setdefault(Path(path).name, []).append(path)
+        self._known[path] = size
+
+    def remove(self, path: str) -> None:
+        if self._sizes.pop(path, None) is not None:
+            super().remove(path)
+            self._copies.pop(path, None)
+            self._places[Path(path).name].remove(path)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        with super().held():
+            # A lock here would outlive a killed run. A bucket that refuses the file is reported before work begins.
+            (self.out / LEDGER / "lock").write_bytes(b"")
+            yield
+
+    def _lock_folder(self) -> Path:
+        return workspace_of(self.out)
+
+    @property
+    def _folder(self) -> Path:
+        """Folder of the copies."""
+        return workspace_of(self.out) / "receipts"
+
+    @property
+    def _sizes(self) -> dict[str, int]:
+        self._read()
+        return self._known
+
+    def _read(self) -> None:
+        """List the files and fetch new receipts, once."""
+        with self._lock:
+            if self._is_read:
+                return
+            for folder in _FOLDERS:
+                for name, stored in storage.listing(self.out / folder).items():
+                    path = f"{folder}/{name}"
+                    self._known[path] = stored.bytes
+                    self._places.setdefault(Path(path).name, []).append(path)
+                    if folder == LEDGER and path.endswith(".json"):
+                        self._copies[path] = self._folder / f"{Path(name).stem}.{stored.version}.json"
+            self._fetch()
+            self._is_read = True
+
+    def _fetch(self) -> None:
+        """Fetch the receipts that are new, and remove copies that are out of date."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        kept = {path.name for path in self._folder.iterdir()}
+        wanted = {path: copy for path, copy in self._copies.items() if copy.name not in kept}
+        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=self._folder) as name:
+            targets = {path: Path(name) / copy.name for path, copy in wanted.items()}
+            storage.fetch_all(self.out, targets)
+            for path, target in targets.items():
+                target.replace(wanted[path])
+        current = {copy.name for copy in self._copies.values()}
+        for name in kept - current:
+            if name.endswith(".json"):
+                (self._folder / name).unlink(missing_ok=True)
+
+
+def workspace_of(out: Path) -> Path:
+    """Return the folder of this machine and user for an address, made if it is missing; BadInput if it cannot be."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "twillight" / fingerprint(str(out))
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:  # no folder of all users instead: a stranger may have put files there
+        allowed = "XDG_CACHE_HOME must name a folder that can be written"
+        raise BadInput(str(cache), "", error.strerror or error, allowed) from error
+    return folder
