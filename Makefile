@@ -70,6 +70,7 @@ lint: $(READY)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/python -m tests.lint
 
 # PyTorch's build for the CPU alone is taken where the package index has it: it needs no CUDA.
 # Nothing is installed again until the pinned versions or the package's own description change.

@@ -1,0 +1,21 @@
+"""Check the order, the words and the sizes of the code; print the table of budgets. `make lint` runs it."""
+
+from __future__ import annotations
+
+import sys
+
+from tests.lint import architecture, budgets, words
+
+
+def main() -> int:
+    """Print everything that is wrong, and the table; return 1 if anything is wrong."""
+    text, exceeded = budgets.table()
+    wrong = [*architecture.problems(), *words.problems(), *exceeded]
+    print(text)
+    for sentence in wrong:
+        print(sentence, file=sys.stderr)
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

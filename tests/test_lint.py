@@ -1,0 +1,96 @@
+"""The checks of `make lint` can fail."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.lint import architecture, budgets, words
+from tests.lint.tree import ROOT, Source
+
+
+def source(text, module="pipeline.truth.made_up"):
+    return Source(Path(f"{module.rpartition('.')[2]}.py"), module, text, ast.parse(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("from weaves.fabric import Fabric", 0),
+        ("from pipeline.truth import query", 0),
+        ("def f():\n    from pipeline.shards.schema import SCHEMAS", 1),
+        ("import twillight", 1),
+        ("import pyarrow.parquet", 1),
+        ("from .query import Queries", 1),
+    ],
+)
+def test_imports_point_upstream(text, wrong):
+    assert len(list(architecture.wrong_imports(source(text)))) == wrong
+
+
+def test_a_test_imports_nothing_from_rooms_after_its_own():
+    text = "from reports.record import Record\nfrom pipeline.shards.queries import Frame"
+    wrong = list(architecture.wrong_imports_of_test(source(text, "tests.pipeline.truth.test_made_up")))
+    assert len(wrong) == 1 and "reports.record" in wrong[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("see pipeline.truth.query", []),
+        ("`pipeline.truth.query.Queries.take`, then", []),
+        ("`pipeline.truth.query.Queries.nothing`", ["pipeline.truth.query.Queries.nothing"]),
+        ("(pipeline.truth.sums)", ["pipeline.truth.sums"]),
+        ("`kernels.SMOOTH`", []),
+        ("`kernels.ROUGH`", ["kernels.ROUGH"]),
+        ("tests/fits and pipeline/atomic.py.", []),
+        ("tests/fit", ["tests/fit"]),
+    ],
+)
+def test_names_in_docstrings_and_comments_exist(text, wrong):
+    assert architecture.missing_names(text) == wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"), [("teacher_of", 1), ("knobs", 1), ("stand_in", 1), ("errors", 0), ("_placed", 1)]
+)
+def test_names_use_the_terms_of_the_field(name, wrong):
+    assert len(list(words.wrong_names(name))) == wrong
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"), [("Queries that it was not taught.", 1), ("The column `asked`.", 0), ("A task is given.", 0)]
+)
+def test_prose_uses_the_terms_of_the_field(text, wrong):
+    assert len(list(words.wrong_prose(text))) == wrong
+
+
+def test_lines_of_code_are_counted_without_imports_docstrings_and_comments():
+    text = '"""A module."""\n\nfrom a import (\n    b,\n)\n\n# why\nx = 1  # one\n\n\n'
+    text += 'def f():\n    """Nothing."""\n    return (\n        b\n    )\n'
+    assert source(text).lines_of_code == 5
+
+
+def test_a_budget_that_is_exceeded_is_named(monkeypatch):
+    monkeypatch.setattr(budgets, "measured", lambda: {"files": ("files", 10**9), "steps": ("steps", 0)})
+    text, exceeded = budgets.table()
+    assert "1,000,000,000" in text and len(exceeded) == 1 and exceeded[0].startswith("files: ")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "from jobs.cli import main; main(['--help'])",
+        "from jobs.plan.plan import plan; from jobs.recipe.load import load_recipe",
+    ],
+    ids=["help", "plan"],
+)
+def test_help_and_plans_load_no_heavy_library(code):
+    """`twillight --help` answers in under 0.5 s because nothing heavy is imported; numpy alone takes 0.1 s."""
+    heavy = sorted(set(architecture.HOMES) - {"cyclopts", "rich"})
+    check = f"import sys; print('loaded:', *(name for name in {heavy} if name in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", f"{code}; {check}"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "loaded:"
