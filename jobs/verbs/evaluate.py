@@ -33,7 +33,7 @@ def truth_options(**chosen: object) -> TruthOptions:
     given = {name: value for name, value in chosen.items() if value is not None}
     estimator = given.get("estimator", TruthOptions().estimator)
     if estimator not in ESTIMATORS:
-        raise BadInput(WHERE, "--estimator", estimator, nearest(str(estimator), ESTIMATORS, "estimator"))
+        raise BadInput(WHERE, "--estimator", estimator, nearest(str(estimator), ESTIMATORS))
     try:
         return validated(TruthOptions, given, WHERE)
     except BadInput as error:

@@ -90,7 +90,7 @@ def require(
     names = [model.options.name for model in general.models]
     if method and method not in names:
         raise BadInput(
-            "require", "--method", method, f"{general.name} has no such method; {nearest_name(method, names, 'model')}"
+            "require", "--method", method, f"{general.name} has no such method; {nearest_name(method, names)}"
         )
     records = read_records([records_file(out, general.name)])
     sizes = size_table(records)
