@@ -137,7 +137,7 @@ def import_(
     weft: Annotated[YarnFlags, Parameter(name="--weft")] = YarnFlags(),
 ) -> None:
     """Make a fabric from the draft file of a weaving program."""
-    from jobs.verbs.exchange.import_draft import import_draft
+    from jobs.verbs.exchange import import_draft
 
     import_draft(draft, out, like, name, {"warp": warp.given(), "weft": weft.given()})
 
@@ -181,40 +181,11 @@ def export(
     ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader."""
-    from jobs.terminal import Terminal
-    from weaves.fabric import load_fabric
+    from jobs.verbs.exchange import export_fabric
 
-    cloth = load_fabric(fabric)
-    kinds = (("--mesh", mesh), ("--wif", wif), ("--maps", maps), ("--shader", shader))
-    chosen = [option for option, path in kinds if path is not None]
-    if len(chosen) != 1:
-        allowed = "one of --mesh, --wif, --maps and --shader is needed"
-        raise BadInput("export", "", " and ".join(chosen) or "nothing", allowed)
-    for option, value, owner in (
-        ("--vertices", vertices, mesh), ("--repeats", repeats, mesh), ("--size", size, maps),
-        ("--model", model, shader), ("--level", level, shader), ("--language", ", ".join(language) or None, shader),
-        ("--kind", ", ".join(kind) or None, shader),
-    ):  # fmt: skip
-        if value is not None and owner is None:
-            raise BadInput("export", option, value, f"is not for {chosen[0]}; leave it out")
-    if mesh is not None:
-        from jobs.verbs.exchange.export_mesh import write_mesh
-
-        triangles = write_mesh(cloth, mesh, 64 if vertices is None else vertices, 1 if repeats is None else repeats)
-        said = f"{mesh}: {triangles:,} triangles; lengths in yarn spacings, z up"
-    elif wif is not None:
-        from jobs.verbs.exchange.export_draft import write_draft
-
-        said = write_draft(cloth, wif)
-    elif shader is not None:
-        from pipeline.shader.export_shader import export_shader
-
-        said = export_shader(cloth, shader, level, language, kind, model)
-    else:
-        from jobs.verbs.exchange.maps.export_maps import SIZE, export_maps
-
-        said = export_maps(cloth, Path(str(maps)), SIZE if size is None else size)
-    Terminal().print(said, soft_wrap=True)
+    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader}
+    options = {"vertices": vertices, "repeats": repeats, "size": size, "model": model, "level": level}
+    export_fabric(fabric, paths, {**options, "language": language, "kind": kind})
 
 
 @app.command(sort_key=2)
@@ -227,14 +198,9 @@ def view(
     ] = 160,
 ) -> None:
     """Write a page of one file that draws a fabric while light and viewer turn, and compares methods."""
-    from jobs.terminal import Terminal
-    from reports.viewer.view import write_page
-    from weaves.fabric import load_fabric
+    from jobs.verbs.exchange import view as write_page
 
-    console = Terminal()
-    with console.status("tables and tiles"):
-        said = write_page(load_fabric(fabric), out, truth)
-    console.print(said, soft_wrap=True)
+    write_page(fabric, out, truth)
 
 
 @app.command(sort_key=2)

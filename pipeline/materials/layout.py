@@ -67,7 +67,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
         If the size is no power of two from `SMALLEST` to `LARGEST`, or too small for the repeat.
     """
     if not SMALLEST <= size <= LARGEST or size & (size - 1):
-        raise BadInput("export", "--size", size, f"must be a power of two from {SMALLEST} to {LARGEST}")
+        raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST} to {LARGEST}")
     found = min(_candidates(fabric.repeat, size), key=_order)
     if found.texels_per_yarn < TEXELS_PER_YARN:
         needed = size
@@ -77,7 +77,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
         allowed = f"the repeat of {ends} ends and {picks} picks needs {needed}"
         if needed > LARGEST:
             allowed += f", and at most {LARGEST} are possible"
-        raise BadInput("export", "--size", size, allowed)
+        raise BadInput("export", "size", size, allowed)
     return found
 
 

@@ -33,7 +33,7 @@ from pipeline.truth.geometry import heightfield
 from pipeline.truth.scattering import slab_float32
 from weaves.colour import LUMINANCE
 
-COLUMNS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
+ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
     "GROUP": (nodes, ("START", "LINES", "RULE_X", "RULE_Y", "GROUP_FAMILY")),
     "PIECE": (nodes, ("FAMILY", "BLOCK")),
@@ -153,7 +153,7 @@ def constants() -> dict[str, float | int]:
         "LUMINANCE_GREEN": green,
         "LUMINANCE_BLUE": blue,
     }
-    for name, (module, columns) in COLUMNS.items():
+    for name, (module, columns) in ARRAYS.items():
         found |= {column: vars(module)[column] for column in columns}
         extra = CELLS_OF_GROUP if name == "GROUP" else ()
         found |= {column: len(columns) + index for index, column in enumerate(extra)}

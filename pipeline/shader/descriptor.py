@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from importlib.metadata import version
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from pipeline.compiled.arrays import Float32
+from pipeline.models.domain import Domain
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.golden import ANSWERS, COLUMNS, DENSITY, TRANSPARENCY, Golden
+from pipeline.shader.golden import ANSWERS, DENSITY, QUERY_COLUMNS, TRANSPARENCY, Golden
 from pipeline.shader.limits import MOST_CELLS, MOST_NODES
-from pipeline.shader.tables import Tables
+from pipeline.shader.tables import ClothTables, Place
 from pipeline.truth.conventions import COMPONENTS
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 GOLDEN: Final = "golden.json"
@@ -34,17 +36,6 @@ class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
-class Place(_Model):
-    """An array in a buffer."""
-
-    offset: int
-    """First element."""
-    shape: tuple[int, ...]
-    """Its extent, row-major."""
-    meaning: str
-    """Its content."""
-
-
 class Buffer(_Model):
     """A buffer that the shader reads."""
 
@@ -58,7 +49,7 @@ class Buffer(_Model):
     """Arrays in it, after the scalars."""
 
 
-class Layer(_Model):
+class PlacedLayer(_Model):
     """A layer: outputs = activation(biases + inputs times weights)."""
 
     network: str
@@ -71,7 +62,7 @@ class Layer(_Model):
     """Function of each output."""
 
 
-class Network(_Model):
+class Networks(_Model):
     """The networks of a model, in the buffer `weights`. Offsets are in elements, shapes in numbers."""
 
     name: str
@@ -84,7 +75,7 @@ class Network(_Model):
     """Inputs of each network, in their order."""
     outputs: dict[str, str]
     """Meaning of the outputs of each network."""
-    layers: list[Layer]
+    layers: list[PlacedLayer]
     """Layers, in the order of their computation."""
     onnx: dict[str, str]
     """Inputs of the ONNX form, each of N rows; its output is `components`, (N, 4)."""
@@ -102,74 +93,6 @@ class Colours(_Model):
     diffuse_weft: tuple[float, float, float]
     transmitted_warp: tuple[float, float, float]
     transmitted_weft: tuple[float, float, float]
-
-
-class Vectors(_Model):
-    """Content of `golden.json`."""
-
-    columns: tuple[str, ...] = COLUMNS
-    """Columns of a query."""
-    queries: list[list[float]]
-    """Queries."""
-    groups: dict[str, tuple[int, int]]
-    """First row and end of the rows of each kind; the range of a column is that of its group."""
-    components: list[list[float]]
-    """Their answers."""
-    bounds: list[list[float]]
-    """Upper bounds of the components."""
-    transparency: list[float]
-    """Transparency of the footprint towards the viewer; empty for a model that does not know it."""
-    density: list[float]
-    """Density with which `sample` finds wi, 1/sr; empty for a model without it."""
-    steady: float
-    """Share of the queries tried whose answer does not hang on the last digit of a place; the others are not listed."""
-
-
-class Descriptor(_Model):
-    """Content of `soft_nodes.json`."""
-
-    model: str = "soft_nodes"
-    """The method."""
-    fabric: str
-    """Name of the fabric."""
-    generator: str
-    """Program and version."""
-    level: int | None
-    """Level of detail k of the soft nodes; none if the model has none."""
-    inputs: dict[str, str]
-    """Fields of a query, with their units."""
-    outputs: dict[str, str]
-    """Fields of an answer."""
-    conventions: list[str]
-    """Axes, directions, cosine and colours."""
-    components: tuple[str, ...] = COMPONENTS
-    """Order of the four components."""
-    colours: Colours
-    """Colours of the yarns."""
-    repeat: tuple[int, int]
-    """Ends and picks after which the weave repeats."""
-    limits: dict[str, int]
-    """Largest table that the shader takes."""
-    texture_width: int = TEXTURE_WIDTH
-    """Texels of a row of every texture."""
-    kinds: list[str]
-    """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
-    scalars: dict[str, int | float]
-    """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
-    back_scalars: dict[str, int | float]
-    """The next ones of both, of the back of the cloth, if the tables know it."""
-    buffers: dict[str, Buffer]
-    """Buffers, by the name that they have in the source."""
-    network: Network | None = None
-    """Networks, of a model that has some."""
-    source: list[str] = []
-    """Files of the source."""
-    languages: dict[str, list[str]] = {}
-    """Files that slangc made, by language."""
-    golden: str = GOLDEN
-    """Queries with their answers."""
-    files: dict[str, str] = {}
-    """SHA-256 of every file, by path; that of this file is of its other keys."""
 
 
 INPUTS: Final = {
@@ -200,9 +123,87 @@ CONVENTIONS: Final = [
 """Axes, directions, cosine and colours."""
 
 
-def generator() -> str:
-    """Return program and version."""
-    return f"twillight {version('twillight')}"
+class Descriptor(_Model):
+    """Content of `soft_nodes.json`."""
+
+    model: str = "soft_nodes"
+    """The method."""
+    fabric: str
+    """Name of the fabric."""
+    generator: str = f"twillight {version('twillight')}"
+    """Program and version."""
+    level: int | None
+    """Level of detail k of the soft nodes; none if the model has none."""
+    inputs: dict[str, str] = INPUTS
+    """Fields of a query, with their units."""
+    outputs: dict[str, str] = OUTPUTS
+    """Fields of an answer."""
+    conventions: list[str] = CONVENTIONS
+    """Axes, directions, cosine and colours."""
+    components: tuple[str, ...] = COMPONENTS
+    """Order of the four components."""
+    colours: Colours
+    """Colours of the yarns."""
+    repeat: tuple[int, int]
+    """Ends and picks after which the weave repeats."""
+    limits: dict[str, int]
+    """Largest table that the shader takes."""
+    texture_width: int = TEXTURE_WIDTH
+    """Texels of a row of every texture."""
+    kinds: list[str]
+    """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
+    scalars: dict[str, int | float]
+    """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
+    back_scalars: dict[str, int | float]
+    """The next ones of both, of the back of the cloth, if the tables know it."""
+    buffers: dict[str, Buffer]
+    """Buffers, by the name that they have in the source."""
+    network: Networks | None = None
+    """Networks, of a model that has some."""
+    source: list[str] = []
+    """Files of the source."""
+    languages: dict[str, list[str]] = {}
+    """Files that slangc made, by language."""
+    golden: str = GOLDEN
+    """Queries with their answers."""
+    files: dict[str, str] = {}
+    """SHA-256 of every file, by path; that of this file is of its other keys."""
+
+
+class Shader(NamedTuple):
+    """A model of one fabric, ready to be written.
+
+    Attributes
+    ----------
+    name : str
+        Name of the model, of its file in the source, and of its function there.
+    sources : tuple of str
+        Files of the source that are the same for all fabrics.
+    generated : dict
+        Texts of the other files of the source, by name.
+    files : dict
+        Contents of the files of buffers, by their paths in the folder.
+    about : Descriptor
+        The descriptor, before source and languages are written.
+    golden : Golden
+        Queries with their answers.
+    size : str
+        Words on its size, for a sentence.
+    sampled : bool
+        Whether directions can be drawn.
+    onnx : callable or None
+        Returns its network as an ONNX model; None if it has none.
+    """
+
+    name: str
+    sources: tuple[str, ...]
+    generated: dict[str, str]
+    files: dict[str, bytes]
+    about: Descriptor
+    golden: Golden
+    size: str
+    sampled: bool
+    onnx: Callable[[], bytes] | None = None
 
 
 def colours(fabric: Fabric) -> Colours:
@@ -218,54 +219,48 @@ def colours(fabric: Fabric) -> Colours:
     )
 
 
-def descriptor(
-    fabric: Fabric,
-    level: int,
-    found: Tables,
-    kinds: Collection[str],
-) -> Descriptor:
+def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collection[str]) -> Descriptor:
     """Return the content of `soft_nodes.json`, before files are written."""
-    values = {name: getattr(found, name) for name in _FILES}
     return Descriptor(
         fabric=fabric.name,
-        generator=generator(),
         level=level,
-        inputs=INPUTS,
-        outputs=OUTPUTS,
-        conventions=CONVENTIONS,
         colours=colours(fabric),
-        repeat=(int(found.scalars["ends"]), int(found.scalars["picks"])),
+        repeat=(int(tables.scalars["ends"]), int(tables.scalars["picks"])),
         limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
         kinds=sorted(kinds),
-        scalars=found.scalars,
-        back_scalars=found.back_scalars,
+        scalars=tables.scalars,
+        back_scalars=tables.back_scalars,
         buffers={
             name: Buffer(
                 files=files,
                 channels=_CHANNELS[name],
-                elements=values[name].size // _CHANNELS[name],
-                arrays={
-                    key: Place(offset=array.offset, shape=array.shape, meaning=array.meaning)
-                    for key, array in found.places.get(name, {}).items()
-                },
+                elements=getattr(tables, name).size // _CHANNELS[name],
+                arrays=tables.places.get(name, {}),
             )
             for name, files in _FILES.items()
         },
     )
 
 
-def vectors(found: Golden) -> Vectors:
-    """Return the content of `golden.json`."""
-    whole = found.answers.shape[1] == ANSWERS
-    return Vectors(
-        queries=_short(found.rows),
-        groups=found.groups,
-        components=_short(found.answers[:, :4]),
-        bounds=_short(found.answers[:, 4:8]),
-        transparency=_short(found.answers[:, TRANSPARENCY]) if whole else [],
-        density=_short(found.answers[:, DENSITY]) if whole else [],
-        steady=found.steady,
-    )
+def vectors(golden: Golden) -> dict[str, Any]:
+    """Return the content of `golden.json`.
+
+    `columns` names those of `queries`; `groups` has first row and end of each kind, and the range of a column is that
+    of its group. `components` and `bounds` are the answers; `transparency`, and `density` of wi in 1/sr, are empty for
+    a model without them. `steady` is the share of the queries tried whose answer does not hang on the last digit of a
+    place; the others are not listed.
+    """
+    whole = golden.answers.shape[1] == ANSWERS
+    return {
+        "columns": QUERY_COLUMNS,
+        "queries": _short(golden.rows),
+        "groups": golden.groups,
+        "components": _short(golden.answers[:, :4]),
+        "bounds": _short(golden.answers[:, 4:8]),
+        "transparency": _short(golden.answers[:, TRANSPARENCY]) if whole else [],
+        "density": _short(golden.answers[:, DENSITY]) if whole else [],
+        "steady": golden.steady,
+    }
 
 
 def _short(values: Float32) -> list[Any]:
@@ -274,3 +269,23 @@ def _short(values: Float32) -> list[Any]:
     numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
     found: list[Any] = np.array(numbers).reshape(values.shape).tolist()
     return found
+
+
+def trained_ranges(domain: Domain | None) -> dict[str, tuple[float, float]]:
+    """Return the ranges of footprints, directions and yarns that a model was trained on."""
+    if domain is None:
+        return {}
+    queries = domain.queries
+    of_queries = {"footprint, yarn spacings": queries.sigma, "angle to the normal, degrees": (0.0, queries.max_angle)}
+    return of_queries | domain.yarns
+
+
+def why_outside(domain: Domain | None, fabric: Fabric) -> str:
+    """Return which yarn of a fabric lies outside the training, such as ``optical_thickness = 0.8``; empty if none."""
+    if domain is None:
+        return ""
+    try:
+        domain.refuse_fabric(fabric, "")
+    except BadInput as error:
+        return f"{error.key} = {error.value}"
+    return ""

@@ -1,18 +1,22 @@
-"""The folder that `twillight export --shader` writes: source, tables, descriptor and golden vectors."""
+"""A folder with a model of a fabric for renderers: source, tables, descriptor and golden vectors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final
 
 from pipeline.folders import own_files
+from pipeline.models.neumip.model import Neumip
+from pipeline.models.registry import covering_model
 from pipeline.models.runtimes import no_onnx
-from pipeline.shader.descriptor import GOLDEN, vectors
+from pipeline.models.selvage.model import Selvage
+from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, ONNX, SOURCE, compiler_for, made, refuse_unknown, translate
-from pipeline.shader.models import shader_of
-from pipeline.shader.shader import Shader
-from pipeline.shader.sides import wanted_kinds
+from pipeline.shader.networks import NEUMIP, SELVAGE, neumip_shader, selvage_shader
+from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
+from pipeline.shader.tables import wanted_kinds
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -22,13 +26,13 @@ ENTRIES: Final = ("evaluate.slang", "draw.slang")
 _HOME = Path(__file__).parent
 
 
-def export_shader(
+def write_shader(
     fabric: Fabric,
     folder: Path,
-    level: int | None,
-    languages: Sequence[str],
-    kinds: Sequence[str] = (),
     model: str | None = None,
+    level: int | None = None,
+    language: Sequence[str] = (),
+    kind: Sequence[str] = (),
 ) -> str:
     """Write a model of a fabric for renderers, whole or not at all, and return a sentence on the folder.
 
@@ -38,14 +42,14 @@ def export_shader(
         The cloth.
     folder : Path
         Folder to write; an earlier export of the same model is replaced (`pipeline.folders`).
-    level : int, optional
-        Level of detail k of the soft nodes, one of DETAILS.
-    languages : sequence of str
-        Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
-    kinds : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of KINDS, or EVERY.
     model : str, optional
         The model (`shader_of`); the soft nodes if left out.
+    level : int, optional
+        Level of detail k of the soft nodes, one of DETAILS.
+    language : sequence of str
+        Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
+    kind : sequence of str
+        Kinds of queries beside light and viewer in front of flat cloth: of KINDS, or EVERY.
 
     Raises
     ------
@@ -55,12 +59,12 @@ def export_shader(
     WorkFailed
         If slangc refuses the source.
     """
-    refuse_unknown(languages)
-    known = wanted_kinds(kinds)
-    wanted = made(languages)
+    refuse_unknown(language)
+    known = wanted_kinds(kind)
+    wanted = made(language)
     compiler = compiler_for(wanted) if wanted else None
     shader = shader_of(model, fabric, level, known)
-    onnx = _onnx(shader, languages)
+    onnx = _onnx(shader, language)
     listing = f"{shader.name}.json"
     entries = ("evaluate", "draw", *(("scatter",) if shader.sampled else ()))
     with own_files(folder, listing) as here:
@@ -74,11 +78,11 @@ def export_shader(
             (here / name).write_bytes(content)
         if onnx is not None:
             files[ONNX] = [f"{ONNX}/network.onnx"]
-        (here / GOLDEN).write_text(vectors(shader.golden).model_dump_json() + "\n", encoding="utf-8")
-        said = shader.said.model_copy(update={"source": names, "languages": files})
-        (here / listing).write_text(said.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        (here / GOLDEN).write_text(json.dumps(vectors(shader.golden), separators=(",", ":")) + "\n", encoding="utf-8")
+        about = shader.about.model_copy(update={"source": names, "languages": files})
+        (here / listing).write_text(about.model_dump_json(), encoding="utf-8")
         size = sum(path.stat().st_size for path in here.rglob("*") if path.is_file())
-    outside = said.network.outside if said.network else ""
+    outside = about.network.outside if about.network else ""
     warning = f"; {fabric.name} is not like its training: {outside}" if outside else ""
     return f"{folder}: {', '.join((SOURCE, *files, *sorted(known)))}; {shader.size}, {size / 1e3:,.0f} kB{warning}"
 
@@ -88,9 +92,9 @@ def _onnx(shader: Shader, languages: Sequence[str]) -> bytes | None:
     if ONNX not in languages and (ALL not in languages or shader.onnx is None):
         return None
     if shader.onnx is None:
-        raise BadInput("export", "--language", ONNX, f"{shader.name} has no network; choose another --model")
+        raise BadInput("export", "language", ONNX, f"{shader.name} has no network; choose another model")
     if missing := no_onnx():
-        raise BadInput("export", "--language", ONNX, missing)
+        raise BadInput("export", "language", ONNX, missing)
     return shader.onnx()
 
 
@@ -106,3 +110,35 @@ def _write_source(shader: Shader, folder: Path) -> list[str]:
     for file, text in texts.items():
         (folder / file).write_text(text, encoding="utf-8")
     return [f"{SOURCE}/{file}" for file in texts]
+
+
+def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
+    """Return a model of a fabric, ready to be written.
+
+    Parameters
+    ----------
+    model : str, optional
+        `soft_nodes`, which is meant if it is left out, a model that comes with the package, or the folder of a trained
+        `selvage` or `neumip`.
+    fabric : Fabric
+        The cloth.
+    level : int, optional
+        Level of detail of the soft nodes.
+    kinds : collection of str
+        Of KINDS.
+
+    Raises
+    ------
+    BadInput
+        If there is no such model, its files are damaged or of another version, it was not trained on the fabric, it has
+        no shader, or has no such level or kinds.
+    """
+    if model is None or model == SOFT_NODES:
+        return soft_nodes_shader(fabric, level, kinds)
+    method = covering_model(model, fabric, "export", "model")
+    if isinstance(method, Selvage):
+        return selvage_shader(method, fabric, level, kinds)
+    if isinstance(method, Neumip):
+        return neumip_shader(method, fabric, level, kinds)
+    allowed = f"has no shader; {SOFT_NODES}, {SELVAGE} and the folder of a trained {NEUMIP} have one"
+    raise BadInput("export", "model", model, allowed)

@@ -22,12 +22,12 @@ from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import Table
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.shader.constants import POINTS, WIDENING
-from pipeline.shader.sides import BEHIND, CURVATURE, Sides
+from pipeline.shader.tables import BEHIND, CURVATURE, Sides
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.colour import LUMINANCE
 
-COLUMNS: Final = (
+QUERY_COLUMNS: Final = (
     "u", "v", "deviation_x", "deviation_y", "correlation", "wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z", "curvature"
 )  # fmt: skip
 """Columns of a query as the shader takes it."""
@@ -81,7 +81,7 @@ class Golden(NamedTuple):
     Attributes
     ----------
     rows : float32 (N, 12)
-        COLUMNS.
+        QUERY_COLUMNS.
     answers : float32 (N, ANSWERS) or (N, 8)
         Components; bounds; of models that know them transparency, and density of wi in the mixture of the lobes, 1/sr.
     groups : dict

@@ -59,7 +59,7 @@ LANGUAGES: Final = {
     "metal": Language("metal", _rows("metal")),
     "wgsl": Language("wgsl", _rows("wgsl")),
 }
-"""Languages that slangc makes, by the name of --language."""
+"""Languages that slangc makes, by name."""
 
 _ES: Final = (
     (
@@ -79,7 +79,7 @@ def refuse_unknown(languages: Sequence[str]) -> None:
     for name in languages:
         if name not in (ALL, SOURCE, ONNX, *LANGUAGES):
             allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ONNX, ALL))}"
-            raise BadInput("export", "--language", one_line(name, 40), allowed)
+            raise BadInput("export", "language", one_line(name, 40), allowed)
 
 
 def made(languages: Sequence[str]) -> list[str]:
@@ -102,8 +102,8 @@ def compiler_for(languages: Sequence[str]) -> Path:
     """Return slangc; BadInput, naming the languages that need it, if it is not there."""
     found = slangc()
     if found is None:
-        allowed = f"slangc is needed: pip install --no-deps slangtorch; --language {SOURCE} is written without it"
-        raise BadInput("export", "--language", ", ".join(languages), allowed)
+        allowed = f"slangc is needed: pip install --no-deps slangtorch; {SOURCE} is written without it"
+        raise BadInput("export", "language", ", ".join(languages), allowed)
     return found
 
 

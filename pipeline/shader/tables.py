@@ -12,35 +12,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import io
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from pipeline.analytic.importance.lobes import point_places
 from pipeline.analytic.soft_nodes import footprint_nodes
 from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
 from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table, tabulate
 from pipeline.analytic.soft_nodes.waves import TOGETHER
 from pipeline.compiled.arrays import Float32
+from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants
 from pipeline.shader.limits import MOST_CELLS, MOST_HEIGHT, MOST_NODES
-from pipeline.shader.sides import Sides
-from weaves.errors import BadInput
+from weaves.errors import BadInput, one_line
+from weaves.fabric import Fabric
+
+BEHIND: Final = "behind"
+CURVATURE: Final = "curvature"
+KINDS: Final = (BEHIND, CURVATURE)
+"""Kinds of queries beside light and viewer in front of flat cloth, as `pipeline.models` names them."""
+
+EVERY: Final = "all"
+"""All kinds."""
 
 
-class Array(NamedTuple):
-    """An array in a buffer: its first element there, its shape, and what it holds."""
+class Sides(NamedTuple):
+    """Tables of both sides of a cloth, by the kinds of queries that a shader is to answer.
+
+    Attributes
+    ----------
+    front : Table
+        Its front, with what light from behind and curved cloth need if these are wanted.
+    back : Table or None
+        Its back, if viewers behind it are wanted.
+    colours : float32 (6, 3)
+        k_s, k_d and k_dt, each of warp and weft, linear RGB.
+    """
+
+    front: Table
+    back: Table | None
+    colours: Float32
+
+
+@dataclass(frozen=True)
+class Place:
+    """An array in a buffer: its first element there, its shape (row-major), and what it holds."""
 
     offset: int
     shape: tuple[int, ...]
     meaning: str
 
 
-class Tables(NamedTuple):
-    """A cloth for a shader.
+class ClothTables(NamedTuple):
+    """Buffers of a cloth.
 
     Attributes
     ----------
@@ -61,7 +92,7 @@ class Tables(NamedTuple):
     grid: npt.NDArray[np.uint8]
     scalars: dict[str, int | float]
     back_scalars: dict[str, int | float]
-    places: dict[str, dict[str, Array]]
+    places: dict[str, dict[str, Place]]
 
 
 _MEANINGS: Final = {
@@ -86,16 +117,35 @@ _MEANINGS: Final = {
 }
 
 
-def refuse_large(ends: int, picks: int) -> None:
-    """Refuse a repeat of more than MOST_CELLS cells."""
+def wanted_kinds(names: Collection[str]) -> frozenset[str]:
+    """Return the kinds that names choose; BadInput if one is none."""
+    for name in names:
+        if name not in (*KINDS, EVERY):
+            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join((*KINDS, EVERY))}")
+    return frozenset(KINDS if EVERY in names else names)
+
+
+def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
+    """Return the tables of a fabric at a level of detail, for KINDS of queries."""
+    behind, curved = BEHIND in kinds, CURVATURE in kinds
+    reflected, transmitted = colours(fabric), colours(fabric, transmitted=True)
+    return Sides(
+        tabulate(fabric, behind=behind, level=level, curved=curved),
+        tabulate(fabric.back(), behind=True, level=level) if behind else None,
+        np.concatenate([reflected, transmitted[2:]]).astype(np.float32),
+    )
+
+
+def refuse_large_repeat(fabric: Fabric) -> None:
+    """Refuse a repeat of more than MOST_CELLS cells, before it is tabulated."""
+    picks, ends = fabric.weave.warp_over.shape
     if ends * picks > MOST_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"
-        raise BadInput("export", "--shader", f"{ends} ends × {picks} picks", allowed)
+        raise BadInput("export", "shader", f"{ends} ends × {picks} picks", allowed)
 
 
-def tables(sides: Sides) -> Tables:
+def tables(sides: Sides) -> ClothTables:
     """Return the buffers of a cloth without threads of their own; BadInput above MOST_NODES or MOST_HEIGHT."""
-    refuse_large(*(int(n) for n in sides.front.repeat))
     found = [_side(table) for table in (sides.front, sides.back) if table is not None]
     _refuse_large_tables(found)
     shared = {"colours": sides.colours, "point_places": point_places(POINTS)}
@@ -109,7 +159,7 @@ def tables(sides: Sides) -> Tables:
         offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
         heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
-    return Tables(
+    return ClothTables(
         integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
         numbers.filled([value for head in heads for value in head.values() if isinstance(value, float)], np.float32),
         np.ascontiguousarray(np.concatenate([side.rows.reshape(-1, 4) for side in found]), np.float32),
@@ -128,7 +178,7 @@ class _Buffer:
     """A buffer that begins with scalars; arrays are added after them."""
 
     def __init__(self, scalars: int) -> None:
-        self.places: dict[str, Array] = {}
+        self.places: dict[str, Place] = {}
         self._stop, self._values = scalars, [np.zeros(0)]
 
     def add(self, arrays: dict[str, npt.NDArray[Any]], prefix: str = "") -> dict[str, int]:
@@ -136,7 +186,7 @@ class _Buffer:
         found = {}
         for name, values in arrays.items():
             meaning = f"of the back: {_MEANINGS[name]}" if prefix else _MEANINGS[name]
-            self.places[prefix + name] = Array(self._stop, values.shape, meaning)
+            self.places[prefix + name] = Place(self._stop, values.shape, meaning)
             found[name], self._stop = self._stop, self._stop + values.size
             self._values.append(values.ravel())
         return found
@@ -216,12 +266,12 @@ def _refuse_large_tables(found: Sequence[_Side]) -> None:
     """Refuse tables above MOST_NODES or MOST_HEIGHT."""
     count = max(len(side.rows) for side in found)
     if count > MOST_NODES:
-        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower --level"
-        raise BadInput("export", "--shader", f"{count:,} nodes", allowed)
+        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
+        raise BadInput("export", "shader", f"{count:,} nodes", allowed)
     size = sum(len(side.grid) for side in found)
     if size > TEXTURE_WIDTH * MOST_HEIGHT:
         allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
-        raise BadInput("export", "--shader", f"{size:,} horizons", allowed)
+        raise BadInput("export", "shader", f"{size:,} horizons", allowed)
 
 
 def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> str:
@@ -238,7 +288,7 @@ def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> st
     return "\n".join([*lines, ""])
 
 
-def layout_slang(found: Tables) -> str:
+def layout_slang(found: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
     lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
     kinds = {name: "int" if isinstance(value, int) else "float" for name, value in found.scalars.items()}
@@ -304,3 +354,22 @@ def _rules() -> tuple[Float32, Float32, Float32]:
     count = footprint_nodes.HERMITE
     hermite = np.stack([own["_HERMITE_PLACES"][:count], own["_HERMITE_WEIGHTS"][:count]])
     return own["_GAUSS_PLACES"], own["_GAUSS_WEIGHTS"], hermite
+
+
+def table_files(found: ClothTables) -> dict[str, bytes]:
+    """Return the files of the four buffers, by their paths."""
+    rows = np.pad(found.grid, (0, -found.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
+    return {
+        "tables/integers.i32": found.integers.astype("<i4").tobytes(),
+        "tables/numbers.f32": found.numbers.astype("<f4").tobytes(),
+        "tables/nodes.f32": found.nodes.astype("<f4").tobytes(),
+        "tables/nodes.f16": found.nodes.astype("<f2").tobytes(),
+        "tables/grid.png": _png(rows),
+    }
+
+
+def _png(rows: npt.NDArray[np.uint8]) -> bytes:
+    """Return rows of bytes as a picture; the lowest row of the texture comes first."""
+    buffer = io.BytesIO()
+    Image.fromarray(rows).save(buffer, format="PNG", compress_level=4)
+    return buffer.getvalue()

@@ -37,7 +37,7 @@ SPHERE_RADIUS: Final = 60.0
 _SHADOW = 0.01  # a ray to the light starts so far above the cloth
 
 
-class Camera(NamedTuple):
+class Viewpoint(NamedTuple):
     """Viewer and light; angles in degrees, and a turn of 0 comes from -y.
 
     Attributes
@@ -110,7 +110,7 @@ def arcs() -> Floats:
     return np.stack([x - x[middle], radii, 1.0 - 2.0 * (np.arange(len(radii)) % 2), along - along[middle]], axis=-1)
 
 
-def seen(camera: Camera, size: int, ends: int) -> Seen:
+def seen(camera: Viewpoint, size: int, ends: int) -> Seen:
     """Return the pixels of a square picture of `size` pixels with lit cloth; `ends` are those of the repeat."""
     toward = direction(camera.turn, camera.tilt)
     turn = math.radians(camera.turn)
@@ -146,7 +146,7 @@ def seen(camera: Camera, size: int, ends: int) -> Seen:
     return Seen(cloth.reshape(size, size), lit.reshape(size, size), queries)
 
 
-def _middle(camera: Camera, toward: Floats, radius: float) -> Floats:
+def _middle(camera: Viewpoint, toward: Floats, radius: float) -> Floats:
     """Return the point in the middle of the picture."""
     if camera.shape == "plane":
         return np.array([*camera.target, 0.0])

@@ -1,26 +1,96 @@
-"""The page that `twillight view` writes: one file that works from a disk, without a network."""
+"""A page that draws a fabric live: one file that works from a disk, without a network.
+
+It holds tables of several shapes and levels, views with their tiles, and a still picture.
+
+Buffers are compressed by gzip and written in base64. A table is of one shape of the yarns, a factor of their bend and
+one of their width: the own shape has every level that the shader takes, the others have the usual one.
+"""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import html
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, Table, tabulate
 from pipeline.atomic import atomic_write
-from pipeline.shader.limits import MOST_CELLS
+from pipeline.models.method import Method
+from pipeline.models.named import TRUTH, named_method
+from pipeline.scenes.shade import colours
+from pipeline.shader.constants import TEXTURE_WIDTH
+from pipeline.shader.limits import MOST_CELLS, MOST_NODES
+from pipeline.shader.networks import correction
+from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
+from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
+from pipeline.truth.options import TruthOptions
+from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
-from reports.viewer.content import content
-from reports.viewer.generate import SHADERS
+from reports.viewer.generate import network, shipped
+from reports.viewer.shapes import (
+    HALF_ARC,
+    HALF_HEIGHT,
+    SPREAD,
+    Seen,
+    Viewpoint,
+    arcs,
+    seen,
+    sphere_radius,
+)
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+from weaves.yarn import Yarn
 
 SCRIPTS: Final = ("tables.js", "picture.js", "controls.js")
 
 _HOME = Path(__file__).parent
 
+VIEWS: Final = {
+    "One yarn": Viewpoint("plane", 20.0, 60.0, 9.0, -50.0, 40.0, (2.0, 2.0)),
+    "Cloth": Viewpoint("plane", 20.0, 45.0, 70.0, -50.0, 40.0, (2.0, 2.0)),
+    "Horizon": Viewpoint("plane", 10.0, 7.0, 150.0, -50.0, 40.0, (2.0, 2.0)),
+    "Sphere": Viewpoint("sphere", 15.0, 20.0, 215.0, -35.0, 45.0),
+    "Drape": Viewpoint("drape", -20.0, 10.0, 560.0, -40.0, 40.0),
+}
+"""Views of the page, each with a picture of the truth."""
 
-def write_page(fabric: Fabric, path: Path, truth: int) -> str:
+TILES: Final = ("map_material",)
+"""Methods that the page has as pictures at its views, beside the truth."""
+
+STILL: Final = "Drape"
+"""View of the still picture, for a browser without WebGL 2."""
+
+STILL_SIZE: Final = 384
+
+BENDS: Final = (0.6, 1.0, 1.4)
+"""Factors of the bends of both yarns."""
+
+WIDTHS: Final = (0.8, 1.0, 1.25)
+NARROWER: Final = (0.65, 0.8, 1.0)
+"""Factors of the widths of both yarns: the second ones if yarns would overlap."""
+
+STEEPEST: Final = 85.0
+"""Largest bend of a yarn, degrees."""
+
+TWISTED: Final = 30.0
+"""Twist of the nodes of yarns without twist, in degrees: the page turns all nodes to the twist that it shows, and finds
+their extent across the yarn from how their fibres turn, which they do not without twist."""
+
+_PRECISION = TruthOptions(relative_error=0.01)
+_BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
+
+
+def write_page(fabric: Fabric, path: Path, truth: int = 160) -> str:
     """Write the viewer of a fabric, whole or not at all, and return a sentence on it.
 
     Parameters
@@ -28,39 +98,37 @@ def write_page(fabric: Fabric, path: Path, truth: int) -> str:
     fabric : Fabric
         The cloth.
     path : Path
-        File to write, ending in ``.html``; its folder is made.
+        File to write; its folder is made.
     truth : int
         Pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to MOST_TILE; 0: none.
 
     Raises
     ------
     BadInput
-        If the path or the number cannot be used, or the repeat is too large for the shader.
+        If the number cannot be used, or the repeat is too large for the shader.
     """
-    if path.suffix != ".html":
-        raise BadInput("view", "--out", str(path), "a path that ends in .html is needed")
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
-        raise BadInput("view", "--truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
+        raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
     picks, ends = fabric.weave.warp_over.shape
     if ends * picks > MOST_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"
-        raise BadInput("view", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
-    found = content(fabric, truth)
-    page = whole_page(found)
+        raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
+    shown = content(fabric, truth)
+    page = whole_page(shown)
     atomic_write(path, page.encode())
-    return f"{path}: {len(found['tables'])} tables, {len(found['views'])} views, {len(page) / 1e6:.1f} MB"
+    return f"{path}: {len(shown['tables'])} tables, {len(shown['views'])} views, {len(page) / 1e6:.1f} MB"
 
 
-def whole_page(found: dict[str, object]) -> str:
+def whole_page(shown: dict[str, object]) -> str:
     """Return the page of a content."""
     parts = {
-        "FABRIC": html.escape(str(found["fabric"]).replace("_", " ")),
-        "STILL": str(found["still"]),
+        "FABRIC": html.escape(str(shown["fabric"]).replace("_", " ")),
+        "STILL": str(shown["still"]),
         "STYLE": _text("page.css"),
-        "SHADER": SHADERS["cloth"].read_text(encoding="utf-8"),
-        "SELVAGE": SHADERS["selvage"].read_text(encoding="utf-8"),
+        "SHADER": shipped("cloth"),
+        "SELVAGE": shipped("selvage"),
         # No content can end the element.
-        "CONTENT": json.dumps({key: value for key, value in found.items() if key != "still"}).replace("<", "\\u003c"),
+        "CONTENT": json.dumps({key: value for key, value in shown.items() if key != "still"}).replace("<", "\\u003c"),
         "SCRIPT": "\n".join(_text(name) for name in SCRIPTS),
     }
     page = _text("page.html")
@@ -71,3 +139,181 @@ def whole_page(found: dict[str, object]) -> str:
 
 def _text(name: str) -> str:
     return (_HOME / name).read_text(encoding="utf-8")
+
+
+def content(fabric: Fabric, truth: int) -> dict[str, Any]:
+    """Return what the page shows of a fabric, ready for JSON.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth; its repeat is not too large for the shader.
+    truth : int
+        Pixels along each side of tiles, which are pictures of the truth and of TILES; 0: there are none.
+    """
+    ends = fabric.weave.repeat[0]
+    factors = bends(fabric), widths(fabric)
+    found: list[dict[str, Any]] = []
+    grids: list[str] = []
+    for bend in factors[0]:
+        for width in factors[1]:
+            shape = bent(fabric, bend, width)
+            levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
+            of_shape = [(level, _nodes(shape, level)) for level in levels]
+            # All levels of a shape have the same grid.
+            about = {"bend": bend, "width": width, "grid": len(grids)}
+            grids.append(packed(of_shape[0][1].front.grid.ravel()))
+            kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
+            found += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+    still, irradiance = _still(fabric)
+    methods = _methods(fabric) if truth else {}
+    return {
+        "fabric": fabric.name,
+        "texture_width": TEXTURE_WIDTH,
+        "colours": colours(fabric).tolist(),
+        "warp": _yarn(fabric.warp),
+        "weft": _yarn(fabric.weft),
+        "thickness": fabric.optical_thickness,
+        "bends": factors[0],
+        "widths": factors[1],
+        "columns": {"sin": SIN_TWIST, "cos": COS_TWIST, "roughness": ALPHA, "relief": BETA, "blend": BLEND},
+        "gap": GAP,
+        "tables": found,
+        "selvage": _selvage(fabric, found),
+        "grids": grids,
+        "tiles": [*methods, TRUTH] if truth else [],
+        "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
+        "shapes": {
+            "spread": SPREAD,
+            "radius": sphere_radius(ends),
+            "half_arc": HALF_ARC,
+            "half_height": HALF_HEIGHT,
+            "arcs": arcs().tolist(),
+        },
+        "irradiance": irradiance,
+        "still": f"data:image/png;base64,{base64.b64encode(still).decode()}",
+    }
+
+
+def bends(fabric: Fabric) -> tuple[float, ...]:
+    """Return the factors of the bends: 1 alone if the yarns are flat."""
+    steepest = max(fabric.warp.bend, fabric.weft.bend)
+    return tuple(factor for factor in BENDS if factor <= 1.0 or steepest * factor <= STEEPEST) if steepest else (1.0,)
+
+
+def widths(fabric: Fabric) -> tuple[float, ...]:
+    """Return the factors of the widths."""
+    return WIDTHS if max(fabric.warp.width, fabric.weft.width) * max(WIDTHS) <= 1.0 else NARROWER
+
+
+def bent(fabric: Fabric, bend: float, width: float) -> Fabric:
+    """Return a fabric whose bends and widths are multiplied by factors."""
+    yarns = {
+        name: yarn.model_copy(update={"bend": yarn.bend * bend, "width": yarn.width * width})
+        for name, yarn in (("warp", fabric.warp), ("weft", fabric.weft))
+    }
+    return fabric.model_copy(update=yarns)
+
+
+def packed(values: npt.NDArray[Any]) -> str:
+    """Return an array, little-endian, as gzip in base64."""
+    return base64.b64encode(gzip.compress(values.astype(values.dtype.newbyteorder("<")).tobytes(), mtime=0)).decode()
+
+
+def _nodes(fabric: Fabric, level: int) -> Sides:
+    """Return the front of a fabric, of yarns without twist as if they had TWISTED."""
+    yarns = {"warp": fabric.warp, "weft": fabric.weft}
+    turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
+    return tabulate_sides(fabric.model_copy(update=turned), level, ())
+
+
+def _twist(yarn: Yarn) -> float:
+    """Return the twist with which the nodes of a yarn are tabulated."""
+    return yarn.twist if abs(yarn.twist) >= 1.0 else TWISTED
+
+
+def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any]:
+    """Return a table for the page."""
+    found, table = tables(sides), sides.front
+    return about | {
+        "bends": (fabric.warp.bend, fabric.weft.bend),
+        "widths": (fabric.warp.width, fabric.weft.width),
+        "twists": (_twist(fabric.warp), _twist(fabric.weft)),
+        "count": int(table.evenly.size),
+        "stride": found.scalars["stride"],
+        "yarn": found.places["numbers"]["yarn"].offset,
+        "yarn_columns": found.places["numbers"]["yarn"].shape[1],
+        "thickness": [*(name for name, value in found.scalars.items() if isinstance(value, float))].index("thickness"),
+        "integers": packed(found.integers),
+        "numbers": packed(found.numbers),
+        "nodes": packed(found.nodes),
+        "families": packed(_families(table, found)),
+    }
+
+
+def _families(table: Table, found: ClothTables) -> npt.NDArray[np.uint8]:
+    """Return the family of every node; those that fill up blocks count as gaps."""
+    families = np.full(table.evenly.size, GAP, np.uint8)
+    for group in table.groups.astype(np.int64):
+        families[group[START] : group[START] + COLUMNS * group[LINES]] = group[GROUP_FAMILY]
+    return families
+
+
+def _yarn(yarn: Yarn) -> dict[str, float]:
+    return {"roughness": yarn.roughness, "twist": yarn.twist, "blend": yarn.blend}
+
+
+def _selvage(fabric: Fabric, found: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """Return the weights of the network for the fabric; None if the page lacks the table that it corrects."""
+    method = network()
+    level = method.options.level
+    if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in found):
+        return None
+    return {"level": level, "weights": packed(correction(method, fabric)[0].values)}
+
+
+def _methods(fabric: Fabric) -> dict[str, Method]:
+    """Return TILES without those that cannot answer for the fabric, such as maps too small for its repeat."""
+    found: dict[str, Method] = {}
+    for name in TILES:
+        method = named_method(name, "view", "")
+        try:
+            method.prepare(fabric)
+        except BadInput:
+            continue
+        found[name] = method
+    return found
+
+
+def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict[str, Method]) -> dict[str, Any]:
+    """Return a view with its tiles: components as half floats, -1 where there is no cloth, row 0 the lowest."""
+    found: dict[str, Any] = {"name": name, **camera._asdict(), "size": size}
+    if size:
+        ends = fabric.weave.repeat[0]
+        picture = seen(camera, size, ends)
+        answers = estimate(fabric, picture.queries, _PRECISION, 0)
+        shown = colours(fabric)
+        deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
+        tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
+        tiles[TRUTH] = answers.mean
+        found["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
+        found["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
+    return found
+
+
+def _components(picture: Seen, values: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+    """Return components in their pixels, (H, W, 4): 0 where nothing lights the cloth, -1 where there is none."""
+    whole = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
+    whole[picture.lit] = values
+    return whole
+
+
+def _still(fabric: Fabric) -> tuple[bytes, float]:
+    """Return a picture by soft nodes as PNG, and the irradiance at which it is neither dark nor glaring."""
+    picture = seen(VIEWS[STILL], STILL_SIZE, fabric.weave.repeat[0])
+    values = read_queries(tabulate(fabric), picture.queries).components @ colours(fabric)
+    irradiance = float(_BRIGHT / max(np.percentile(values.max(axis=1), 97.0), 1e-6))
+    pixels = np.zeros((*picture.cloth.shape, 4))
+    pixels[picture.cloth, 3] = 1.0
+    pixels[picture.lit, :3] = np.minimum(irradiance * values, 1.0)
+    return png_bytes(pixels, "colour"), irradiance

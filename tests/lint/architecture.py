@@ -11,7 +11,7 @@ from tests.lint.tree import DOORS, GRAPH, MODULES, PACKAGES, ROOT, TESTS, Source
 # Imports point to the left (upwards in this list) only.
 ORDER = [
     "weaves",
-    "pipeline",  # fingerprint, atomic
+    "pipeline",  # fingerprint, atomic, folders
     "pipeline.compiled",
     "pipeline.truth",
     "pipeline.analytic",
@@ -25,6 +25,7 @@ ORDER = [
     "reports",  # record, options
     "reports.images",
     "reports.viewer",
+    "reports.exports",
     "reports.measure",
     "reports.truth",
     "reports.tables",
@@ -63,9 +64,9 @@ HOMES = {
     "dask": ["jobs"],
     "cyclopts": ["jobs"],
     "rich": ["jobs"],
-    "trimesh": ["jobs"],
-    "MaterialX": ["jobs"],
-    "pygltflib": ["jobs"],
+    "trimesh": ["reports.exports"],
+    "MaterialX": ["reports.exports"],
+    "pygltflib": ["reports.exports"],
     "mitsuba": ["pipeline.scenes", "pipeline.mitsuba"],
     "drjit": ["pipeline.scenes", "pipeline.mitsuba"],
 }

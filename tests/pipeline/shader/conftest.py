@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline.shader.export_shader import export_shader
+from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
 from weaves.fabric import load_fabric
 
@@ -38,7 +38,7 @@ def exported(tmp_path_factory):
     @cache
     def export(name, level=2, *languages, kinds=(), model=None):
         folder = home / "-".join((name, str(level), *languages, *kinds, Path(model or "soft_nodes").name))
-        export_shader(load_fabric(name), folder, None if model else level, languages, kinds, model)
+        write_shader(load_fabric(name), folder, model, None if model else level, languages, kinds)
         return folder
 
     return export

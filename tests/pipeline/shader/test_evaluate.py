@@ -8,7 +8,7 @@ import pytest
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shader.golden import GROUPS, read_sides, rows_of
-from pipeline.shader.sides import KINDS, tabulate_sides
+from pipeline.shader.tables import KINDS, tabulate_sides
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 

@@ -10,7 +10,7 @@ from scipy import stats
 from pipeline.analytic.importance.lobes import STRAIGHT, Lobes
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.shader.golden import lobes_of
-from pipeline.shader.sides import BEHIND, tabulate_sides
+from pipeline.shader.tables import BEHIND, tabulate_sides
 from pipeline.truth.query import Queries
 from tests.pipeline.shader.test_evaluate import EVERY
 from weaves.fabric import load_fabric

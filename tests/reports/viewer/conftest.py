@@ -10,9 +10,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from reports.viewer import content as module
-from reports.viewer.content import content
-from reports.viewer.view import whole_page
+from reports.viewer import view as module
+from reports.viewer.view import content, whole_page
 from weaves.fabric import load_fabric
 
 FABRIC = "gingham"

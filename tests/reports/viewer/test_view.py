@@ -10,9 +10,8 @@ import pytest
 
 from pipeline.shader.languages import slangc
 from reports.viewer import view
-from reports.viewer.content import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, widths
-from reports.viewer.generate import SHADERS, mark, shader, sources
-from reports.viewer.view import whole_page
+from reports.viewer.generate import SHADERS, mark, shader, shipped, sources
+from reports.viewer.view import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
 from tests.reports.viewer.conftest import opened, write
 from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
 from weaves.fabric import load_fabric, preset_names
@@ -22,14 +21,14 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.mark.parametrize("name", SHADERS)
 def test_the_shaders_are_made_of_their_source(name):
-    assert mark(sources()) in SHADERS[name].read_text(encoding="utf-8"), "run `make viewer-shader`"
+    assert mark(sources()) in shipped(name), "run `make viewer-shader`"
 
 
 @pytest.mark.parametrize("name", SHADERS)
 def test_slangc_makes_the_shaders_again(name):
     if slangc() is None:
         pytest.skip("slangc is not installed")
-    assert shader(name, sources()) == SHADERS[name].read_text(encoding="utf-8"), "run `make viewer-shader`"
+    assert shader(name, sources()) == shipped(name), "run `make viewer-shader`"
 
 
 def test_an_installed_package_has_all_files_of_the_page():

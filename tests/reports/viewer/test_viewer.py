@@ -9,8 +9,8 @@ from pipeline.models.named import named_method, own_method
 from pipeline.scenes.shade import colours
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.viewer.content import TILES, VIEWS, bent
 from reports.viewer.shapes import seen
+from reports.viewer.view import TILES, VIEWS, bent
 from tests.reports.viewer.conftest import FABRIC, SIZE, opened
 from weaves.fabric import load_fabric
 

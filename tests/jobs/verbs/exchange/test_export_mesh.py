@@ -78,7 +78,7 @@ def _srgb(linear):
         (["denim", "--mesh", "a.ply", "--vertices", "1"], "--vertices = 1: must be at least 2"),
         (["denim", "--mesh", "a.ply", "--repeats", "0"], "--repeats = 0: must be at least 1"),
         (["denim", "--mesh", "a.ply", "--vertices", "many"], "many"),
-        (["denim", "--mesh", "a.ply", "--vertices", "9999"], "with fewer --vertices or --repeats"),
+        (["denim", "--mesh", "a.ply", "--vertices", "9999"], "with fewer vertices or repeats"),
         (["denim", "--mesh", "file/a.ply"], "a folder that can be written is needed"),
         (["denim"], "nothing: one of --mesh, --wif, --maps and --shader is needed"),
         (

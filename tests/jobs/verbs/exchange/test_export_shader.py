@@ -30,9 +30,9 @@ def test_the_source_needs_no_compiler(twillight, monkeypatch, tmp_path):
         (("--shader", "x", "--language", "basic"), "must be one of slang, cpp, cuda, glsl"),
         (("--shader", "x", "--kind", "wet"), "must be one of behind, curvature, all"),
         (("--shader", "x", "--level", "3"), "must be one of 1, 2, 4, 8"),
-        (("--wif", "x.wif", "--level", "2"), "is not for --wif"),
-        (("--mesh", "x.ply", "--language", "cpp"), "is not for --mesh"),
-        (("--maps", "x", "--kind", "all"), "is not for --maps"),
+        (("--wif", "x.wif", "--level", "2"), "is not for wif"),
+        (("--mesh", "x.ply", "--language", "cpp"), "is not for mesh"),
+        (("--maps", "x", "--kind", "all"), "is not for maps"),
         (("--mesh", "x.ply", "--shader", "x"), "one of --mesh, --wif, --maps and --shader is needed"),
     ],
 )
@@ -44,7 +44,7 @@ def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, allowed):
 
 def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, tmp_path):
     code, _, complaint = twillight("export", "crepe", "--shader", "x", "--level", "8")
-    assert code == 2 and "1,856 nodes" in complaint and "at most 1,024; choose a lower --level" in complaint
+    assert code == 2 and "1,856 nodes" in complaint and "at most 1,024; choose a lower level" in complaint
     monkeypatch.setattr(tables, "MOST_HEIGHT", 16)
     code, _, complaint = twillight("export", "gingham", "--shader", "x")
     assert code == 2 and "horizons" in complaint
@@ -74,15 +74,14 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, tmp
     assert "trained with level 2" in refused(twillight, CLOTH, *shader, "selvage", "--level", "4")
     assert "has no soft nodes" in refused(twillight, CLOTH, *shader, neumip, "--level", "4")
     assert "soft_nodes has no network" in refused(twillight, CLOTH, "--shader", "x", "--language", "onnx")
-    assert "is not for --mesh" in refused(twillight, CLOTH, "--mesh", "x.ply", "--model", "selvage")
+    assert "is not for mesh" in refused(twillight, CLOTH, "--mesh", "x.ply", "--model", "selvage")
     write_model(tmp_path / "woven", b"", {"options": WovenOptions().model_dump(mode="json"), "version": {"model": 1}})
     refused(twillight, CLOTH, *shader, str(tmp_path / "woven"))
     assert not (tmp_path / "x").exists()
 
 
 def test_other_models_have_no_shader(twillight, monkeypatch):
-    monkeypatch.setattr(verb, "shader_of", verb.shader_of)
-    monkeypatch.setattr("pipeline.shader.models.covering_model", lambda *_: object())
+    monkeypatch.setattr("pipeline.shader.export_shader.covering_model", lambda *_: object())
     assert "has no shader; soft_nodes, selvage and" in refused(twillight, CLOTH, "--shader", "x", "--model", "woven")
 
 

@@ -49,7 +49,7 @@ def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
         (["import", "a.wif", "--out", "a.wif/b.toml"], "a folder that can be written is needed"),
         (["import", "a.wif"], "--out"),
         (["export", "denim", "--wif", "b.txt"], "a path that ends in .wif is needed"),
-        (["export", "denim", "--wif", "b.wif", "--repeats", "2"], "--repeats = 2: is not for --wif; leave it out"),
+        (["export", "denim", "--wif", "b.wif", "--repeats", "2"], "--repeats = 2: is not for wif; leave it out"),
     ],
 )
 def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, said):

@@ -9,7 +9,7 @@ from PIL import Image
 
 from jobs.cli import main
 
-ROOT = Path(__file__).parents[5]
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.mark.slow

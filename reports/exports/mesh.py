@@ -1,4 +1,4 @@
-"""The file that `twillight export --mesh` writes: a cloth's yarns and the walls between them as a binary PLY.
+"""A cloth's yarns and the walls between them as a binary PLY.
 
 Lengths are in yarn spacings: x along the weft, y along the warp, z up. Every vertex has the diffuse colour of its yarn
 as 8-bit sRGB, those of the walls `WALL`.
@@ -23,40 +23,33 @@ MOST_TRIANGLES: Final = 50_000_000
 """More are refused: the file would have a gigabyte, and the work in memory ten."""
 
 
-def write_mesh(fabric: Fabric, path: Path, vertices: int, repeats: int) -> int:
-    """Write a cloth as one PLY file, whole or not at all.
+def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1) -> str:
+    """Write a cloth as one PLY file, whole or not at all, and return a sentence on it.
 
     Parameters
     ----------
     fabric : Fabric
         The cloth.
     path : Path
-        File to write, ending in ``.ply``; its folder is made.
+        File to write; its folder is made.
     vertices : int
         Steps across a yarn, and along it in every cell of the draft, >= 2.
     repeats : int
         Copies of the repeat along x and along y, >= 1.
-
-    Returns
-    -------
-    int
-        Triangles written.
 
     Raises
     ------
     BadInput
         If a number or the path cannot be used, or more than `MOST_TRIANGLES` would be needed.
     """
-    if path.suffix != ".ply":
-        raise BadInput("export", "--mesh", str(path), "a path that ends in .ply is needed")
-    for key, value, least in (("--vertices", vertices, 2), ("--repeats", repeats, 1)):
+    for key, value, least in (("vertices", vertices, 2), ("repeats", repeats, 1)):
         if value < least:
             raise BadInput("export", key, value, f"must be at least {least}")
     # The yarns alone: two triangles a step across and along, in every cell.
     needed = 2 * vertices**2 * fabric.weave.warp_over.size * repeats**2
     if needed > MOST_TRIANGLES:
-        allowed = f"needs {needed:,} triangles; with fewer --vertices or --repeats, at most {MOST_TRIANGLES:,}"
-        raise BadInput("export", "--vertices", vertices, allowed)
+        allowed = f"needs {needed:,} triangles; with fewer vertices or repeats, at most {MOST_TRIANGLES:,}"
+        raise BadInput("export", "vertices", vertices, allowed)
     with atomic_path(path) as temporary:
         meshes = repeat_mesh(fabric, vertices, (repeats, repeats))
         colours = [hex_colour(fabric.warp.diffuse_rgb), hex_colour(fabric.weft.diffuse_rgb), WALL]
@@ -68,4 +61,4 @@ def write_mesh(fabric: Fabric, path: Path, vertices: int, repeats: int) -> int:
             process=False,  # merging or reordering vertices would take the walls' edges from them
         )
         temporary.write_bytes(trimesh.exchange.ply.export_ply(whole, encoding="binary"))
-    return len(whole.faces)
+    return f"{path}: {len(whole.faces):,} triangles; lengths in yarn spacings, z up"

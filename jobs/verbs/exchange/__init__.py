@@ -1,1 +1,0 @@
-"""Verbs that exchange fabrics with other programs: `import`, `export`, and `view`, whose page browsers open."""

@@ -1,0 +1,188 @@
+"""A folder of texture maps with mip levels as EXR and PNG, their size in `maps.json`, and materials made of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.folders import own_files
+from pipeline.materials.layout import Layout, layout
+from pipeline.materials.lobes import SHEEN_ROUGHNESS
+from pipeline.materials.planes import planes, yarn_ids
+from pipeline.materials.reflectance import reflectance
+from pipeline.materials.textures import (
+    Constants,
+    Textures,
+    across_direction,
+    constants,
+    openpbr_roughness,
+    textures,
+)
+from reports.exports.materials import (
+    DOCUMENT,
+    LARGEST_TEXTURE,
+    SAMPLE,
+    spacing_cm,
+    write_openpbr,
+    write_sample,
+    yarns_per_cm,
+)
+from reports.images.texture import Kind, write_texture
+from weaves.errors import BadInput
+from weaves.fabric import Fabric
+
+LISTING: Final = "maps.json"
+
+Plane = npt.NDArray[Any]
+
+
+class Map(NamedTuple):
+    """How a map is stored (`reports.images.texture`), its content, and where it is found in the textures of a level."""
+
+    kind: Kind
+    meaning: str
+    of: Callable[[Textures], Plane]
+
+
+def _rotation(level: Textures) -> Plane:
+    """Return the angle from +U to the direction across the fibres, in turns."""
+    x, y = np.moveaxis(across_direction(level.normal, level.tangent), -1, 0)
+    return np.asarray(np.mod(np.arctan2(y, x) / (2.0 * np.pi), 0.5))
+
+
+def _openpbr(level: Textures) -> tuple[Plane, Plane]:
+    return openpbr_roughness(level.alpha_along, level.alpha_across)
+
+
+_DOWN: Final = np.array([1.0, -1.0, 1.0], np.float32)
+
+MAPS: Final[dict[str, Map]] = {
+    "base_color": Map("colour", "diffuse colour, not multiplied by the opacity", lambda level: level.base_color),
+    "specular_color": Map(
+        "colour", "tint of the specular lobe; F0 is that of `ior` times it", lambda level: level.specular_color
+    ),
+    "transmission_color": Map(
+        "colour", "colour of the light that goes diffusely through", lambda level: level.transmission_color
+    ),
+    "opacity": Map("share", "0 in gaps between yarns, 1 on yarns", lambda level: level.opacity),
+    "height": Map("height", "height in yarn spacings; gaps at the lowest point", lambda level: level.height),
+    "normal_opengl": Map("direction", "normal, green up (OpenGL, +Y)", lambda level: level.normal),
+    "normal_directx": Map("direction", "normal, green down (DirectX, -Y)", lambda level: level.normal * _DOWN),
+    "tangent": Map("direction", "direction of the fibres, green up", lambda level: level.tangent),
+    "anisotropy_rotation": Map(
+        "share", "direction across the fibres: angle from +U towards +V, in turns; do not filter", _rotation
+    ),
+    "roughness_along": Map(
+        "share", "roughness along the fibres, the square root of alpha", lambda level: np.sqrt(level.alpha_along)
+    ),
+    "roughness_across": Map(
+        "share", "roughness across the fibres, the square root of alpha", lambda level: np.sqrt(level.alpha_across)
+    ),
+    "roughness": Map("share", "roughness of OpenPBR; goes with anisotropy", lambda level: _openpbr(level)[0]),
+    "anisotropy": Map("share", "anisotropy of OpenPBR, rougher across", lambda level: _openpbr(level)[1]),
+}
+"""Every map that has mip levels, by its file name; `transmission_color` is left out where nothing goes through."""
+
+YARN_ID: Final[tuple[Kind, str]] = (
+    "number",
+    "0 in gaps, then ends from the left, then picks from below; do not filter",
+)
+"""Kind and meaning of the numbers of the yarns (`pipeline.materials.planes.yarn_ids`); without mip levels."""
+
+
+def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
+    """Write the maps of a fabric, whole or not at all, and return a sentence on them.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    folder : Path
+        Folder to write; maps of before are replaced (`pipeline.folders`).
+    size : int
+        Texels of the longer side.
+
+    Raises
+    ------
+    BadInput
+        If the size, the folder or a missing library allows no maps.
+    """
+    for library in ("MaterialX", "pygltflib"):
+        if find_spec(library) is None:
+            allowed = f"{library} is needed for materials: pip install 'twillight[materials]'"
+            raise BadInput("export", "maps", str(folder), allowed)
+    shown = layout(fabric, size)
+    with own_files(folder, LISTING) as made:
+        count = _write(fabric, shown, made)
+    ends, picks = yarns_per_cm(fabric)
+    assumed = "" if fabric.yarns_per_cm else ", assumed because the fabric has no yarns_per_cm"
+    return (
+        f"{folder}: {count} maps of {shown.width} × {shown.height} texels as EXR and PNG, {SAMPLE} and "
+        f"{DOCUMENT}; a map shows {shown.ends} ends × {shown.picks} picks, {shown.ends / ends:.3g} × "
+        f"{shown.picks / picks:.3g} cm (yarns per cm: {ends:g} × {picks:g}{assumed})"
+    )
+
+
+def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
+    """Write all files, and return the number of maps."""
+    share = reflectance(fabric)
+    material, level = constants(fabric, share), planes(fabric, shown, share)
+    maps = {name: row for name, row in MAPS.items() if name != "transmission_color" or material.transmitted > 0.0}
+    span = (float(level.height.min()), float(level.height.max()))
+    write_texture(folder / "yarn_id", yarn_ids(fabric, shown), YARN_ID[0])
+    levels: list[tuple[int, int]] = []
+    sampled, place = False, folder
+    while True:
+        level_maps = textures(level, material)
+        for name, row in maps.items():
+            write_texture(place / name, row.of(level_maps), row.kind, span)
+        if not sampled and max(level.coverage.shape) <= LARGEST_TEXTURE:
+            write_sample(folder / SAMPLE, fabric, shown, level_maps, material)
+            sampled = True
+        if level.coverage.size == 1:
+            break
+        level = level.halved()
+        height, width = level.coverage.shape
+        levels.append((width, height))
+        (place := folder / "mips" / f"{width}x{height}").mkdir(parents=True)
+    listed = {**{name: (row.kind, row.meaning) for name, row in maps.items()}, "yarn_id": YARN_ID}
+    write_openpbr(folder / DOCUMENT, fabric.name, material)
+    about = _about(fabric, shown, material) | {
+        "height_span": span,
+        "maps": {
+            name: {"meaning": meaning, "kind": kind, "exr": f"{name}.exr", "png": f"{name}.png"}
+            for name, (kind, meaning) in listed.items()
+        },
+        "mip_levels": levels,
+    }
+    (folder / LISTING).write_text(json.dumps(about), encoding="utf-8")
+    return len(listed)
+
+
+def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]:
+    """Return the size of the cloth that a map shows, and the numbers of the material."""
+    ends, picks = yarns_per_cm(fabric)
+    return {
+        "fabric": fabric.name,
+        "generator": f"twillight {version('twillight')}",
+        "yarns": (shown.ends, shown.picks),
+        "texels": (shown.width, shown.height),
+        "yarns_per_cm": (ends, picks),
+        "yarns_per_cm_source": "fabric" if fabric.yarns_per_cm else "default",
+        "size_cm": (shown.ends / ends, shown.picks / picks),
+        "spacing_cm": spacing_cm(fabric),
+        "orientation": "U along the picks, V along the ends; the lower left corner is the first end and pick",
+        "material": {
+            "ior": material.ior,
+            "sheen_color": [round(float(value), 6) for value in material.sheen],
+            "sheen_roughness": SHEEN_ROUGHNESS,
+            "transmitted": material.transmitted,
+        },
+    }
