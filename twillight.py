@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from pipeline.models.method import Method
     from pipeline.models.patch_bsdf import PatchBSDF
     from pipeline.shards.manifest import Role, Split
-    from pipeline.training.stream import RowStream
+    from pipeline.training.dataset import RowStream
     from pipeline.truth.query import Answers
 
 __all__ = [
@@ -348,6 +348,6 @@ class Dataset:
         >>> max(len(batch["sigma"]) for batch in batches)
         100
         """
-        from pipeline.training.stream import RowStream
+        from pipeline.training.dataset import RowStream
 
         return RowStream(self._rows.of(split, fabrics), rows, seed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -49,3 +50,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value
+
+
+def stream_seed(purpose: str, belongs_to: Sequence[Any]) -> int:
+    """Return the seed of a stream, 0 <= seed < 2^64: the fingerprint of its JSON-able parts."""
+    return int(fingerprint([purpose, *belongs_to], 16), 16)

@@ -96,7 +96,7 @@ class ImageOptions(_Options):
 
 
 class DisplayOptions(_Options):
-    """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.fovvideovdp`)."""
+    """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.scene_errors`)."""
 
     resolution: tuple[Annotated[int, Field(ge=1, le=2**16)], Annotated[int, Field(ge=1, le=2**16)]] = (3840, 2160)
     """Width and height in pixels."""

@@ -27,9 +27,7 @@ from pydantic import (
 from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
-from weaves.plain import Basket, Plain, Rib
-from weaves.satin import Sateen, Satin
-from weaves.twill import BrokenTwill, Herringbone, Twill
+from weaves.families import Basket, BrokenTwill, Herringbone, Plain, Rib, Sateen, Satin, Twill
 from weaves.validation import read_toml, validated
 from weaves.yarn import Yarn
 

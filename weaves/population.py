@@ -35,9 +35,7 @@ from pydantic import (
 from weaves.draft import Draft, Matrix, cells
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-from weaves.plain import basket, plain, rib
-from weaves.satin import sateen, satin, valid_moves
-from weaves.twill import broken_twill, herringbone, twill
+from weaves.families import basket, broken_twill, herringbone, plain, rib, sateen, satin, twill, valid_moves
 from weaves.yarn import Number, Yarn
 
 FamilyName = Literal[

@@ -45,7 +45,7 @@ MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_ti
 
 
 DIFFERENCE: Final = "mse, own less general"
-"""Quantity that pairs both pictures, pixel by pixel (`reports.measure.paired_error`)."""
+"""Quantity that pairs both pictures, pixel by pixel (`reports.measure.block_bootstrap`)."""
 
 
 _WIDTH: Final = 110  # columns that a table with its intervals takes
@@ -210,7 +210,7 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
 def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
     """Return the difference of the errors of both models; nothing if a picture or the truth's frames are not sound."""
     from reports.images.exr import RGB, read_exr
-    from reports.measure.paired_error import mse_difference
+    from reports.measure.block_bootstrap import mse_difference
     from reports.measure.scene.shot import read_shot
 
     name, setting, ledger = model.options.name, _setting(model), Ledger(out)

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline.fingerprint import stream_seed
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.streams import stream_seed
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from pipeline import versions
+from pipeline.fingerprint import stream_seed
 from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.streams import stream_seed
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 

@@ -3,14 +3,16 @@
 Roles: `seen` fabrics are named by the recipe; `population` members are drawn at random and only trained on; `unseen`
 fabrics are named and never shown to a general model (a per-material model, which knows no other fabric, reads their
 training rows); `unseen_population` members are drawn at random and only measured.
+
+`Published` is the manifest of the folder that `twillight publish` writes.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +29,7 @@ from weaves.reading import MIB, read_json
 
 Role = Literal["seen", "population", "unseen", "unseen_population"]
 Split = Literal["train", "validation", "test"]
+Contents = TypeVar("Contents", bound=BaseModel)
 
 FILE = "manifest.json"
 
@@ -79,15 +82,7 @@ class Manifest(BaseModel):
     @classmethod
     def load(cls, folder: Path) -> Manifest:
         """Read a data set's manifest; BadInput if it is missing, too large or not one."""
-        path = folder / FILE
-        try:
-            return cls.model_validate(read_json(path, _MOST_BYTES, "a manifest", wide={"fabrics": _MOST_FABRICS}))
-        except FileNotFoundError as error:
-            raise BadInput(str(path), "", "does not exist", "generate the data set first") from error
-        except ValidationError as error:
-            first = error.errors(include_url=False, include_input=False)[0]
-            key = ".".join(map(str, first["loc"]))
-            raise BadInput(str(path), "", f"not a manifest ({key} {first['msg']})", "generate the data set") from error
+        return _read(cls, folder, ("fabrics",), ("generate the data set first", "generate the data set"))
 
     def save(self, folder: Path) -> None:
         """Write the manifest whole or not at all."""
@@ -134,3 +129,78 @@ class Manifest(BaseModel):
 def _encoded(shard: ShardEntry) -> str:
     """Return an entry, which has no nested values, as in JSON with an indent."""
     return f"  {{\n   {_LINES.encode(shard.model_dump())[1:-1]}\n  }}"
+
+
+class PublishedFile(BaseModel):
+    """One file of a published data set."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    file: Annotated[str, Field(pattern=r"^([A-Za-z0-9_-]{1,80}/){0,3}[A-Za-z0-9_.-]{1,80}$")]
+    """Path within the folder."""
+    bytes: int
+    """Size."""
+    sha256: str
+    """Hash of its bytes."""
+    role: Role | None = None
+    """Role of its fabrics; None for files without rows."""
+    split: Split | None = None
+    """Split of its rows."""
+    rows: dict[str, int] = {}
+    """Number of rows of each of its fabrics."""
+
+
+class Published(BaseModel):
+    """The contents of a published data set."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    name: str
+    """Name of its recipe."""
+    version: str
+    """Version of the columns, that of the truth, and 0."""
+    fingerprint: str
+    """Fingerprint of everything that shaped its rows."""
+    schema_version: int
+    """Version of the columns."""
+    truth_version: int
+    """Version of the ground truth; 0 if it is not known."""
+    licence: str
+    """SPDX identifier."""
+    rows: int
+    """Number of all rows."""
+    roles: dict[Role, list[str]]
+    """Names of the fabrics in each role."""
+    fabrics: dict[str, Fabric]
+    """Every fabric in full."""
+    options: dict[str, Any]
+    """The recipe's data set section."""
+    files: Annotated[list[PublishedFile], FailFast()]
+    """All files but this one."""
+
+    @classmethod
+    def load(cls, folder: Path) -> Published:
+        """Read the manifest of a published data set; BadInput if it is missing, too large or not one."""
+        return _read(cls, folder, ("fabrics", "rows"), ("get the whole data set", "get the data set again"))
+
+    def encoded(self) -> bytes:
+        """Return the bytes of its file; the same contents give the same bytes."""
+        content = self.model_dump(mode="json", exclude_none=True)
+        return json.dumps(content, indent=1, ensure_ascii=False).encode() + b"\n"
+
+
+def _read(contents: type[Contents], folder: Path, wide: Sequence[str], remedies: tuple[str, str]) -> Contents:
+    """Read the manifest of a folder; a table named by `wide` has an entry a fabric.
+
+    `remedies` end the sentences about a manifest that is missing and about a file that is none.
+    """
+    path = folder / FILE
+    try:
+        found = read_json(path, _MOST_BYTES, "a manifest", wide=dict.fromkeys(wide, _MOST_FABRICS))
+        return contents.model_validate(found)
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", "does not exist", remedies[0]) from error
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        key = ".".join(map(str, first["loc"]))
+        raise BadInput(str(path), "", f"not a manifest ({key} {first['msg']})", remedies[1]) from error

@@ -9,8 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy.typing as npt
 
 from pipeline.shards.joined import read_fabric
-from pipeline.shards.manifest import Manifest, Role
-from pipeline.shards.published import Published
+from pipeline.shards.manifest import Manifest, Published, Role
 from pipeline.shards.store import read_columns
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric

@@ -2,5 +2,5 @@
 
 On held-out queries: held_out (errors, time, memory), by_size, timing, memory. On views of one fabric:
 pictures, frames and aliasing, silhouette. Properties of a method: furnace (energy), extremes, latents. Statistics:
-block_bootstrap, paired_error. In scenes: the folder scene, which also has FLIP, SSIM and PSNR (scene.flip_ssim).
+block_bootstrap. In scenes: the folder scene, which also has FLIP, SSIM and PSNR (scene.image_error).
 """

@@ -20,9 +20,8 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.microflake import density, sigma
 from weaves.fabric import load_fabric
+from weaves.families import Satin, Twill
 from weaves.mesh import repeat_mesh
-from weaves.satin import Satin
-from weaves.twill import Twill
 
 mi.set_variant("scalar_rgb")
 

@@ -10,8 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from weaves.draft import LARGEST_REPEAT, Draft, cells
 from weaves.errors import BadInput
-from weaves.plain import plain
-from weaves.twill import twill
+from weaves.families import plain, twill
 
 matrices = hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=7))
 

@@ -10,8 +10,8 @@ from scipy import stats
 
 from weaves.draft import cells
 from weaves.fabric import Fabric
+from weaves.families import broken_twill, herringbone, twill
 from weaves.population import FamilyName, Population, Ranges, population_fabrics
-from weaves.twill import broken_twill, herringbone, twill
 
 RANGES = ("plain", "twill", "satin", "irregular")
 UNSEEN: tuple[FamilyName, ...] = ("compound_twill", "large_satin", "irregular")

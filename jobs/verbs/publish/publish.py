@@ -27,8 +27,7 @@ from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.shards.check import check_shard
 from pipeline.shards.joined import join_shards
 from pipeline.shards.manifest import FILE as MANIFEST
-from pipeline.shards.manifest import Manifest
-from pipeline.shards.published import Published, PublishedFile
+from pipeline.shards.manifest import Manifest, Published, PublishedFile
 from pipeline.shards.store import read_about
 from weaves.errors import BadInput, WorkFailed
 

@@ -4,14 +4,25 @@ m is the method's value, t the truth's, s its standard error, all linear RGB, <.
 mask) and the channels.
 
 linear light    MSE and relative MSE as in `reports.error`, noise subtracted. Components: `light_errors`.
-display light   PSNR, SSIM, FLIP, HDR-FLIP and CIEDE2000, means of the maps of `reports.measure.scene.flip_ssim`. PSNR
-                is infinite where pictures are equal.
+display light   PSNR, SSIM, FLIP, HDR-FLIP and CIEDE2000, means of maps. PSNR is infinite where pictures are equal.
 
 Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
 subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel (option
 `floor_channels`), fixed seed: about the score of a perfect method. Intervals are 95 % percentile bootstraps over
 square blocks of pixels, since errors of neighbours are correlated (`reports.measure.block_bootstrap`); they say how
 much the choice of pixels matters, not the noise floor.
+
+Maps of the perceived difference on a display. Outside the mask both pictures are set to one grey, the median luminance
+of the truth's lit pixels: nothing there enters, not even by the windows of SSIM and FLIP, and it shifts no exposure of
+HDR-FLIP. L = min(max(exposure m, 0), 1), and E is its sRGB encoding, the codes of the picture on the page.
+
+square          (E_m - E_t)^2, mean over channels; PSNR is 10 log10(1 / mean) in dB: peak 1, which is display white.
+ssim            structural similarity of E, Gaussian window, one channel at a time, range 1, at the picture's edge
+                continued by reflection [Wang2004SSIM], scikit-image. 1 where equal.
+flip_ldr        error map of E at a number of pixels per degree [Andersson2020FLIP], NVIDIA's code. 0 to 1.
+flip_hdr        the same for linear values >= 0 over the exposures between those that fit the truth's median and its
+                maximum [Andersson2021HDRFLIP]. It does not depend on the unit of light.
+delta_e         CIEDE2000 of L (`weaves.colour.delta_e`).
 """
 
 from __future__ import annotations
@@ -19,16 +30,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+import flip_evaluator
 import numpy as np
 import numpy.typing as npt
+from skimage.metrics import structural_similarity
 
 from reports.error import Error, relative_squared_error, relative_weight, squared_error
 from reports.measure.block_bootstrap import block_interval, blocks
-from reports.measure.scene.flip_ssim import perceived_maps
 from reports.options import ImageOptions
 from reports.record import Metric, Record
+from weaves.colour import LUMINANCE, delta_e, encoded
 from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
@@ -191,3 +204,35 @@ def _checked(
     if min(t[lit].min(), s[lit].min()) < 0 or t[lit].max() == 0:
         raise BadInput("image errors", "truth", "dark or negative", "light > 0 and standard errors >= 0 are needed")
     return m, t, s, lit
+
+
+def perceived_maps(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
+    """Return the maps above by name, (H, W); pictures (H, W, 3), `lit` (H, W) the pixels that count."""
+    grey = float(np.median(truth[lit] @ LUMINANCE))
+    picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
+    light, light_truth = (np.clip(options.exposure * values, 0.0, 1.0) for values in (picture, truth))
+    shown, shown_truth = encoded(light), encoded(light_truth)
+    window = {"gaussian_weights": True, "sigma": options.ssim_sigma, "use_sample_covariance": False}
+    compare: Any = structural_similarity  # has no types
+    similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
+    # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
+    unit = 1.0 / (truth @ LUMINANCE).max()
+    return {
+        "square": ((shown - shown_truth) ** 2).mean(axis=-1),
+        "ssim": similarity.mean(axis=-1),
+        "flip_ldr": _flip(shown, shown_truth, "LDR", options),
+        "flip_hdr": _flip(np.maximum(unit * picture, 0.0), unit * truth, "HDR", options),
+        "delta_e": delta_e(light, light_truth),
+    }
+
+
+def _flip(picture: Floats, truth: Floats, kind: str, options: ImageOptions) -> Floats:
+    """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
+    values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
+    parameters: dict[str, Any] = {"ppd": options.pixels_per_degree}
+    if kind == "HDR":
+        parameters["tonemapper"] = options.tone_mapper
+    errors, _, _ = flip_evaluator.evaluate(
+        *values, kind, applyMagma=False, computeMeanError=False, parameters=parameters
+    )
+    return np.asarray(errors[..., 0], np.float64)

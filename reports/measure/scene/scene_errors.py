@@ -6,6 +6,12 @@ flicker where cloth is lit in every one of them, the spectrum of whole frames, w
 Intervals are those of `reports.measure.block_bootstrap`, over blocks of pixels with all their frames; excess energy has
 none. Every method is wrapped by `pipeline.models.fallback`; its fallback share stands beside its
 numbers.
+
+FovVideoVDP [Mantiuk2021FovVideoVDP] is the visibility of the difference of two films in JOD: 10 where they look the
+same, one less where 3 of 4 people prefer the truth. Sustained and transient contrast count, so flicker does. Films are
+luminance on a display (`DisplayOptions`): Y = peak min(max(exposure L, 0), 1) + peak / contrast. Frames are fewer than
+the quarter of a second that the metric looks back: the first one is taken to have stood still before. `pyfvvdp` may
+not be used commercially and is therefore no dependency.
 """
 
 from __future__ import annotations
@@ -24,8 +30,6 @@ from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.difference_maps import difference_maps
-from reports.measure.scene.fovvideovdp import fovvideovdp_records
 from reports.measure.scene.image_error import image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
@@ -35,6 +39,12 @@ from weaves.colour import LUMINANCE
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
+from typing import Any
+
+from reports.error import relative_weight
+from reports.measure.scene.image_error import ImageErrors
+from reports.options import DisplayOptions
+from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
 
@@ -84,7 +94,7 @@ def measure_scene(
         Options of the comparison, and the seed of random methods.
     pictures : mapping
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
-        of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.difference_maps`).
+        of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.scene_errors`).
     """
     image, reference = options.image, _reference(shot, options.image)
     truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]
@@ -188,3 +198,93 @@ def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Recor
     return Record(
         method=method.name, setting=method.setting, scene=shot.name, threads=1, provenance=provenance or Provenance()
     )
+
+
+def difference_maps(
+    picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors, epsilon: float = 0.01
+) -> dict[str, npt.NDArray[Any]]:
+    """Return the layers of a picture's errors, (H, W) by channel.
+
+    They are `lit` (1 where a pixel counts), those of `relative_differences`, and the maps of `ImageErrors`.
+    """
+    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask, epsilon), **errors.maps}
+
+
+def relative_differences(
+    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.NDArray[np.bool_], epsilon: float = 0.01
+) -> dict[str, Floats]:
+    """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
+
+    The mean of the channels' squares is the relative MSE as measured (`reports.error`).
+    """
+    m, t = (np.asarray(values, np.float64)[mask] for values in (picture, truth))
+    light, reference = m @ LUMINANCE, t @ LUMINANCE
+    shares = [*((m - t) * relative_weight(t, epsilon)).T, (light - reference) * relative_weight(reference, epsilon)]
+    maps = {f"relative.{name}": np.zeros(mask.shape) for name in "RGBY"}
+    for plane, share in zip(maps.values(), shares, strict=True):
+        plane[mask] = share
+    return maps
+
+
+def absence() -> str:
+    """Return one sentence that says why the measure is missing; empty where it is not."""
+    try:
+        _library()
+    except ImportError as error:
+        return f"FovVideoVDP is not measured: {error}; pip install pyfvvdp adds it."
+    return ""
+
+
+def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOptions | None = None) -> float | None:
+    """Return the quality of a film in JOD; None where pyfvvdp is not installed.
+
+    Parameters
+    ----------
+    frames, truth : array_like (F, H, W)
+        Linear luminance of the method's frames and of the truth's, irradiance included (as in
+        `reports.measure.pictures`).
+
+    Raises
+    ------
+    BadInput
+        If sizes differ, there are fewer than two frames, or a value is not finite.
+    """
+    options = options or DisplayOptions()
+    film, reference = (np.asarray(values, np.float64) for values in (frames, truth))
+    if film.shape != reference.shape or film.ndim != 3 or len(film) < 2:
+        raise BadInput(
+            "FovVideoVDP", "frames", film.shape, f"two or more of the truth's size {reference.shape} are needed"
+        )
+    if not (np.isfinite(film).all() and np.isfinite(reference).all()):
+        raise BadInput("FovVideoVDP", "frames", "not finite", "every pixel needs a number")
+    if absence():
+        return None
+    metric = _metric(options)
+    light = [(options.peak * np.clip(options.exposure * a, 0.0, 1.0)).astype(np.float32) for a in (film, reference)]
+    return float(metric.predict(*light, dim_order="FHW", frames_per_second=options.frames_per_second)[0])
+
+
+def fovvideovdp_records(
+    subject: Record, frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOptions | None = None
+) -> list[Record]:
+    """Return the score as a Record of `subject`; none where pyfvvdp is not installed."""
+    score = fovvideovdp(frames, truth, options)
+    return [] if score is None else [subject.of("fovvideovdp", score, len(np.asarray(truth)))]
+
+
+def _metric(options: DisplayOptions) -> Any:
+    library = _library()
+    return library.fvvdp(
+        display_photometry=library.fvvdp_display_photo_eotf(options.peak, contrast=options.contrast, EOTF="linear"),
+        display_geometry=library.fvvdp_display_geometry(
+            options.resolution, distance_m=options.distance, diagonal_size_inches=options.diagonal
+        ),
+        device="cpu",
+        quiet=True,
+    )
+
+
+def _library() -> Any:
+    import pyfvvdp
+
+    return pyfvvdp

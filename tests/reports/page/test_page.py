@@ -11,8 +11,8 @@ import pytest
 from reports.images.exr import frame_layers, write_exr
 from reports.measure.latents import SHARES
 from reports.measure.pictures import write_picture
-from reports.measure.scene.difference_maps import difference_maps
 from reports.measure.scene.image_error import image_errors
+from reports.measure.scene.scene_errors import difference_maps
 from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.content import PageInput
 from reports.page.files import read_files

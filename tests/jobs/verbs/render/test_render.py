@@ -20,7 +20,7 @@ from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
 from weaves.fabric import load_fabric
-from weaves.satin import Satin
+from weaves.families import Satin
 
 SMALL = ("--size", "32x24", "--directions", "4")
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)

@@ -7,8 +7,8 @@ import pytest
 from reports.images import tiles
 from reports.images.exr import read_exr, write_exr
 from reports.images.tiles import flip_tile, relative_tile
-from reports.measure.scene.difference_maps import difference_maps, relative_differences
 from reports.measure.scene.image_error import image_errors
+from reports.measure.scene.scene_errors import difference_maps, relative_differences
 
 MASK = np.zeros((24, 32), dtype=bool)
 MASK[2:22, 3:29] = True

@@ -4,7 +4,7 @@ import sys
 import numpy as np
 import pytest
 
-from reports.measure.scene.fovvideovdp import absence, fovvideovdp, fovvideovdp_records
+from reports.measure.scene.scene_errors import absence, fovvideovdp, fovvideovdp_records
 from reports.options import DisplayOptions
 from reports.record import Record
 from weaves.errors import BadInput

@@ -1,13 +1,21 @@
-"""Twills: every end repeats its neighbour one pick later, so that floats form diagonals.
+"""Families of weaves that a few numbers describe.
 
-An n/m twill takes each end over n picks and under m; steps may follow each other (over 3, under 1, over 1, under 2). A
-right-hand twill rises to the right. A broken twill turns round halfway through the repeat, a herringbone after a whole
-one; both jump half a repeat where they turn, which cuts the floats there.
+A plain weave alternates yarn by yarn; a rib moves groups of yarns together in one direction, a basket weave in both.
+
+A satin binds each end once in a repeat, and no two neighbouring ends in neighbouring picks. The binding point moves on
+by `move` ends from pick to pick. It meets every end once exactly when `move` and the number of ends share no factor,
+and 1 or ends - 1 would be a twill: so 6 ends have no regular satin at all. A satin shows the warp, a sateen the weft.
+
+An n/m twill takes each end over n picks and under m; steps may follow each other (over 3, under 1, over 1, under 2).
+Every end repeats its neighbour one pick later, so that floats form diagonals. A right-hand twill rises to the right. A
+broken twill turns round halfway through the repeat, a herringbone after a whole one; both jump half a repeat where
+they turn, which cuts the floats there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import gcd
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -159,3 +167,153 @@ class Herringbone(Family):
     def build(self) -> Draft:
         """Weave it."""
         return herringbone(self.over, self.under, self.width)
+
+
+def valid_moves(ends: int) -> list[int]:
+    """Return the moves that make a satin of `ends` ends: coprime to it, and neither 1 nor ends - 1."""
+    return [move for move in range(2, ends - 1) if gcd(move, ends) == 1]
+
+
+def satin(ends: int = 5, move: int = 2) -> Draft:
+    """Weave a warp-faced satin.
+
+    Raises
+    ------
+    BadInput
+        If the ends or the move make no satin; the sentence lists what would.
+    """
+    return Draft(~_bindings("satin", ends, move), f"satin {ends}/{move}")
+
+
+def sateen(ends: int = 5, move: int = 2) -> Draft:
+    """Weave a weft-faced satin.
+
+    Raises
+    ------
+    BadInput
+        As `satin`.
+    """
+    return Draft(_bindings("sateen", ends, move), f"sateen {ends}/{move}")
+
+
+def _bindings(kind: str, ends: int, move: int) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    """Mark the one end at which each pick is bound."""
+    if not 5 <= ends <= LARGEST_REPEAT:
+        raise BadInput(kind, "ends", ends, f"5 to {LARGEST_REPEAT} ends are possible")
+    if move not in (moves := valid_moves(ends)):
+        listed = f"{ends} ends allow {', '.join(map(str, moves))}" if moves else f"{ends} ends allow none"
+        others = [other for other in (ends - 1, ends + 1) if valid_moves(other)]
+        hint = "" if moves else f"; try {' or '.join(map(str, others))} ends"
+        raise BadInput(
+            kind, "move", move, f"a move shares no factor with the ends and is not 1 or ends - 1: {listed}{hint}"
+        )
+    pick, end = np.ogrid[:ends, :ends]
+    bound: np.ndarray[tuple[int, int], np.dtype[np.bool_]] = end == pick * move % ends
+    return bound
+
+
+class Satin(Family):
+    """A warp-faced satin."""
+
+    family: Literal["satin"] = "satin"
+    ends: StrictInt = 5
+    """Ends, and picks, of the repeat."""
+    move: StrictInt = 2
+    """Ends from one binding point to that of the next pick."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return satin(self.ends, self.move)
+
+
+class Sateen(Family):
+    """A weft-faced satin."""
+
+    family: Literal["sateen"] = "sateen"
+    ends: StrictInt = 5
+    """Ends, and picks, of the repeat."""
+    move: StrictInt = 2
+    """Ends from one binding point to that of the next pick."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return sateen(self.ends, self.move)
+
+
+Group = Annotated[StrictInt, Field(ge=1, le=16)]
+
+
+def plain() -> Draft:
+    """Weave over one, under one."""
+    return _blocks(1, 1, "plain")
+
+
+def rib(ends: int = 1, picks: int = 2) -> Draft:
+    """Weave groups of yarns in one direction only: `picks` together make a warp rib, `ends` together a weft rib.
+
+    Raises
+    ------
+    BadInput
+        Unless exactly one of the two numbers is 1.
+    """
+    if (ends == 1) == (picks == 1) or min(ends, picks) < 1:
+        raise BadInput("rib", "picks", picks, f"one of ends and picks is 1 and the other is more; ends is {ends}")
+    return _blocks(ends, picks, f"rib {ends}x{picks}")
+
+
+def basket(ends: int = 2, picks: int = 2) -> Draft:
+    """Weave groups of `ends` warps over groups of `picks` wefts.
+
+    Raises
+    ------
+    BadInput
+        If a group has fewer than two yarns.
+    """
+    if min(ends, picks) < 2:
+        key, value = ("ends", ends) if ends < 2 else ("picks", picks)
+        raise BadInput("basket", key, value, "a basket weave groups at least 2 yarns")
+    return _blocks(ends, picks, f"basket {ends}x{picks}")
+
+
+def _blocks(ends: int, picks: int, name: str) -> Draft:
+    """Lay a chequerboard of blocks."""
+    pick, end = np.ogrid[: 2 * picks, : 2 * ends]
+    return Draft((pick // picks + end // ends) % 2 == 0, name)
+
+
+class Plain(Family):
+    """Over one, under one."""
+
+    family: Literal["plain"] = "plain"
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return plain()
+
+
+class Rib(Family):
+    """Plain weave with groups in one direction."""
+
+    family: Literal["rib"] = "rib"
+    ends: Group = 1
+    """Ends that move together."""
+    picks: Group = 2
+    """Picks that lie together."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return rib(self.ends, self.picks)
+
+
+class Basket(Family):
+    """Plain weave with groups in both directions."""
+
+    family: Literal["basket"] = "basket"
+    ends: Group = 2
+    """Ends that move together."""
+    picks: Group = 2
+    """Picks that lie together."""
+
+    def build(self) -> Draft:
+        """Weave it."""
+        return basket(self.ends, self.picks)
