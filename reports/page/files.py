@@ -21,10 +21,14 @@ _LIST: Final = TypeAdapter(dict[str, str])
 
 
 def write_files(folder: Path, names: Iterable[str]) -> None:
-    """List files of a page, given by their paths in its folder, and remove those that only the list before had."""
+    """List files of a page, given by their paths in its folder, and remove those that only the list before had.
+
+    One that was changed since it was listed stays.
+    """
     hashes = {name: file_sha256(folder / name) for name in sorted(names)}
-    for name in _found(folder).keys() - hashes:
-        (folder / name).unlink(missing_ok=True)
+    for name, sha256 in _found(folder).items():
+        if name not in hashes and (folder / name).is_file() and file_sha256(folder / name) == sha256:
+            (folder / name).unlink()
     atomic_write(folder / FILES, json.dumps(hashes, indent=1).encode() + b"\n")
 
 

@@ -66,6 +66,12 @@ def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequenc
     truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
     about = About(manifest, parts_of(manifest), identifier, tuple(authors) or AUTHORS, truth)
     staging = target.with_name(f".tmp-{target.name}")
+    if (
+        staging.is_dir()
+        and any(staging.iterdir())
+        and not any((staging / name).is_file() for name in (_LOCK, MANIFEST))
+    ):
+        raise BadInput(str(staging), "", "is in the way", "it is not of this command; move it, or name another --to")
     try:
         staging.mkdir(parents=True, exist_ok=True)
     except OSError as error:

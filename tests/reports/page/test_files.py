@@ -24,6 +24,9 @@ def test_files_of_an_earlier_page_are_removed_and_others_kept(folder):
     (folder / "results.md").write_text("by another hand")
     write_files(folder, ["records.json"])
     assert sorted(path.name for path in folder.rglob("*.*")) == [FILES, "records.json", "results.md"]
+    (folder / "records.json").write_text("changed since")
+    write_files(folder, [])
+    assert (folder / "records.json").read_text() == "changed since"
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"a": 1}', '{"../a": "b"}', '{"/a": "b"}'])

@@ -253,6 +253,11 @@ def test_a_stopped_run_leaves_nothing_and_is_continued(published, dataset, tmp_p
     joined = verb.join_shards
     monkeypatch.setattr(verb, "join_shards", stopped)
     tokens = ["publish", str(dataset), "--to", str(target), "--licence", "CC-BY-4.0"]
+    own = tmp_path / ".tmp-wide" / "notes.txt"
+    own.parent.mkdir()
+    own.write_text("mine")
+    assert main(tokens) == 2 and own.read_text() == "mine"
+    own.unlink()
     assert main(tokens) == 130
     assert not target.exists()
     kept = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in done[1:]}
