@@ -316,27 +316,8 @@ def train(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = Wo
 
 
 @app.command(sort_key=8)
-def bench(
-    recipe: Annotated[
-        str,
-        Parameter(
-            help="Recipe, or a measurement of the truth: `stability` (rounding), `truth` (speed and errors), "
-            "`sampler` (variance saved), `mitsuba` (path-traced frames)."
-        ),
-    ],
-    *,
-    add: Add = NOTHING,
-    out: Out = OUT,
-    on: On = WorkerFlags(),
-) -> None:
-    """Measure error, aliasing and time of every method, or stability, speed and accuracy of the truth."""
-    from jobs.verbs.bench import BENCHES, bench_alone
-
-    if recipe in BENCHES:
-        if add:
-            raise BadInput(f"bench {recipe}", "--add", add[0], "leave it out: only the truth is measured")
-        bench_alone(recipe, out, on.connection(), on.workers, on.progress)
-        return
+def bench(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = WorkerFlags()) -> None:
+    """Measure error, aliasing and time of every method; the recipes `truth` and `mitsuba`: the truth, Mitsuba."""
     from jobs.verbs.run import work
 
     work(recipe, ["bench"], out, on.connection(), on.workers, on.progress, add)

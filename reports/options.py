@@ -230,6 +230,19 @@ class RunOptions(_Options):
     """Measure every network that estimates its errors (`selvage`) at these wished relative errors too."""
 
 
+StudyName = Literal[
+    "stability",
+    "throughput",
+    "accuracy",
+    "calibration",
+    "bias",
+    "effort",
+    "footprint_colours",
+    "sampling",
+    "path_traced",
+]
+"""Modules of `reports.truth` that measure the truth, importance sampling, or frames in Mitsuba."""
+
 LEAST_TILE: Final = 8
 MOST_TILE: Final = 512
 """Fewest and most pixels along each side of a picture of the truth on a live page."""
@@ -255,6 +268,8 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     """Scenes with cameras, lights and cloths of their own."""
     live: LiveOptions = LiveOptions()
     """Fabrics that the page shows live."""
+    studies: tuple[StudyName, ...] = ()
+    """Measurements of the truth itself, of importance sampling, and of path-traced frames; they read no data set."""
     edge: EdgeOptions = EdgeOptions()
     """The silhouette, measured where the data set's queries are of curved cloth."""
 

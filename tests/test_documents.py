@@ -10,7 +10,6 @@ import pytest
 
 from jobs.cli import app
 from jobs.recipe.load import recipe_names
-from jobs.verbs.bench import BENCHES
 from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.schema import SCHEMAS
@@ -109,7 +108,7 @@ def test_commands_are_understood(path):
             continue
         app.parse_args(tokens, exit_on_error=False, print_error=False)
         if tokens[0] in OF_RECIPES and not tokens[1].isupper() and not tokens[1].endswith(".toml"):
-            assert tokens[1] in {*recipe_names(), *BENCHES}, f"{tokens}: no such recipe"
+            assert tokens[1] in recipe_names(), f"{tokens}: no such recipe"
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)

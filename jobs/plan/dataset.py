@@ -26,7 +26,6 @@ SECONDS_A_POINT: Final = 3.5e-7
 """One point of the truth, on one core of a server of 2021."""
 POINTS_A_ROW: Final = 1700
 """Points for 2 % relative error, on average."""
-BYTES_A_ROW: Final = 62
 
 
 class Shard(Task):
@@ -75,11 +74,6 @@ class Shard(Task):
     def rows(self) -> int:
         """Rows of the shard."""
         return self.shard.rows
-
-    @property
-    def size(self) -> int:
-        """Estimated bytes of the shard."""
-        return self.rows * BYTES_A_ROW
 
     def versions(self) -> dict[str, int]:
         """Return the version of the truth."""

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from jobs.plan.dataset import fingerprint_of
-from jobs.plan.measurements.live_page import LivePage
 from jobs.plan.measurements.measurement import Measurement, Picture
-from jobs.plan.measurements.scene_shot import SceneShot
+from jobs.plan.measurements.scenes import SceneShot
 from jobs.plan.measurements.subjects import Subjects
-from jobs.plan.measurements.timing import Timing
+from jobs.plan.measurements.timing import TimeOfMethods
+from jobs.plan.measurements.truth_images import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
@@ -45,8 +45,6 @@ class Page(Task):
     """Metrics from outside; the ids of their measurements are in `measured`."""
     measured: tuple[str, ...]
     """Ids of the measurements."""
-    others: dict[str, str]
-    """Files of Records that no task writes, each with its hash."""
     records: Places
     """Files of Records of the measurements."""
     timing: Place
@@ -81,11 +79,6 @@ class Page(Task):
         """All measurements."""
         return self.measured
 
-    @property
-    def reads(self) -> Mapping[str, str]:
-        """The Records that no task writes."""
-        return self.others
-
     def written(self, out: Path) -> tuple[str, ...]:
         """Return the files of its folder."""
         from reports.page.files import read_files
@@ -97,17 +90,12 @@ class Page(Task):
         """Estimated seconds on one core."""
         return 15.0
 
-    @property
-    def size(self) -> int:
-        """Estimated bytes of the folder."""
-        return 10_000_000
-
     def versions(self) -> dict[str, int]:
         """Return the version of the benchmark."""
         return {"bench": versions.BENCH}
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Write it. Records of other measurements are shown if they existed when the page was planned."""
+        """Write it."""
         from reports.page.content import PageInput
         from reports.page.page import write_page
         from reports.page.picture_strips import PictureFile
@@ -127,7 +115,7 @@ class Page(Task):
             options=self.options,
             records=[
                 record.model_copy(update={"provenance": record.provenance.model_copy(update=own)})
-                for record in read_records(out / path for path in (*self.records, *self.others))
+                for record in read_records(out / path for path in self.records)
             ],
             machine=read_machine(out / self.timing),
             pictures=[PictureFile(p.fabric, p.scene, p.method, p.setting, out / p.path) for p in self.pictures],
@@ -136,7 +124,7 @@ class Page(Task):
         write_page(out / self.folder, content, progress)
 
 
-def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[str, str]) -> Page:
+def page_of(subjects: Subjects, benches: Sequence[Measurement]) -> Page:
     """Return the page of all measurements."""
     recipe = subjects.recipe
     shots = [task for task in benches if isinstance(task, SceneShot)]
@@ -152,9 +140,8 @@ def page_of(subjects: Subjects, benches: Sequence[Measurement], alone: Mapping[s
         options=recipe.bench,
         metrics=recipe.metrics,
         measured=tuple(task.id for task in benches),
-        others=dict(alone),
         records=tuple(task.records for task in benches if task.records),
-        timing=next(task.records for task in benches if isinstance(task, Timing)),
+        timing=next(task.records for task in benches if isinstance(task, TimeOfMethods)),
         pictures=tuple(picture for task in benches for picture in task.pictures),
         live={task.fabric.name: task.products[0] for task in benches if isinstance(task, LivePage)},
     )

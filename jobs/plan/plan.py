@@ -5,28 +5,46 @@ Every task is listed after those it needs. Each kind of task defines its own ide
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable
+from typing import Final
 
 from jobs.plan.dataset import Shard, shards
-from jobs.plan.measurements.catalogue import measurements
+from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric, OnUnseenPopulation, TruthNoise
+from jobs.plan.measurements.measurement import Measurement
+from jobs.plan.measurements.models import AtExtremes, Latents
+from jobs.plan.measurements.scenes import FrameTime, OnScene, SceneShot
+from jobs.plan.measurements.studies import Study
 from jobs.plan.measurements.subjects import Subjects
+from jobs.plan.measurements.timing import TimeOfMethods
+from jobs.plan.measurements.truth_images import LivePage, TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.page import page_of
 from jobs.plan.task import Task
 from jobs.plan.training import trainings
 from jobs.recipe.recipe import Recipe
 
+KINDS: Final[tuple[type[Measurement], ...]] = (
+    TruthPicture,
+    TruthFrames,
+    TruthEdge,
+    TruthNoise,
+    OnFabric,
+    OnUnseenPopulation,
+    Latents,
+    SceneShot,
+    OnScene,
+    FrameTime,
+    AtExtremes,
+    TimeOfMethods,
+    ErrorsBySize,
+    OfAddedMetric,
+    LivePage,
+    Study,
+)
+"""The kinds of measurement, each after those that it reads."""
 
-def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> list[Task]:
-    """Return the tasks of a recipe.
 
-    Parameters
-    ----------
-    recipe : Recipe
-        The recipe.
-    alone : mapping
-        Files of Records that no task writes and the page shows, each with its hash.
-    """
+def plan(recipe: Recipe) -> list[Task]:
+    """Return the tasks of a recipe."""
     parts = {id(one): shards(one) for one in recipe.together}
     own = parts[id(recipe)]
     rows, trained = list(own), {}
@@ -37,9 +55,9 @@ def plan(recipe: Recipe, alone: Mapping[str, str] = MappingProxyType({})) -> lis
         read = {need for task in trained[model.options.name][0].values() for need in task.needs}
         rows += [part for part in parts[id(trainer)] if part.id in read]
     subjects = Subjects(recipe, own, trained)
-    benches = measurements(subjects)
+    benches = [task for kind in KINDS for task in kind.planned(subjects)]
     every = [task for seeds in trained.values() for tasks in seeds for task in tasks.values()]
-    return [*_once(rows), *every, *benches, page_of(subjects, benches, alone)]
+    return [*_once(rows), *every, *benches, page_of(subjects, benches)]
 
 
 def _once(parts: Iterable[Shard]) -> list[Shard]:

@@ -117,7 +117,7 @@ class Ready:
 
     def _push(self, task: Task) -> None:
         self._pushed += 1  # equally urgent tasks start in the order in which they became ready
-        heapq.heappush(self._alone if task.alone else self._beside, (self._order[task.id], self._pushed, task))
+        heapq.heappush(self._alone if task.slots == "all" else self._beside, (self._order[task.id], self._pushed, task))
 
     def _pop(self, heap: list[tuple[float, int, Task]]) -> Task | None:
         """Start the most urgent task of a heap that can start."""

@@ -7,10 +7,10 @@ work is the same task in another recipe, in another order or on more workers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -23,6 +23,8 @@ from pydantic import (
 
 from pipeline.fingerprint import IDENTITY, fingerprint
 from weaves.fabric import Fabric
+
+_Kind = TypeVar("_Kind")
 
 Stage = Literal["generate", "train", "bench", "report"]
 
@@ -41,7 +43,7 @@ Places = Annotated[tuple[str, ...], PLACE]
 """Several of them."""
 
 
-class Part(BaseModel):
+class TaskPart(BaseModel):
     """A part of a task: typed fields, without its places in an identity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
@@ -55,8 +57,13 @@ class Part(BaseModel):
                     del content[name]
         return content
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Ids of the tasks whose products it reads: those of its parts."""
+        return tuple(id for part in held(self, TaskPart) for id in part.needs)
 
-class Made(Part):
+
+class Made(TaskPart):
     """Products of another task that this one reads."""
 
     task: str
@@ -64,14 +71,17 @@ class Made(Part):
     path: Place
     """Path of its product, or of the folder of its products."""
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """That task."""
+        return (self.task,)
 
-class Task(Part):
+
+class Task(TaskPart):
     """A piece of work; the methods that raise NotImplementedError are each kind's to define."""
 
     stage: ClassVar[Stage]
     """The stage that does it."""
-    alone: ClassVar[bool] = False
-    """True if it measures time: nothing else may run beside it, and it has a new process."""
     shares_process: ClassVar[bool] = False
     """True if it may run beside others in one process: it uses no random numbers and threads of a library."""
 
@@ -90,33 +100,23 @@ class Task(Part):
         """Files that exist when it is done, relative to the output folder."""
         raise NotImplementedError
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Ids of the tasks that must be done before."""
-        return ()
-
-    @property
-    def reads(self) -> Mapping[str, str]:
-        """Files that it reads and no task makes, relative to the output folder, each with its hash."""
-        return {}
-
     def written(self, out: Path) -> tuple[str, ...]:
         """Return all files that it has made in the output folder `out`: the products, last, and what they list."""
         return self.products
 
     @property
+    def slots(self) -> Literal["one", "all"]:
+        """Slots of a run that it takes: all if it measures time, so nothing runs beside it and its process is new."""
+        return "one"
+
+    @property
     def cost(self) -> float:
-        """Estimated seconds on one core."""
+        """Estimated seconds on one core of a desktop of 2023; a run corrects them by the tasks that have ended."""
         return 1.0
 
     @property
     def rows(self) -> int:
         """Estimated rows of the products."""
-        return 0
-
-    @property
-    def size(self) -> int:
-        """Estimated bytes of the products."""
         return 0
 
     def versions(self) -> dict[str, int]:
@@ -169,3 +169,19 @@ Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]
 """A fabric whose colours do not change the result."""
 Coloured = Annotated[Fabric, WrapSerializer(_look)]
 """A fabric whose colours change the result."""
+
+
+def held(owner: BaseModel, kind: type[_Kind]) -> Iterator[_Kind]:
+    """Yield all objects of a kind in the fields of a task or option, but none inside another one."""
+    for name in type(owner).model_fields:
+        yield from _held_in(getattr(owner, name), kind)
+
+
+def _held_in(value: object, kind: type[_Kind]) -> Iterator[_Kind]:
+    if isinstance(value, kind):
+        yield value
+    elif isinstance(value, BaseModel):
+        yield from held(value, kind)
+    elif isinstance(value, Mapping | list | tuple):
+        for inner in value.values() if isinstance(value, Mapping) else value:
+            yield from _held_in(inner, kind)

@@ -71,11 +71,6 @@ class Training(Task):
         return self.training.steps * self.training.batch * self.options.seconds[0]
 
     @property
-    def size(self) -> int:
-        """Estimated bytes of weights and card."""
-        return 500_000
-
-    @property
     def _fabric(self) -> str:
         """The only fabric of a network of one material; else empty."""
         return self.fabrics[0] if self.options.of_one_material else ""

@@ -20,6 +20,9 @@ from weaves.validation import read_toml, validated
 
 RECIPES = Path(__file__).parents[1] / "recipes"
 
+_MEASURED_BY: Final = {"stability": "truth", "sampler": "truth"}
+"""Recipes that measure what was once measured without a recipe."""
+
 MOST_RECIPES: Final = 32
 """Most recipes that one recipe names, directly or through others."""
 
@@ -46,6 +49,9 @@ def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
+        if recipe := _MEASURED_BY.get(str(name_or_path)):
+            allowed = f"is measured by the recipe {recipe}: `twillight run {recipe}`"
+            raise BadInput("recipe", "name", str(name_or_path), allowed)
         if str(name_or_path) not in (known := recipe_names()):
             allowed = f"a path ending in .toml or a recipe's name is needed; {nearest(str(name_or_path), known)}"
             raise BadInput("recipe", "name", str(name_or_path), allowed)

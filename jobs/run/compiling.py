@@ -7,17 +7,13 @@ reaches is compiled by the first task that calls it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final, NamedTuple
 
-from pydantic import BaseModel
-
-from jobs.plan.task import Task
+from jobs.plan.task import Task, held
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.options import Options
 from pipeline.truth.options import TruthOptions
-
-_Kind = TypeVar("_Kind")
 
 _ROWS: Final = 8
 
@@ -86,29 +82,15 @@ def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
 def _estimators(task: Task) -> Iterator[str]:
     """Yield the estimators that a task evaluates; a page evaluates none."""
     if task.stage != "report":
-        yield from (truth.estimator for truth in _held(task, TruthOptions))
+        yield from (truth.estimator for truth in held(task, TruthOptions))
     if "fallback" in task.versions():
         yield from _FALLBACK
 
 
 def _models(task: Task) -> Iterator[Options]:
     """Yield the models without training that a task names, with the first value of their parameter alone."""
-    for options in _held(task, Options):
+    for options in held(task, Options):
         if options.model == "selvage":  # corrects soft_nodes
             yield CLASSES["soft_nodes"]()
         elif not options.learns and options.model != "added":  # code from outside runs in a process of its own
             yield options.single()[0]
-
-
-def _held(value: object, kind: type[_Kind]) -> Iterator[_Kind]:
-    """Yield every object of a kind in the fields of a task."""
-    if isinstance(value, kind):
-        yield value
-    elif isinstance(value, BaseModel):
-        for name in type(value).model_fields:
-            yield from _held(getattr(value, name), kind)
-    elif isinstance(value, Mapping):
-        yield from _held(tuple(value.values()), kind)
-    elif isinstance(value, list | tuple):
-        for inner in value:
-            yield from _held(inner, kind)

@@ -217,7 +217,7 @@ class _Driver:
         """Return the hashes of the products that a task needs, by path, for workers that fetch them."""
         if self._ledger.store.is_local:
             return {}
-        hashes = dict(task.reads)
+        hashes = dict[str, str]()
         for need in self._needs(task):
             files = self._ledger.products(need)
             hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}

@@ -70,8 +70,6 @@ def faults(
     bad = {Path(path).name for task in unknown.values() for path in task.products}
     for one in recipe.together:
         found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
-    for page in (task for task in tasks if isinstance(task, Page)):
-        found += _other_faults(page, ledger.out)
     return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in found})
 
 
@@ -139,17 +137,6 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
             yield Fault("missing", path, "it does not exist, although the page was written", page)
         elif file_sha256(ledger.out / path) != sha256:
             yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
-
-
-def _other_faults(page: Page, out: Path) -> Iterator[Fault]:
-    """Yield the faults of Records that no task writes and the page shows: no receipt has their hash."""
-    from reports.record import read_records
-
-    for path in page.others:
-        try:
-            read_records([out / path])
-        except BadInput as error:
-            yield Fault("damaged", path, f"it {error.value}; `twillight bench {Path(path).stem}` measures it again")
 
 
 def _value_faults(part: Shard, path: Path, sha256: str) -> list[str]:

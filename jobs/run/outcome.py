@@ -74,7 +74,7 @@ def work(
     threads : int
         Tasks that this process may do at the same time.
     """
-    own = task.alone or (threads > 1 and not task.shares_process)
+    own = task.slots == "all" or (threads > 1 and not task.shares_process)
     start = time.perf_counter()
     try:
         with _workspace(task, out, inputs) as folder:

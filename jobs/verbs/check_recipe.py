@@ -23,7 +23,6 @@ from jobs.run.faults import Fault, faults
 from jobs.run.ledger import Ledger
 from jobs.run.progress_forms import ProgressForm
 from jobs.terminal import Terminal
-from jobs.verbs.bench import measured_alone
 from jobs.verbs.run import work
 from weaves.errors import BadInput, WorkFailed
 
@@ -96,7 +95,7 @@ def exit_code(found: Sequence[Fault]) -> int:
 def _found(name: str, out: Path, add: Sequence[str]) -> tuple[list[Task], list[Fault]]:
     """Return the plan of a recipe and the faults of its files."""
     recipe = load_recipe(name, add)
-    tasks = plan(recipe, measured_alone(out))
+    tasks = plan(recipe)
     console = Terminal(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         bar = progress.add_task("checking", total=1.0)

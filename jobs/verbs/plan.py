@@ -1,14 +1,14 @@
-"""`twillight plan`: what would run and why, with rows, bytes and time; and how long it takes on some workers."""
+"""`twillight plan`: what would run and why, with rows and time; and how long it takes on some workers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from rich.table import Table
 
-from jobs.console import duration, size, table_of
+from jobs.console import duration, table_of
 from jobs.plan.estimate import Estimate
 from jobs.plan.plan import plan
 from jobs.plan.schedule import LEAST_GAIN, Schedule, doublings, longest_chain, schedule
@@ -17,7 +17,6 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE, reasons
 from jobs.terminal import Terminal
-from jobs.verbs.bench import measured_alone
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
@@ -34,15 +33,12 @@ class Facts(NamedTuple):
         Why each task that is not done would run, by its id.
     seconds : dict
         Duration of every task: measured, or estimated and scaled by what was measured of its kind.
-    bytes : dict
-        Size of every task's products: measured or estimated.
     measured : int
         Number of tasks with a measured duration.
     """
 
     why: dict[str, str]
     seconds: dict[str, float]
-    bytes: dict[str, int]
     measured: int
 
     def left(self, tasks: Sequence[Task]) -> list[Task]:
@@ -60,7 +56,7 @@ def print_plan(recipe: str, out: Path, workers: int = 0, add: Sequence[str] = ()
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 1 to {MOST_WORKERS}")
-    tasks = plan(load_recipe(recipe, add), measured_alone(out))
+    tasks = plan(load_recipe(recipe, add))
     facts = facts_of(tasks, Ledger(out))
     console = Terminal()
     console.print(plan_table(tasks, facts))
@@ -80,19 +76,18 @@ def facts_of(tasks: Sequence[Task], ledger: Ledger) -> Facts:
     for task in tasks:
         if receipt := measured.get(task.id):
             estimate.learn(task, receipt.seconds)
-    seconds, bytes_ = {}, {}
+    seconds = {}
     for task in tasks:
         if receipt := measured.get(task.id):
             seconds[task.id] = receipt.seconds
-            bytes_[task.id] = sum(product.bytes for product in receipt.files.values())
         else:
-            seconds[task.id], bytes_[task.id] = estimate.seconds(task), task.size
-    return Facts(why, seconds, bytes_, len(measured))
+            seconds[task.id] = estimate.seconds(task)
+    return Facts(why, seconds, len(measured))
 
 
 def plan_table(tasks: Sequence[Task], facts: Facts) -> Table:
-    """Show a plan by stage, kind and reason: tasks, rows, bytes and time on one core; totals of what would run."""
-    right = ("tasks", "rows", "size", "one core")
+    """Show a plan by stage, kind and reason: tasks, rows and time on one core; totals of what would run."""
+    right = ("tasks", "rows", "one core")
     table = table_of("stage", "what", *right, "why", right=right)
     for stage in STAGES:
         groups: dict[tuple[str, str], list[Task]] = {}
@@ -144,30 +139,21 @@ def schedule_table(tasks: Sequence[Task], facts: Facts, workers: int) -> Table:
 
 
 def _notes(tasks: Sequence[Task], facts: Facts, chosen: Schedule, last: int) -> list[str]:
-    """Return sentences about a schedule: straggler tail, where it stops scaling, bytes, and what was measured."""
+    """Return sentences about a schedule: straggler tail, where it stops scaling, and what was measured."""
     chain = longest_chain(tasks, facts.seconds)
-    written, read = moved(tasks, facts.bytes)
     return [
         f"{chosen.workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
         "workers (tail)",
         f"more than {max(1, last // 2):,} workers save less than {LEAST_GAIN:.0%} each time they double; the longest "
         f"chain of tasks takes {duration(chain)}",
-        f"moved: {size(written)} written, up to {size(read)} read",
         f"{facts.measured:,} of {len(tasks):,} durations are measured, the others estimated",
     ]
 
 
-def moved(tasks: Sequence[Task], bytes_: Mapping[str, int]) -> tuple[int, int]:
-    """Return the bytes that tasks write, and read at most: all products that each needs, and each once to verify it."""
-    written = sum(bytes_.values())
-    return written, written + sum(bytes_.get(need, 0) for task in tasks for need in task.needs)
-
-
-def _sums(tasks: Sequence[Task], facts: Facts) -> tuple[str, str, str, str]:
-    rows, bytes_ = sum(task.rows for task in tasks), sum(facts.bytes[task.id] for task in tasks)
+def _sums(tasks: Sequence[Task], facts: Facts) -> tuple[str, str, str]:
+    rows = sum(task.rows for task in tasks)
     return (
         f"{len(tasks):,}",
         f"{rows:,}" if rows else "",
-        size(bytes_) if bytes_ else "",
         duration(sum(facts.seconds[task.id] for task in tasks)),
     )

@@ -1,7 +1,7 @@
 """`twillight prune`: files in the output folder that none of some recipes needs, listed or removed.
 
 Removed are products with their receipts, manifests, and what stopped tasks left. Files that no task made, such as crash
-reports, the recipes of `twillight require` and the Records of `twillight bench truth`, are listed apart and kept.
+reports and the recipes of `twillight require`, are listed apart and kept.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
-from jobs.verbs.bench import measured_alone
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
 
@@ -74,10 +73,10 @@ def prune(recipes: Sequence[str], out: Path, delete: bool, add: Sequence[str] = 
 
 def _needed(recipes: Sequence[str], out: Path, add: Sequence[str]) -> set[str]:
     """Return the paths of all files that recipes need, receipts and notes of failures too."""
-    needed, alone = set[str](), measured_alone(out)
+    needed = set[str]()
     for name in recipes:
         recipe = load_recipe(name, add)
-        tasks = plan(recipe, alone)
+        tasks = plan(recipe)
         needed.update(own_files(recipe, tasks, out))
         ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in shards(one)}
         needed.update(f"ledger/{id}{ending}" for id in ids for ending in (".json", ".failed.json"))

@@ -23,7 +23,6 @@ from jobs.run.manifest_file import ManifestFile
 from jobs.run.progress_forms import ProgressForm
 from jobs.run.receipt import Product
 from jobs.terminal import Terminal
-from jobs.verbs.bench import measured_alone
 from weaves.errors import WorkFailed
 
 
@@ -46,7 +45,7 @@ def work(
         If any task failed; the others were done nevertheless.
     """
     recipe = load_recipe(recipe_name, add)
-    tasks = plan(recipe, measured_alone(out))
+    tasks = plan(recipe)
     console = Terminal()
     ledger = Ledger(out)
     with ledger.store.held():
@@ -98,7 +97,7 @@ def work(
 def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
     """Remove a finished page if times that it shows will be measured again: they will not be the same."""
     page = next(task for task in tasks if isinstance(task, Page))
-    timed = [task for task in tasks if task.alone and task.id in page.needs]
+    timed = [task for task in tasks if task.slots == "all" and task.id in page.needs]
     if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
         ledger.store.remove(page.products[0])
 

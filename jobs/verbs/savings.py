@@ -18,8 +18,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from jobs.plan.measurements.scene import OnScene
-from jobs.plan.measurements.scene_shot import SceneShot
+from jobs.plan.measurements.scenes import OnScene, SceneShot
 from jobs.plan.plan import plan
 from jobs.plan.task import Task
 from jobs.plan.training import Training
@@ -27,7 +26,6 @@ from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
-from jobs.verbs.bench import measured_alone
 from jobs.verbs.require_recipe import alone
 from pipeline.models.card import read_card
 from weaves.errors import BadInput
@@ -180,7 +178,7 @@ def _costs(
 
 def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
     """Refuse a page that a scene's recipe wrote before it was written anew."""
-    page = plan(own, measured_alone(out))[-1]
+    page = plan(own)[-1]
     if Ledger(out).state(page) != "done":
         raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {run}`")
 

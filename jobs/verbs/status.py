@@ -13,12 +13,11 @@ from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
-from jobs.verbs.bench import measured_alone
 
 
 def print_status(recipe: str, out: Path, add: Sequence[str] = ()) -> None:
     """Print the states of a recipe's tasks, with methods from outside in `add`."""
-    Terminal().print(status_table(plan(load_recipe(recipe, add), measured_alone(out)), Ledger(out)))
+    Terminal().print(status_table(plan(load_recipe(recipe, add)), Ledger(out)))
 
 
 def status_table(tasks: Sequence[Task], ledger: Ledger) -> Table:

@@ -155,14 +155,14 @@ def _of_scenes(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
-    """Yield what `bench truth`, `bench sampler` and `bench mitsuba` measured, if they were run."""
+    """Yield what the studies of a recipe measured (`reports.options.StudyName`)."""
     rates, accuracies = truth_rows.rate_rows(records), accuracy.RECORDS.from_records(records)
     biases, efforts = bias.RECORDS.from_records(records), effort.RECORDS.from_records(records)
     samplers, traced = sampling.RECORDS.from_records(records), path_traced.RECORDS.from_records(records)
     calibrations = calibration.RECORDS.from_records(records)
     losses = footprint_colours.RECORDS.from_records(records)
     if rates or accuracies or biases or efforts:
-        yield "## The ground truth (`twillight bench truth`)"
+        yield "## The ground truth (`twillight run truth`)"
     if rates:
         yield "### Speed"
         yield markdown_table(("what", "fabric", "rate", "note"), rates)
@@ -182,14 +182,14 @@ def _of_the_truth(records: Sequence[Record]) -> Iterator[str]:
         yield "### Loss by mean colours of the footprint where ends and picks differ in colour"
         yield markdown_table(("fabric", *truth_rows.COLOURS), truth_rows.colour_rows(losses))
     if samplers:
-        yield "## Sampling directions (`twillight bench sampler`)"
+        yield "## Sampling directions (`twillight run truth`)"
         yield (
             "How many times less variance than a cosine on both sides has, how many times less in equal time, and the "
             "time of one direction with its density."
         )
         yield markdown_table(("fabric", *truth_rows.SAMPLERS), truth_rows.sampler_rows(samplers))
     if traced:
-        yield "## Path-traced frames (`twillight bench mitsuba`)"
+        yield "## Path-traced frames (`twillight run mitsuba`)"
         yield (
             "Mean squared error of linear RGB over the squared mean of the frame, seconds of one processor, and the "
             "error of one random point a sample in equal time over this error."

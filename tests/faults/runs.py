@@ -115,7 +115,7 @@ def run(recipe, out, *arguments, **others):
 
 def hashes(recipe, out):
     """Return the hash of every product without times or a machine in it, and of the manifest."""
-    tasks = [task for task in plan(load_recipe(recipe)) if not task.alone and task.stage != "report"]
+    tasks = [task for task in plan(load_recipe(recipe)) if task.slots == "one" and task.stage != "report"]
     products = [out / path for task in tasks for path in task.products if not path.endswith(".machine.json")]
     files = products + sorted(out.glob("datasets/*/manifest.json"))
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}

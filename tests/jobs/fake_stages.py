@@ -81,7 +81,7 @@ class FakeBench(Fake):
 
 
 class FakeTiming(FakeBench):
-    alone: ClassVar = True
+    slots: ClassVar = "all"
 
 
 def task(name, kind=Fake, needs=(), **fields):

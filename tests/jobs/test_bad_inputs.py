@@ -203,8 +203,7 @@ generate smoke --scheduler tls://127.0.0.1:1 --tls-ca good.json --tls-key good.j
 train smoke
 bench smoke
 report smoke
-bench truth --workers 2
-bench stability --scheduler tcp://127.0.0.1:1
+bench stability
 status smoke --nothing
 results smoke
 results smoke --out good.json

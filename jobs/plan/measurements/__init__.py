@@ -1,7 +1,8 @@
-"""Kinds of measurement, one in each file: its identity, its tasks in a recipe, and its work.
+"""Kinds of measurement: what each depends on, its tasks in a recipe, and its work.
 
-`measurement.py` is their base class, `subjects.py` has their fabrics and models, `catalogue.py` lists them. References
-by the truth: the folder `images`, `scene_shot.py`. Measurements: `truth.py`, `method.py`, `latents.py`, `scene.py`,
-`frame_time.py`, `extremes.py`, `timing.py`, `added_metric.py`. `live_page.py` measures nothing; the page shows it. The
-code that measures is in `reports.measure`; it is imported when a task runs.
+`measurement.py` is their base class; what a task needs, its title and the names of its files follow from its fields.
+`subjects.py` has their fabrics and models. References by the truth: `truth_images.py`, `SceneShot` in `scenes.py`.
+Measurements: of methods on fabrics (`fabrics.py`), at their extremes and between fabrics (`models.py`), in scenes
+(`scenes.py`), in time (`timing.py`), and of the truth itself (`studies.py`). The code that measures is in
+`reports.measure` and `reports.truth`; it is imported when a task runs.
 """

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
 
 from jobs.plan.measurements.subjects import Subjects, Trained
-from jobs.plan.task import Progress, Stage, Task
+from jobs.plan.task import Made, Progress, Stage, Task, held
+from pipeline import versions
 from pipeline.models.added.added_method import AddedMethod
+from reports.added_metric import AddedMetric
+from reports.options import RunOptions
+from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
     from reports.record import Record
+
+_SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
+"""Fields that say what is measured, in the order of a title."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +40,15 @@ class Picture:
 
 
 class Measurement(Task):
-    """A task of the benchmark; each kind has a field ``kind``."""
+    """A task of the benchmark; each kind has a field ``kind``, the method `planned`, and `measure` or `run`."""
 
     stage: ClassVar[Stage] = "bench"
+    code: ClassVar[tuple[str, ...]] = ("bench",)
+    """Its code among `pipeline.versions`, beside that of its models and of their ways to run."""
+    seconds: ClassVar[float] = 1.0
+    """Estimated seconds on one core."""
+    timed: ClassVar[bool] = False
+    """True if it measures time, so that nothing may run beside it."""
 
     if TYPE_CHECKING:
 
@@ -48,14 +62,26 @@ class Measurement(Task):
         raise NotImplementedError
 
     @property
-    def name(self) -> str:
-        """Beginning of the names of its files."""
-        raise NotImplementedError
+    def subjects(self) -> tuple[str, ...]:
+        """What is measured: a model with its seed, a fabric, a view or a scene."""
+        values = (getattr(self, name, None) for name in _SUBJECTS)
+        return tuple(_label(value) for value in values if value is not None)
+
+    @property
+    def title(self) -> str:
+        """Kind and subjects."""
+        return f"{self.kind} of {', '.join(self.subjects)}" if self.subjects else self.kind
+
+    @property
+    def group(self) -> str:
+        """Kind."""
+        return self.kind
 
     @property
     def stem(self) -> str:
         """Path of its files without their endings."""
-        return f"records/{self.name}-{self.id[:8]}"
+        words = re.sub(r"[^A-Za-z0-9_.]+", "-", "-".join((self.kind, *self.subjects)))
+        return f"records/{words}-{self.id[:8]}"
 
     @property
     def records(self) -> str:
@@ -73,26 +99,36 @@ class Measurement(Task):
         return (self.records, f"{self.stem}.machine.json", *(picture.path for picture in self.pictures))
 
     @property
+    def slots(self) -> Literal["one", "all"]:
+        """All if it measures time."""
+        return "all" if self.timed else "one"
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return self.seconds
+
+    @property
     def threads(self) -> int:
         """Most threads that a method may use while it is measured."""
         return 1
 
-    @property
-    def trained(self) -> tuple[Trained, ...]:
-        """Models that it measures."""
-        return ()
-
-    @property
-    def runs_added_code(self) -> bool:
-        """True if code from outside is run."""
-        return any(isinstance(one.options, AddedMethod) for one in self.trained)
+    def versions(self) -> dict[str, int]:
+        """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
+        code, ways = {*self.code}, list(held(self, RunOptions))
+        code |= {"bound"} if any(one.bounds for one in ways) else set()
+        code |= {"fallback"} if any(one.wished_errors for one in ways) else set()
+        models = {model.options.name: model.options.version for model in held(self, Trained)}
+        return {name: getattr(versions, name.upper()) for name in code} | models
 
     def without(self, names: Sequence[str]) -> Self | None:
         """Return the measurement without some methods from outside; None if it measures one model alone."""
-        return None
+        models: tuple[Trained, ...] | None = getattr(self, "models", None)
+        left = models and tuple(model for model in models if model.options.name not in names)
+        return None if left is None else self.model_copy(update={"models": left})
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Measure, and write the Records; with methods from outside, in a process that can be ended.
+        """Measure, and write the Records; with code from outside, in a process that can be ended.
 
         A method that fails ends a measurement of it alone. One of several methods starts again without it.
 
@@ -101,7 +137,8 @@ class Measurement(Task):
         MethodFailed
             If the only method fails.
         """
-        if not self.runs_added_code:
+        added = [one for one in held(self, Trained) if isinstance(one.options, AddedMethod)]
+        if not added and not list(held(self, AddedMetric)):
             self.write(out, progress)
             return
         from pipeline.models.added.apart import run_apart
@@ -134,21 +171,45 @@ class Measurement(Task):
         assert measured is not None
         records = measured.measure(out, progress)
         records += [
-            Record(method=name, scene=self.of_scene, metric="not_run", value=1.0, note=reason)
+            Record(method=name, scene=getattr(self, "scene", ""), metric="not_run", value=1.0, note=reason)
             for name, reason in left_out.items()
         ]
-        origins = {one.options.name: one.options.origin for one in self.trained if isinstance(one.options, AddedMethod)}
+        models = [model.options for model in held(self, Trained)]
+        origins = {options.name: options.origin for options in models if isinstance(options, AddedMethod)}
         records = [one.made_by(origins[one.method]) if one.method in origins else one for one in records]
         write_records(out / self.records, records, this_machine(self.threads))
-
-    @property
-    def of_scene(self) -> str:
-        """Name of the scene that it is about; empty if there is none."""
-        return ""
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Return the Records; pictures are written."""
         raise NotImplementedError
+
+
+class Reference(Measurement):
+    """Files that other measurements or the page read; there are no Records."""
+
+    endings: ClassVar[tuple[str, ...]] = (".exr",)
+    """Of the files; the first one is what others read."""
+
+    @property
+    def records(self) -> str:
+        """No Records."""
+        return ""
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """A file an ending."""
+        return tuple(f"{self.stem}{ending}" for ending in self.endings)
+
+    @property
+    def made(self) -> Made:
+        """The file, as other measurements read it."""
+        return Made(task=self.id, path=self.products[0])
+
+
+def _label(subject: object) -> str:
+    if isinstance(subject, Trained):
+        return subject.title
+    return subject.name if isinstance(subject, Fabric | AddedMetric) else str(subject)
 
 
 def _write(task: Measurement, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:

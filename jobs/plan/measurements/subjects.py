@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Self
 
 from jobs.plan.dataset import Shard, fingerprint_of, folder_of
-from jobs.plan.task import PLACE, Made, Part, Place
+from jobs.plan.task import PLACE, Made, Place, TaskPart
 from jobs.plan.training import Training, seed_title
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from pipeline import versions
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint
 from reports.options import BenchOptions, Role, RunOptions, select
@@ -21,11 +20,12 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.models.fallback import Fallback
     from pipeline.models.method import Method
+    from pipeline.shards.manifest import Manifest
     from reports.record import Provenance
 
 
-class Dataset(Part):
-    """A data set's rows that a measurement reads."""
+class HeldOutRows(TaskPart):
+    """Held-out rows of a data set that a measurement reads."""
 
     fingerprint: str
     """Fingerprint of the whole data set."""
@@ -34,8 +34,21 @@ class Dataset(Part):
     folder: Place
     """Folder of the data set."""
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The tasks that make the rows."""
+        return self.rows
 
-class Trained(Part):
+    def opened(self, out: Path) -> tuple[Manifest, Path, Provenance]:
+        """Return the manifest, the folder, and the provenance of Records."""
+        from pipeline.shards.manifest import Manifest
+        from reports.record import Provenance
+
+        folder = out / self.folder
+        return Manifest.load(folder), folder, Provenance(dataset=self.fingerprint)
+
+
+class Trained(TaskPart):
     """A model, and the networks that were trained of it."""
 
     options: ModelOptions
@@ -44,11 +57,6 @@ class Trained(Part):
     """Its trained networks; none where nothing is trained."""
     seed: Annotated[int, PLACE] = 0
     """Seed of their training, which the ids of the networks depend on."""
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Ids of the trainings."""
-        return tuple(network.task for network in self.networks)
 
     @property
     def title(self) -> str:
@@ -64,6 +72,10 @@ class Trained(Part):
         """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
         settings = self.options.settings
         return tuple(f"k = {k}" for k in settings if k in counts) if settings else (self.options.variant,)
+
+    def seconds(self, queries: float) -> float:
+        """Return the estimated seconds in which one core answers so many queries with every setting."""
+        return queries * self.options.seconds[1] * (sum(self.options.settings) or 1)
 
     def provenance(self, dataset: str = "") -> Provenance:
         """Return the provenance of Records of this model."""
@@ -98,19 +110,13 @@ class Trained(Part):
         return others + [one.within(error) for one in estimating for error in ways.wished_errors]
 
 
-def ways_versions(ways: RunOptions) -> dict[str, int]:
-    """Return the versions of the energy bound and of the fallback, where networks are measured with them."""
-    found = {"bound": versions.BOUND} if ways.bounds else {}
-    return found | ({"fallback": versions.FALLBACK} if ways.wished_errors else {})
-
-
 @dataclass(frozen=True)
 class FabricSubject:
     """A named fabric, its role, and its test rows."""
 
     fabric: Fabric
     role: Role
-    dataset: Dataset
+    dataset: HeldOutRows
 
 
 @dataclass(frozen=True)
@@ -192,7 +198,7 @@ class Subjects:
         """Return the models of all seeds that answer for all of some fabrics, with the networks that do."""
         return [(model, trained) for model in self.models if (trained := model.on(fabrics))]
 
-    def dataset(self, names: Sequence[str]) -> Dataset:
+    def dataset(self, names: Sequence[str]) -> HeldOutRows:
         """Return the test rows of fabrics."""
         rows = [
             part.id
@@ -200,7 +206,7 @@ class Subjects:
             for part in self.shards
             if part.shard.fabric.name == name and part.shard.split == "test"
         ]
-        return Dataset(fingerprint=self._fingerprint, rows=tuple(rows), folder=folder_of(self.shards))
+        return HeldOutRows(fingerprint=self._fingerprint, rows=tuple(rows), folder=folder_of(self.shards))
 
     @cached_property
     def _fingerprint(self) -> str:

@@ -1,15 +1,22 @@
 """Measurements: every kind is planned, read back from its own dump, and says what it depends on."""
 
 from dataclasses import replace
-from typing import Annotated, Union
+from typing import Annotated, Union, get_args
 
+import numpy as np
 import pytest
 from pydantic import Field, TypeAdapter
 
-from jobs.plan.measurements.catalogue import KINDS
-from jobs.plan.plan import plan
+from jobs.plan.measurements.studies import Study
+from jobs.plan.plan import KINDS, plan
 from jobs.recipe.load import load_recipe
 from reports.added_metric import AddedMetric
+from reports.options import StudyName
+from reports.record import read_records
+from reports.truth import finding, path_traced, sampling, stability
+from reports.truth.path_traced import Traced
+from reports.truth.sampling import Saving
+from weaves.errors import WorkFailed
 
 ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa: UP007
 
@@ -17,7 +24,7 @@ ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa:
 @pytest.fixture(scope="module")
 def tasks():
     """The measurements of recipes that together have every kind."""
-    recipes = [load_recipe(name) for name in ("smoke", "standard", "curved")]
+    recipes = [load_recipe(name) for name in ("smoke", "standard", "curved", "mitsuba")]
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
     recipes[0] = replace(recipes[0], metrics=(AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),))
@@ -48,3 +55,38 @@ def test_what_a_measurement_needs_is_part_of_its_identity(tasks):
     for task in tasks:
         text = str(task.identity())
         assert all(need in text for need in task.needs), task.title
+
+
+def test_every_study_is_in_a_shipped_recipe():
+    named = {name: load_recipe(name).bench.studies for name in ("truth", "mitsuba")}
+    assert sorted(named["truth"] + named["mitsuba"]) == sorted(get_args(StudyName))
+
+
+@pytest.mark.parametrize(
+    ("module", "row"),
+    [
+        (sampling, Saving("lobes", "denim", 8.0, 5.0, 900.0, 2100.0, 100)),
+        (path_traced, Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.2)),
+    ],
+)
+def test_a_study_records_what_its_module_yields(tmp_path, monkeypatch, module, row):
+    monkeypatch.setattr(module, "measure", lambda: iter([row]))
+    study = Study(study=module.__name__.rpartition(".")[2])
+    (tmp_path / "records").mkdir()
+    study.run(tmp_path, lambda share: None)
+    assert module.RECORDS.from_records(read_records([tmp_path / study.records])) == [row]
+
+
+@pytest.mark.parametrize("value", [1.0, 1.1])
+def test_an_unstable_expression_fails_the_study(tmp_path, monkeypatch, value):
+    row = finding.judge("x", "corner", "float32", {"x": np.arange(1)}, [value], [1.0], 1e-6)
+    monkeypatch.setattr(stability, "stability", lambda: [row])
+    (tmp_path / "records").mkdir()
+    study = Study(study="stability")
+    if value == 1.0:
+        study.run(tmp_path, lambda share: None)
+        (found,) = finding.RECORDS.from_records(read_records([tmp_path / study.records]))
+        assert found.worst == pytest.approx(value - 1.0)
+    else:
+        with pytest.raises(WorkFailed, match=r"x in float32, corner: worst error 1\.0e-01"):
+            study.run(tmp_path, lambda share: None)

@@ -129,19 +129,18 @@ def test_a_colour_changes_what_is_shown_of_its_fabric_and_no_training(files, tas
 
 
 def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
-    assert not ids(tasks, "bench", ", edge")
+    assert not ids(tasks, "bench", "truth edge of ")
     # Models that know curved cloth.
     files.exchange('model = "woven"\nhidden = 32', 'model = "curved"')
     files.exchange('model = "neumip"', 'model = "neumip"\nignore_curvature = true')
     after = edited(files, "sigma = [0.05, 8.0]", "sigma = [0.05, 8.0]\ncurvature = [0.01, 0.5]")
-    edges = ids(after, "bench", ", edge")
+    edges = ids(after, "bench", "truth edge of ")
     assert len(edges) == 3
     for task in after:
-        if task.stage == "bench" and task.title.endswith(" on denim"):
-            assert task.kind == "truth" or edges[0] in task.needs
-            assert task.kind == "truth" or task.edge.path.startswith("records/truth-denim-edge-")
+        if task.stage == "bench" and task.kind == "errors" and task.fabric.name == "denim":
+            assert edges[0] in task.needs and task.edge.path.startswith("records/truth-edge-denim-")
     again = edited(files, "frames = 4", "frames = 4\nedge = { radius = 20.0 }")
-    assert set(ids(again, "bench", ", edge")).isdisjoint(edges)
+    assert set(ids(again, "bench", "truth edge of ")).isdisjoint(edges)
     assert ids(again, "bench", ", sphere") == ids(after, "bench", ", sphere")
 
 
@@ -155,22 +154,24 @@ def test_models_of_one_kind_are_told_apart_on_the_page(files):
 
 
 def test_truth_of_pictures_is_shared_by_all_models_and_data_sets(files, tasks):
-    pictures = ids(tasks, "bench", "truth of ")
-    assert len(pictures) == 3 * 3
-    assert ids(edited(files, "hidden = 32", "hidden = 16"), "bench", "truth of ") == pictures
-    assert ids(edited(files, "seed = 3", "seed = 4"), "bench", "truth of ") == pictures
-    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "truth of denim, sphere") == pictures[:1]
+    images = ("truth picture of ", "truth frames of ")
+    pictures, frames = (ids(tasks, "bench", kind) for kind in images)
+    assert (len(pictures), len(frames)) == (3 * 2, 3)
+    for change in (("hidden = 32", "hidden = 16"), ("seed = 3", "seed = 4")):
+        after = edited(files, *change)
+        assert [ids(after, "bench", kind) for kind in images] == [pictures, frames]
+    assert ids(edited(files, "frames = 4", "frames = 5"), "bench", "truth picture of denim, sphere") == pictures[:1]
 
 
 def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tasks):
     measured = {task.title: task for task in tasks if task.stage == "bench"}
     for fabric in ("denim", "own", "twill_4_4"):
         for method, trainings in (("woven", ids(tasks, "train", "woven")), ("point_sampled", [])):
-            assert measured[f"{method} on {fabric}"].model.needs == tuple(trainings)
-        neumip = measured[f"neumip on {fabric}"]
+            assert measured[f"errors of {method}, {fabric}"].model.needs == tuple(trainings)
+        neumip = measured[f"errors of neumip, {fabric}"]
         assert list(neumip.model.needs) == ids(tasks, "train", f"neumip on {fabric}")
         assert set(ids(tasks, "generate", f"{fabric} test")) < set(neumip.needs)
-    assert [task.title for task in tasks if task.alone] == ["latents of woven", "timing of all methods"]
+    assert [task.title for task in tasks if task.slots == "all"] == ["latents of woven", "timing of all methods"]
     assert set(measured["timing of all methods"].needs) > set(ids(tasks, "train"))
 
 
@@ -178,7 +179,7 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
     """One task a model, on test rows alone; all that is about the other fabrics is as it was, but for the data set."""
     unseen = '[dataset.unseen_population]\ncount = 2\nfamilies = ["irregular"]\n\n[dataset.queries]'
     planned = plan(load_recipe(files.exchange("[dataset.queries]", unseen).write()))
-    added = [task for task in planned if getattr(task, "kind", "") == "unseen population"]
+    added = [task for task in planned if getattr(task, "kind", "") == "errors on random fabrics"]
     assert [task.model.options.name for task in added] == ["woven", "point_sampled"]
     rows = [task for task in planned if getattr(task, "role", "") == "unseen_population"]
     assert {task.shard.split for task in rows} == {"test"} and {task.rows for task in rows} == {500}
@@ -221,16 +222,16 @@ def test_wished_errors_touch_methods_that_estimate_errors_alone(files):
     plain = edited(files, "[bench]", '[[models]]\nmodel = "selvage"\n\n[bench]')
     wished = edited(files, "frames = 4", "frames = 4\nwished_errors = [0.05]")
     assert ids(wished, "train") == ids(plain, "train")
-    for title in ("woven on denim", "neumip on denim"):
+    for title in ("errors of woven, denim", "errors of neumip, denim"):
         assert ids(wished, "bench", title) == ids(plain, "bench", title) != []
-    for title in ("selvage on denim", "timing of all methods"):
+    for title in ("errors of selvage, denim", "timing of all methods"):
         assert set(ids(wished, "bench", title)).isdisjoint(ids(plain, "bench", title))
 
 
 def test_ways_to_run_are_measured_again_and_nothing_is_trained_again(files, tasks):
     after = edited(files, "frames = 4", 'frames = 4\nruntimes = ["onnx", "eager-bf16"]')
     assert ids(after, "train") == ids(tasks, "train")
-    for title in ("woven on denim", "timing of all methods"):
+    for title in ("errors of woven, denim", "timing of all methods"):
         assert set(ids(after, "bench", title)).isdisjoint(ids(tasks, "bench", title))
 
 
@@ -239,14 +240,6 @@ def test_timing_options_touch_the_timing_and_the_page_alone(files, tasks):
     changed = {task.id for task in after} ^ {task.id for task in tasks}
     touched = [key for one in (tasks, after) for key in ids(one, "bench", "timing") + ids(one, "report")]
     assert changed == set(touched)
-
-
-def test_what_was_measured_without_a_recipe_touches_the_page_alone(files, tasks):
-    after = plan(load_recipe(files.path), {"records/truth.json": "0" * 64})
-    changed = {task.id for task in after} ^ {task.id for task in tasks}
-    assert changed == {key for one in (tasks, after) for key in ids(one, "report")}
-    other = plan(load_recipe(files.path), {"records/truth.json": "1" * 64})
-    assert ids(other, "report") != ids(after, "report")
 
 
 def test_no_two_tasks_write_one_file(tasks):
@@ -275,10 +268,10 @@ def test_settings_are_measured_on_scenes_one_by_one():
     more = points.options.model_copy(update={"counts": [*points.options.counts, 128]})
     models = [m.model_copy(update={"options": more}) if m is points else m for m in smoke.models]
     before, after = plan(smoke), plan(dataclasses.replace(smoke, models=tuple(models)))
-    title = "on the scene curtain"
+    title = "scene errors of point_sampled, curtain"
     assert len(ids(before, "bench", title)) == len(ids(after, "bench", title)) - 1
     assert set(ids(before, "bench", title)) < set(ids(after, "bench", title))
-    assert ids(after, "bench", f"point_sampled k = 128 {title}")
+    assert ids(after, "bench", f"{title}, k = 128")
 
 
 BTF = """

@@ -29,7 +29,7 @@ class Step(Task):
 
 
 class Alone(Step):
-    alone: ClassVar = True
+    slots: ClassVar = "all"
 
 
 @st.composite
@@ -53,16 +53,16 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
         for task in taken:
             able = [other for other in waiting.values() if done.issuperset(other.needs)]
             assert task in able
-            if task.alone:
-                assert not running and all(other.alone for other in able)
+            if task.slots == "all":
+                assert not running and all(other.slots == "all" for other in able)
             else:
-                assert len(running) < slots and not any(other.alone for other in running.values())
-            assert urgency[task.id] == max(urgency[other.id] for other in able if other.alone == task.alone)
+                assert len(running) < slots and not any(other.slots == "all" for other in running.values())
+            assert urgency[task.id] == max(urgency[other.id] for other in able if other.slots == task.slots)
             running[task.id] = waiting.pop(task.id)
         # No slot stays free that a task could have.
         able = [other for other in waiting.values() if done.issuperset(other.needs)]
-        if len(running) < slots and not any(other.alone for other in running.values()):
-            assert not [other for other in able if not other.alone]
+        if len(running) < slots and not any(other.slots == "all" for other in running.values()):
+            assert not [other for other in able if other.slots == "one"]
         assert running
         task = random.choice(list(running.values()))
         del running[task.id]

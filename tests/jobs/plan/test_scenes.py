@@ -18,15 +18,15 @@ def changed_by(version, path, monkeypatch):
 def test_what_is_measured_on_scenes_has_a_version_of_its_own(files, monkeypatch):
     path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
     changed = changed_by("SCENE_BENCH", path, monkeypatch)
-    assert "truth of the scene sphere" in changed and "point_sampled k = 1 on the scene sphere" in changed
-    assert all("scene" in title or "frame of sphere" in title or title.startswith("page") for title in changed)
+    assert "scene truth of sphere" in changed and "scene errors of point_sampled, sphere, k = 1" in changed
+    assert all("scene" in title or "frame time" in title or title.startswith("page") for title in changed)
 
 
 def test_answers_of_the_fallback_have_a_version_of_their_own(files, monkeypatch):
     path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
     changed = changed_by("FALLBACK", path, monkeypatch)
-    expected = {"truth of the scene sphere", "point_sampled k = 1 on the scene sphere", "time of a frame of sphere"}
-    assert expected < set(changed) and "point_sampled on denim" not in changed
+    expected = {"scene truth of sphere", "scene errors of point_sampled, sphere, k = 1", "frame time of sphere"}
+    assert expected < set(changed) and "errors of point_sampled, denim" not in changed
 
 
 def test_a_live_page_has_the_version_of_its_scripts(files, monkeypatch):

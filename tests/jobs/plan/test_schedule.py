@@ -23,7 +23,7 @@ class Step(Task):
 
 
 class Alone(Step):
-    alone: ClassVar = True
+    slots: ClassVar = "all"
 
 
 def of(tasks, seconds):

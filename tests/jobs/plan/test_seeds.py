@@ -2,13 +2,10 @@
 
 import pytest
 
-from jobs.plan.measurements.errors_by_size import ErrorsBySize
-from jobs.plan.measurements.extremes import Extremes
-from jobs.plan.measurements.frame_time import FrameTime
-from jobs.plan.measurements.latents import Latents
-from jobs.plan.measurements.method import OnFabric
-from jobs.plan.measurements.scene import OnScene
-from jobs.plan.measurements.timing import Timing
+from jobs.plan.measurements.fabrics import ErrorsBySize, OnFabric
+from jobs.plan.measurements.models import AtExtremes, Latents
+from jobs.plan.measurements.scenes import FrameTime, OnScene
+from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.plan import plan
 from jobs.plan.training import Training
 from jobs.recipe.load import load_recipe
@@ -67,7 +64,7 @@ def test_each_training_of_one_material_has_every_seed(one, files):
     assert [made.task for made in by_size.model.networks] == [task.id for task in found[1]]
 
 
-@pytest.mark.parametrize("kind", [OnFabric, OnScene, Extremes])
+@pytest.mark.parametrize("kind", [OnFabric, OnScene, AtExtremes])
 def test_errors_are_measured_of_every_training(one, three, kind):
     before, after = of(one, kind), of(three, kind)
     assert list(after) == [0, 1, 2] and {len(same) for same in after.values()} == {len(before[0])}
@@ -82,7 +79,7 @@ def test_errors_by_size_of_further_trainings_have_tasks_of_their_own(one, three)
 
 
 def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
-    for kind in (Timing, FrameTime, Latents):
+    for kind in (TimeOfMethods, FrameTime, Latents):
         assert [task.id for task in one if isinstance(task, kind)] == [t.id for t in three if isinstance(t, kind)]
     assert one[-1].pictures == three[-1].pictures
     for kind in (OnFabric, OnScene):

@@ -50,7 +50,9 @@ def test_a_given_method_is_one_more_model(files, theirs):
     path = files.write()
     before, after = ids(load_recipe(path)), ids(load_recipe(path, [theirs]))
     new = after.keys() - before.keys()
-    assert new == {f"bench theirs on {name}" for name in ("denim", "own", "twill_4_4")} | {"bench extremes of theirs"}
+    assert new == {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")} | {
+        "bench extremes of theirs"
+    }
     changed = {title for title in before if after[title] != before[title]}
     assert changed == {"bench timing of all methods", "report page of tiny"}
 
@@ -85,7 +87,7 @@ def test_a_network_is_trained_and_measured_of_each_seed(files, theirs, tmp_path,
     general = [tuple(fabric.name for fabric in (*recipe.seen, *recipe.population))]
     assert [task.fabrics for task in trained] == 2 * (groups if one_material else general)
     assert [task.training.seed for task in trained] == sorted([4, 5] * (3 if one_material else 1))
-    measured = [task for task in tasks if task.stage == "bench" and task.group == "theirs"]
+    measured = [task for task in tasks if task.stage == "bench" and "theirs" in task.title]
     assert measured and all({task.id for task in trained} & set(task.needs) for task in measured)
     (note,) = [note for note in tasks[-1].models if note.name == "theirs"]
     assert note.learns and note.about.startswith("from outside this package: theirs.py, version 3, SHA-256 ")
@@ -134,7 +136,7 @@ def test_a_recipe_has_its_options_and_its_name(files, theirs):
     files.exchange("limit = 5", "limit = 50").write()
     assert ids(load_recipe(path, [theirs])) == first
     files.exchange("rows = 9", "rows = 10").write()
-    assert ids(load_recipe(path, [theirs]))["bench other on denim"] != first["bench other on denim"]
+    assert ids(load_recipe(path, [theirs]))["bench errors of other, denim"] != first["bench errors of other, denim"]
 
 
 @pytest.mark.parametrize("model", ["theirs", "added", "theirs:Theirs"])
@@ -188,7 +190,7 @@ def test_a_metric_is_measured_of_every_model_on_every_fabric(files, tmp_path):
     path = files.write()
     before, after = ids(load_recipe(path)), ids(load_recipe(path, [f"{tmp_path / 'metrics.py'}:largest"]))
     models, fabrics = ("woven", "neumip", "point_sampled"), ("denim", "own", "twill_4_4")
-    assert after.keys() - before.keys() == {f"bench largest of {m} on {f}" for m in models for f in fabrics}
+    assert after.keys() - before.keys() == {f"bench added metric of largest, {m}, {f}" for m in models for f in fabrics}
     assert {title for title in before if after[title] != before[title]} == {"report page of tiny"}
 
 
@@ -218,4 +220,4 @@ def test_an_installed_package_has_its_version(files, tmp_path, monkeypatch):
     assert (found.source, found.distribution, found.folder) == ("their_package:Theirs", "their-distribution 1.2", "")
     before = ids(load_recipe(path))
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: their-distribution\nVersion: 1.3\n")
-    assert ids(load_recipe(path))["bench theirs on denim"] != before["bench theirs on denim"]
+    assert ids(load_recipe(path))["bench errors of theirs, denim"] != before["bench errors of theirs, denim"]

@@ -136,7 +136,7 @@ def test_this_recipes_own_rows_and_trainings_stay_what_they_are(asks, files):
     own = [task for task in tasks if task.stage == "generate" and not task.products[0].startswith("datasets/bent-")]
     assert [task.id for task in own] == ids(plain, "generate")
     assert set(ids(plain, "train")) < set(ids(tasks, "train"))
-    for title in ("woven on denim", "point_sampled on own", "truth on twill_4_4"):
+    for title in ("errors of woven, denim", "errors of point_sampled, own", "truth noise of twill_4_4"):
         assert ids(tasks, "bench", title) == ids(plain, "bench", title)
 
 
@@ -157,18 +157,22 @@ def test_what_is_trained_again(asks, old, new, retrained):
     before, after = plan(asks()), plan(asks(TRAINER.replace(old, new)))
     assert (ids(before, "train", "curved") != ids(after, "train", "curved")) == retrained
     assert ids(before, "train", "woven") == ids(after, "train", "woven")
-    changed = ids(before, "bench", "curved on denim") != ids(after, "bench", "curved on denim")
+    changed = ids(before, "bench", "errors of curved, denim") != ids(after, "bench", "errors of curved, denim")
     assert changed == retrained
-    assert ids(before, "bench", "woven on denim") == ids(after, "bench", "woven on denim")
+    assert ids(before, "bench", "errors of woven, denim") == ids(after, "bench", "errors of woven, denim")
 
 
 def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, files):
     files.recipe += '\n[bench.scenes]\nnames = ["curtain", "dinner_table"]\n'
     tasks = plan(asks())
     titles = {task.title: task for task in tasks if task.stage == "bench"}
-    assert "curved on denim" in titles and "curved on own" in titles and "curved on twill_4_4" not in titles
-    assert list(titles["curved on denim"].model.needs) == ids(tasks, "train", "curved on denim")
-    assert "curved on the scene curtain" in titles and "curved on the scene dinner_table" not in titles
+    assert (
+        "errors of curved, denim" in titles
+        and "errors of curved, own" in titles
+        and "errors of curved, twill_4_4" not in titles
+    )
+    assert list(titles["errors of curved, denim"].model.needs) == ids(tasks, "train", "curved on denim")
+    assert "scene errors of curved, curtain" in titles and "errors in the scene of curved, dinner_table" not in titles
     assert [fabric.name for fabric, _ in titles["extremes of curved"].fabrics] == ["denim"]
     notes = {note.name: note.about for note in tasks[-1].models}
     assert "trained by the recipe bent, on queries of its own" in notes["curved"]
@@ -244,7 +248,7 @@ def test_ways_to_run_are_this_recipes_to_say(asks, files):
     assert none.models[-1].measured(none.bench).runtimes == ()
     before, after = plan(every), plan(none)
     assert ids(before, "train") == ids(after, "train")
-    for title, same in (("curved on denim", False), ("timing of all", False), ("woven on denim", True)):
+    for title, same in (("errors of curved, denim", False), ("timing of all", False), ("errors of woven, denim", True)):
         assert (ids(before, "bench", title) == ids(after, "bench", title)) == same
 
 
@@ -252,7 +256,7 @@ def test_ways_to_run_are_nothing_to_methods_without_a_network(files):
     before = plan(load_recipe(files.write()))
     after = plan(load_recipe(files.exchange("frames = 4", 'frames = 4\nruntimes = ["onnx"]').write()))
     assert ids(before, "bench", "point_sampled on") == ids(after, "bench", "point_sampled on")
-    assert ids(before, "bench", "truth on") == ids(after, "bench", "truth on")
+    assert ids(before, "bench", "truth noise") == ids(after, "bench", "truth noise")
     assert set(ids(before, "bench", "woven on")).isdisjoint(ids(after, "bench", "woven on"))
 
 
@@ -315,7 +319,7 @@ def test_other_physics(asks):
 def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):
     tasks = plan(asks(GENERAL, SHEER, "sheer"))
     for fabric in ("denim", "own", "twill_4_4"):
-        (task,) = [task for task in tasks if task.title == f"woven_sheer on {fabric}"]
+        (task,) = [task for task in tasks if task.title == f"errors of woven_sheer, {fabric}"]
         assert list(task.model.needs) == ids(tasks, "train", "woven_sheer")
 
 

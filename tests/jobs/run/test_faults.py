@@ -5,12 +5,10 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import faults, is_leftover, own_files, task_faults
 from jobs.run.ledger import Ledger
-from jobs.verbs.bench import TRUTH, measured_alone
 from pipeline import versions
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT
 from pipeline.training.loop import ROWS
-from reports.record import Record, machine_path, this_machine, write_records
 from tests.jobs import made_up
 
 RECIPE = """
@@ -94,16 +92,6 @@ def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
     assert {fault.kind for fault in task_faults(one, ledger)} == {"damaged"}
     assert kinds(task_faults(other, ledger)) == [("damaged", other.products[0])]
     assert ledger.discard(other) == [other.products[0]]
-
-
-def test_damaged_records_that_no_task_writes_are_named(trade, tmp_path):
-    recipe, _, ledger = trade
-    path = ledger.out / TRUTH
-    write_records(path, [Record(method="truth")], this_machine(1))
-    assert not [fault for fault in faults(recipe, plan(recipe, measured_alone(ledger.out)), ledger) if not fault.task]
-    machine_path(path).write_text(machine_path(path).read_text().replace('"threads": 1', '"threads": 9'))
-    found = [fault for fault in faults(recipe, plan(recipe, measured_alone(ledger.out)), ledger) if not fault.task]
-    assert kinds(found) == [("damaged", TRUTH)] and "`twillight bench truth`" in found[0].why
 
 
 def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):

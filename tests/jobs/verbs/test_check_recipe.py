@@ -149,7 +149,7 @@ def test_values_that_were_never_right_are_odd(run):
 
 
 def test_a_measurement_of_time_is_taken_again_and_shown(run):
-    timing = next(task for task in run.tasks if task.alone)
+    timing = next(task for task in run.tasks if task.slots == "all")
     expected = made_up.contents(run.out)
     flip(run.out / timing.records)
     assert run("--repair")[0] == 0
@@ -160,7 +160,7 @@ def test_a_measurement_of_time_is_taken_again_and_shown(run):
 
 
 def test_a_run_writes_the_page_again_if_times_are_missing(run, capsys):
-    timing, page = next(task for task in run.tasks if task.alone), run.of(Page)
+    timing, page = next(task for task in run.tasks if task.slots == "all"), run.of(Page)
     before = (run.out / page.products[0]).read_bytes()
     (run.out / timing.records).unlink()
     command = [str(run.out.parent / "tiny.toml"), "--out", str(run.out)]
@@ -200,7 +200,7 @@ def rounds(run, count, flips):
         assert run("--repair")[0] == 0
         assert run()[0] == 0
         found = made_up.contents(run.out)
-        times = {path for task in run.tasks if task.alone or isinstance(task, Page) for path in task.products}
+        times = {path for task in run.tasks if task.slots == "all" or isinstance(task, Page) for path in task.products}
         times |= {f"ledger/{task.id}.json" for task in run.tasks if task.stage == "bench" or isinstance(task, Page)}
         same(found, expected, but=times)
         assert not receipts & {task.id for task in run.tasks if Ledger(run.out).receipt(task) is None}

@@ -8,7 +8,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE
 from jobs.run.receipt import Product
-from jobs.verbs.plan import facts_of, moved
+from jobs.verbs.plan import facts_of
 from weaves.errors import BadInput
 
 
@@ -55,17 +55,13 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
     for task in new:
         assert 1.5 * task.cost < facts.seconds[task.id] < 2.1 * task.cost
     training = next(task for task in tasks if task.stage == "train")
-    assert facts.seconds[training.id] > 1.5 * training.cost and facts.bytes[training.id] == training.size
-    assert {facts.bytes[task.id] for task in shared} == {1}
-    written, read = moved([*shared, training], facts.bytes)
-    assert written == sum(facts.bytes.values())
-    assert read == written + sum(facts.bytes[need] for need in training.needs)
+    assert facts.seconds[training.id] > 1.5 * training.cost
 
 
 def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys):
     assert main(["plan", str(files.path), "--out", str(out), "--workers", "3"]) == 0
     told = capsys.readouterr().out.replace("\n", " ")
-    for part in ("3 workers: ", "workers save less than 5%", "moved: ", "durations are measured"):
+    for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in " ".join(told.split())
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from jobs.cli import main
-from jobs.plan.measurements.scene import OnScene
-from jobs.plan.measurements.scene_shot import SceneShot
+from jobs.plan.measurements.scenes import OnScene, SceneShot
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
@@ -202,7 +201,7 @@ def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
             Ledger(runs.out).finish(task, files, 1.0)
     row = by_quantity(runs)[DIFFERENCE]
     assert row.narrow == pytest.approx((-0.03, -0.03, -0.03), rel=1e-5) and math.isnan(row.ratio)
-    for path in runs.out.glob("records/scene-sphere-*.npz"):  # of the right size, with other bytes
+    for path in runs.out.glob("records/scene-truth-sphere-*.npz"):  # of the right size, with other bytes
         path.write_bytes(b"\0" * path.stat().st_size)
     assert DIFFERENCE not in by_quantity(runs)
 

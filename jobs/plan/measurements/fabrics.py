@@ -1,0 +1,291 @@
+"""Measurements on fabrics: of the truth, of a model on one fabric, on random unseen ones, by the size of footprints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from jobs.plan.measurements.measurement import Measurement, Picture
+from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
+from jobs.plan.measurements.truth_images import TruthEdge, TruthFrames, TruthPicture
+from jobs.plan.task import Coloured, Made, Progress
+from pipeline.scenes.options import View
+from reports.added_metric import AddedMetric
+from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
+
+if TYPE_CHECKING:
+    from reports.record import Record
+
+
+class TruthNoise(Measurement):
+    """The truth's noise on a fabric's held-out queries, and the motion in its frames."""
+
+    kind: Literal["truth noise"] = "truth noise"
+    fabric: Coloured
+    """The fabric."""
+    role: Role
+    """Role of the fabric."""
+    dataset: HeldOutRows
+    """Held-out queries of the fabric."""
+    errors: ErrorOptions
+    """Number of these queries."""
+    frames: Made
+    """The truth's frames."""
+    frame_options: FrameOptions
+    """Options of the frames."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a fabric."""
+        bench = subjects.recipe.bench
+        for subject in subjects.fabrics:
+            yield cls(
+                fabric=subject.fabric,
+                role=subject.role,
+                dataset=subject.dataset,
+                errors=select(ErrorOptions, bench),
+                frames=TruthFrames.of(subject.fabric, subjects.recipe).made,
+                frame_options=select(FrameOptions, bench),
+            )
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure it."""
+        from reports.measure.frames import measure_truth_frames
+        from reports.measure.held_out import measure_truth
+
+        manifest, folder, about = self.dataset.opened(out)
+        records = measure_truth(manifest, folder, self.fabric.name, self.role, self.errors, about)
+        frames = out / self.frames.path
+        return records + measure_truth_frames(self.fabric, self.role, self.frame_options, frames, about)
+
+
+class OnFabric(Measurement):
+    """All methods of a model, one a setting, on one fabric: errors, white furnace, aliasing, silhouettes, pictures."""
+
+    kind: Literal["errors"] = "errors"
+    model: Trained
+    """The model."""
+    ways: RunOptions
+    """Ways to run it that are measured too."""
+    fabric: Coloured
+    """The fabric."""
+    role: Role
+    """Role of the fabric."""
+    dataset: HeldOutRows
+    """Held-out queries of the fabric."""
+    errors: ErrorOptions
+    """Number of these queries."""
+    frames: Made
+    """The truth's frames."""
+    frame_options: FrameOptions
+    """Options of the frames."""
+    views: dict[View, Made]
+    """The truth's pictures."""
+    picture_options: PictureOptions
+    """Options of the pictures."""
+    shown: tuple[str, ...]
+    """Settings that pictures are made of."""
+    edge: Made | None
+    """The truth's edge, where cloth is curved."""
+    edge_options: EdgeOptions | None
+    """Options of the edge."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a fabric, model that answers for it, and seed; pictures are made of the first seed alone."""
+        recipe, bench = subjects.recipe, subjects.recipe.bench
+        for subject in subjects.fabrics:
+            frames, edge = TruthFrames.of(subject.fabric, recipe), TruthEdge.of(subject.fabric, recipe)
+            views = {view: picture.made for view, picture in TruthPicture.of(subject.fabric, bench).items()}
+            for model, trained in subjects.answering([subject.fabric.name]):
+                yield cls(
+                    model=trained,
+                    ways=model.ways(bench),
+                    fabric=subject.fabric,
+                    role=subject.role,
+                    dataset=subject.dataset,
+                    errors=select(ErrorOptions, bench),
+                    frames=frames.made,
+                    frame_options=select(FrameOptions, bench),
+                    views=views if model.is_first else {},
+                    picture_options=select(PictureOptions, bench),
+                    shown=trained.shown(bench.picture_counts) if model.is_first else (),
+                    edge=edge.made if edge else None,
+                    edge_options=bench.edge if edge else None,
+                )
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """A picture a view and setting shown."""
+        return tuple(
+            Picture(self.fabric.name, view, self.model.options.name, setting, self.picture(setting, view))
+            for setting in self.shown
+            for view in self.views
+        )
+
+    def picture(self, setting: str, view: View) -> str:
+        """Return the path of the picture of a setting."""
+        return "-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr"
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        width, height = self.frame_options.frame_size
+        pixels = sum(math.prod(self.picture_options.size(view)) for view in self.views)
+        return 1.0 + self.model.seconds(self.frame_options.frames * width * height + self.errors.rows + pixels)
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure one method after the other."""
+        from reports.measure.frames import measure_aliasing
+        from reports.measure.furnace import measure_furnace
+        from reports.measure.held_out import measure_errors
+        from reports.measure.pictures import render_method
+        from reports.measure.silhouette import measure_silhouette
+
+        manifest, folder, _ = self.dataset.opened(out)
+        about, fabric, role = self.model.provenance(self.dataset.fingerprint), self.fabric, self.role
+        frames, records = out / self.frames.path, []
+        methods = self.model.methods(out)
+        methods += self.model.variants(methods, self.ways)
+        for index, method in enumerate(methods):
+            records += measure_errors(method, manifest, folder, fabric.name, role, self.errors, about)
+            records += measure_furnace(method, fabric, role, about)
+            records += measure_aliasing(method, fabric, role, self.frame_options, frames, about)
+            if self.edge and self.edge_options:
+                records += measure_silhouette(method, fabric, role, self.edge_options, out / self.edge.path, about)
+            for view, truth in self.views.items() if method.setting in self.shown else ():
+                path = out / self.picture(method.setting, view)
+                options = self.picture_options
+                records += render_method(method, fabric, role, view, options, out / truth.path, path, about)
+            progress((index + 1) / len(methods))
+        return records
+
+
+class OnUnseenPopulation(Measurement):
+    """All methods of a model, one a setting, on every random unseen fabric.
+
+    There are no pictures of them: the truth of one picture costs more than all held-out queries of a fabric.
+    """
+
+    kind: Literal["errors on random fabrics"] = "errors on random fabrics"
+    model: Trained
+    """The model."""
+    ways: RunOptions
+    """Ways to run it that are measured too."""
+    fabrics: tuple[Coloured, ...]
+    """The fabrics."""
+    dataset: HeldOutRows
+    """Held-out queries of the fabrics."""
+    errors: ErrorOptions
+    """Number of these queries, each fabric."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a seed and model that answers for all of the fabrics: models of one material do not."""
+        fabrics = tuple(subject.fabric for subject in subjects.unseen_population)
+        names, bench = [fabric.name for fabric in fabrics], subjects.recipe.bench
+        for model, trained in subjects.answering(names) if names else ():
+            yield cls(
+                model=trained,
+                ways=model.ways(bench),
+                fabrics=fabrics,
+                dataset=subjects.dataset(names),
+                errors=select(ErrorOptions, bench),
+            )
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 1.0 + self.model.seconds(len(self.fabrics) * self.errors.rows)
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure one method after the other."""
+        from reports.measure.held_out import measure_errors
+
+        manifest, folder, _ = self.dataset.opened(out)
+        about, records = self.model.provenance(self.dataset.fingerprint), []
+        methods = self.model.methods(out)
+        methods += self.model.variants(methods, self.ways)
+        pairs = [(method, fabric.name) for method in methods for fabric in self.fabrics]
+        for index, (method, name) in enumerate(pairs):
+            records += measure_errors(method, manifest, folder, name, "unseen", self.errors, about)
+            progress((index + 1) / len(pairs))
+        return records
+
+
+class ErrorsBySize(Measurement):
+    """Errors of one training of a model by the size of footprints, on the held-out queries of all fabrics.
+
+    Those of the first training are measured with its times.
+    """
+
+    kind: Literal["errors by size"] = "errors by size"
+    seconds: ClassVar = 3.0
+    model: Trained
+    """The model with the networks of all fabrics."""
+    dataset: HeldOutRows
+    """The held-out queries of all fabrics."""
+    seed: int
+    """Seed of the points of random methods."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a model and seed after its first."""
+        dataset = subjects.dataset([subject.fabric.name for subject in subjects.fabrics])
+        for model in subjects.models:
+            if not model.is_first:
+                yield cls(model=model.whole, dataset=dataset, seed=subjects.recipe.bench.seed)
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure all classes of footprints."""
+        from reports.measure.by_size import measure_errors_by_size
+
+        manifest, folder, _ = self.dataset.opened(out)
+        about = self.model.provenance(self.dataset.fingerprint)
+        return measure_errors_by_size(self.model.methods(out), manifest, folder, self.seed, about)
+
+
+class OfAddedMetric(Measurement):
+    """A metric from outside, of all methods of a model, on the held-out queries of a fabric."""
+
+    kind: Literal["added metric"] = "added metric"
+    metric: AddedMetric
+    """The metric."""
+    model: Trained
+    """The model."""
+    fabric: Coloured
+    """The fabric."""
+    role: Role
+    """Role of the fabric."""
+    dataset: HeldOutRows
+    """Held-out queries of the fabric."""
+    errors: ErrorOptions
+    """Number of these queries."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a metric, fabric, model that answers for it, and seed."""
+        for metric in subjects.recipe.metrics:
+            for subject in (*subjects.fabrics, *subjects.unseen_population):
+                for _, trained in subjects.answering([subject.fabric.name]):
+                    yield cls(
+                        metric=metric,
+                        model=trained,
+                        fabric=subject.fabric,
+                        role=subject.role,
+                        dataset=subject.dataset,
+                        errors=select(ErrorOptions, subjects.recipe.bench),
+                    )
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure one method after the other."""
+        from reports.measure.held_out import measure_added
+
+        manifest, folder, _ = self.dataset.opened(out)
+        about = self.model.provenance(self.dataset.fingerprint)
+        return [
+            measure_added(one, self.metric, manifest, folder, self.fabric.name, self.role, self.errors, about)
+            for one in self.model.methods(out)
+        ]

@@ -1,0 +1,105 @@
+"""Measurements of a model away from the queries of a data set: at its extremes, and between fabrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from jobs.plan.measurements.measurement import Measurement
+from jobs.plan.measurements.subjects import FabricSubject, Subjects, Trained
+from jobs.plan.task import Progress, Uncoloured
+from pipeline.models.domain import PHYSICS
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.options import TruthOptions
+from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH, LATENT_PAIRS, Role
+from weaves.fabric import load_fabric
+
+if TYPE_CHECKING:
+    from reports.record import Record
+
+
+class AtExtremes(Measurement):
+    """All methods of a model at extreme sizes, angles and places, trained ones in half precision too."""
+
+    kind: Literal["extremes"] = "extremes"
+    code: ClassVar = ("truth", "extremes")
+    seconds: ClassVar = 3.0
+    model: Trained
+    """The model."""
+    fabrics: tuple[tuple[Uncoloured, Role], ...]
+    """One fabric of each role."""
+    truth: TruthOptions
+    """The recipe's physics, at a fixed precision."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a model and seed, on the first fabric of each role that it answers for."""
+        physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
+        for model in subjects.models:
+            known: dict[Role, FabricSubject] = {}
+            for subject in subjects.fabrics:
+                if model.on([subject.fabric.name]):
+                    known.setdefault(subject.role, subject)
+            if trained := model.on([one.fabric.name for one in known.values()]) if known else None:
+                yield cls(
+                    model=trained,
+                    fabrics=tuple((one.fabric, role) for role, one in known.items()),
+                    truth=EXTREME_TRUTH.model_copy(update=physics),
+                )
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure all methods side by side."""
+        from pipeline.models.added.guarded import unchecked
+        from pipeline.models.runtimes import runs
+        from reports.measure.extremes import lustrous, measure_extremes
+
+        fabrics = list(self.fabrics)
+        if not self.model.options.of_one_material:
+            fabrics.append((lustrous(fabrics[0][0]), "unseen"))
+        precisions = EXTREME_PRECISIONS if self.model.networks else ()
+        families = [[unchecked(one), *runs(one, precisions)] for one in self.model.methods(out)]
+        return measure_extremes(families, fabrics, self.model.provenance(), self.truth)
+
+
+class Latents(Measurement):
+    """Answers of a model between pairs of presets, and the time of edits."""
+
+    kind: Literal["latents"] = "latents"
+    timed: ClassVar = True
+    code: ClassVar = ("truth", "bench")
+    seconds: ClassVar = 10.0
+    model: Trained
+    """The model."""
+    presets: tuple[Uncoloured, ...]
+    """Presets of the pairs."""
+    queries: QueryOptions
+    """Distribution of the queries."""
+    truth: TruthOptions
+    """Options of the truth."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a model that blends latents, trained with its first seed."""
+        names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
+        dataset = subjects.recipe.dataset
+        for model in subjects.first_models:
+            if subjects.recipe.bench.latents and model.recipe.options.blends:
+                yield cls(
+                    model=model.whole,
+                    presets=tuple(load_fabric(name) for name in names),
+                    queries=dataset.queries,
+                    truth=dataset.truth,
+                )
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure edits, then one pair after the other."""
+        from reports.measure.latents import measure_edits, measure_paths, pairs
+
+        (method,) = self.model.methods(out)
+        about, chosen = self.model.provenance(), pairs()
+        records = measure_edits(method, chosen[0].first, provenance=about)
+        for index, pair in enumerate(chosen):
+            records += measure_paths(method, [pair], self.queries, self.truth, provenance=about)
+            progress((index + 1) / len(chosen))
+        return records

@@ -1,0 +1,219 @@
+"""Measurements in scenes: the truth's frames, the errors of a model in them, the time of a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
+
+from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
+from jobs.plan.measurements.measurement import Measurement, Picture, Reference
+from jobs.plan.measurements.subjects import Subjects, Trained
+from jobs.plan.task import Made, Place, Progress, TaskPart
+from pipeline.fingerprint import file_sha256
+from pipeline.models.options import RoundFootprint
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.scene import Cloth
+from pipeline.scenes.sources import files, worn
+from reports.options import RepeatOptions, SceneBenchOptions, SceneErrorOptions, ShotOptions, select
+from weaves.fabric import Fabric, load_fabric
+
+if TYPE_CHECKING:
+    from reports.record import Record
+
+_QUERIES_A_PIXEL = 5.0  # roughly
+
+
+class SceneCloth(TaskPart):
+    """A cloth of a scene and how it is laid out."""
+
+    fabric: Fabric
+    """The fabric."""
+    yarns: tuple[float, float]
+    """Yarn spacings in one unit of u and of v."""
+    turn: float
+    """Angle from u to the weft, in degrees."""
+
+
+class SceneShot(Reference):
+    """The frames of a scene: queries with the truth's answers, and pictures. All recipes and models share them."""
+
+    kind: Literal["scene truth"] = "scene truth"
+    code: ClassVar = ("truth", "fallback", "scenes", "bench", "scene_bench")  # answers of the fallback are stored
+    endings: ClassVar = (".npz", ".exr")
+    scene: str
+    """Name of the scene."""
+    found: Place
+    """Reference to the scene in the recipe: its name, or a path."""
+    files: tuple[str, ...]
+    """Hashes of its files; none for a scene of the package, which has a version."""
+    cloths: dict[str, SceneCloth]
+    """Cloths by their names in the scene."""
+    step: tuple[float, float, float]
+    """Step of the camera from frame to frame."""
+    options: ShotOptions
+    """Options of the frames and of the truth."""
+
+    @classmethod
+    def of(cls, name: str, options: ShotOptions) -> Self:
+        """Return the shot of a scene."""
+        scene = load_scene(name)
+        cloths = {}
+        for key, fabric in worn(scene).items():
+            cloth = scene.cloths.get(key, Cloth())
+            cloths[key] = SceneCloth(fabric=load_fabric(fabric), yarns=cloth.yarns, turn=cloth.turn)
+        return cls(
+            scene=scene.name,
+            found=name,
+            files=tuple(file_sha256(path) for path in files(scene)),
+            cloths=cloths,
+            step=scene.step,
+            options=options,
+        )
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a scene."""
+        yield from cls.all(subjects.recipe.bench.scenes)
+
+    @classmethod
+    def all(cls, options: SceneBenchOptions) -> list[Self]:
+        """Return the shots of a recipe's scenes, in its order."""
+        return [cls.of(name, select(ShotOptions, options)) for name in options.names]
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The truth's frames."""
+        return (Picture("", self.scene, "truth", "", f"{self.stem}.exr"),)
+
+    @property
+    def fabrics(self) -> list[str]:
+        """Names of its fabrics, sorted."""
+        return sorted({cloth.fabric.name for cloth in self.cloths.values()})
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        options = self.options
+        points = points_a_row(options.truth) + (options.frames - 1) * points_a_row(options.frame_truth)
+        return options.size[0] * options.size[1] * _QUERIES_A_PIXEL * SECONDS_A_POINT * points
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Render the queries and answer them."""
+        from reports.measure.scene.scene_errors import write_truth
+        from reports.measure.scene.shot import read_shot, shoot
+
+        shot, picture = (out / path for path in self.products)
+        shoot(self.found, self.options, shot)
+        write_truth(read_shot(shot), picture)
+
+
+class OnScene(Measurement):
+    """One setting of a model on one scene: a change of one setting repeats no other measurement."""
+
+    kind: Literal["scene errors"] = "scene errors"
+    code: ClassVar = ("fallback", "bench", "scene_bench")
+    scene: str
+    """Name of the scene."""
+    shot: Made
+    """Frames of the scene with the truth's answers."""
+    model: Trained
+    """The model with one setting."""
+    options: SceneErrorOptions
+    """Options of the comparison."""
+    shown: tuple[str, ...]
+    """Settings that pictures are made of."""
+    extent: tuple[int, int]
+    """Width and height of a frame in pixels."""
+    frames: int
+    """Number of frames."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a scene, model that answers for its cloths, seed and setting; pictures are of the first seed."""
+        bench = subjects.recipe.bench
+        for shot in SceneShot.all(bench.scenes):
+            for model, trained in subjects.answering(shot.fabrics):
+                for one in trained.settings:
+                    yield cls(
+                        scene=shot.scene,
+                        shot=shot.made,
+                        model=one,
+                        options=select(SceneErrorOptions, bench.scenes),
+                        shown=one.shown(bench.picture_counts) if model.is_first else (),
+                        extent=shot.options.size,
+                        frames=shot.options.frames,
+                    )
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Model, scene and setting."""
+        return (*super().subjects, *(f"k = {k}" for k in self.model.options.settings))
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The frames of every setting shown."""
+        name = self.model.options.name
+        return tuple(Picture("", self.scene, name, setting, self.picture(setting)) for setting in self.shown)
+
+    def picture(self, setting: str) -> str:
+        """Return the path of the frames of a setting."""
+        return "-".join(filter(None, (self.stem, setting.replace(" = ", "")))) + ".exr"
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 1.0 + self.model.seconds(self.extent[0] * self.extent[1] * _QUERIES_A_PIXEL * self.frames)
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure it."""
+        from reports.measure.scene.scene_errors import measure_scene
+        from reports.measure.scene.shot import read_shot
+
+        methods = self.model.with_fallback(out, self.options.footprint)
+        pictures = {setting: out / self.picture(setting) for setting in self.shown}
+        shot = read_shot(out / self.shot.path)
+        return measure_scene(methods, shot, self.options, pictures, self.model.provenance())
+
+
+class FrameTime(Measurement):
+    """The time of a scene's frame by all methods in turns."""
+
+    kind: Literal["frame time"] = "frame time"
+    timed: ClassVar = True
+    code: ClassVar = ("fallback", "bench")
+    seconds: ClassVar = 10.0
+    scene: str
+    """Name of the scene."""
+    shot: Made
+    """Frames of the scene with the truth's answers."""
+    models: tuple[Trained, ...]
+    """The models that answer for its cloths."""
+    footprint: RoundFootprint
+    """Round footprint that replaces an ellipse where a method answers round footprints only."""
+    options: RepeatOptions
+    """Repeats."""
+    seed: int
+    """Seed of the order of the queries."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a scene, of models trained with their first seed: times do not depend on the weights."""
+        bench = subjects.recipe.bench
+        for shot in SceneShot.all(bench.scenes):
+            yield cls(
+                scene=shot.scene,
+                shot=shot.made,
+                models=tuple(trained for model, trained in subjects.answering(shot.fabrics) if model.is_first),
+                footprint=bench.scenes.footprint,
+                options=select(RepeatOptions, bench),
+                seed=bench.scenes.seed,
+            )
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Time all methods."""
+        from reports.measure.scene.scene_errors import time_scene
+        from reports.measure.scene.shot import read_shot
+
+        methods = [one for model in self.models for one in model.with_fallback(out, self.footprint)]
+        return time_scene(methods, read_shot(out / self.shot.path), self.options, self.seed)

@@ -1,0 +1,184 @@
+"""Images of the truth of one fabric, which other measurements and the page read; all recipes and models share them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import ClassVar, Literal, Self
+
+from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
+from jobs.plan.measurements.measurement import Measurement, Picture, Reference
+from jobs.plan.measurements.subjects import Subjects
+from jobs.plan.task import Coloured, Progress
+from jobs.recipe.recipe import Recipe
+from pipeline import versions
+from pipeline.scenes.options import View, ViewOptions
+from pipeline.truth.options import TruthOptions
+from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
+from weaves.fabric import Fabric
+
+_LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 20.0, 2048, 5
+
+
+class TruthPicture(Reference):
+    """The truth's picture of a fabric in one view."""
+
+    kind: Literal["truth picture"] = "truth picture"
+    code: ClassVar = ("truth", "bench")
+    fabric: Coloured
+    """The fabric."""
+    scene: View
+    """The view."""
+    extent: tuple[int, int]
+    """Width and height in pixels."""
+    view: ViewOptions
+    """Camera, light and scale."""
+    truth: TruthOptions
+    """Options of the truth."""
+    seed: int
+    """Seed of the truth's points."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a fabric and view."""
+        for subject in subjects.fabrics:
+            yield from cls.of(subject.fabric, subjects.recipe.bench).values()
+
+    @classmethod
+    def of(cls, fabric: Fabric, bench: PictureOptions) -> dict[View, Self]:
+        """Return the pictures of a fabric by view."""
+        same = {"fabric": fabric, "view": bench.view, "truth": bench.truth, "seed": bench.seed}
+        return {view: cls(scene=view, extent=bench.size(view), **same) for view in bench.views}
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The picture."""
+        return (Picture(self.fabric.name, self.scene, "truth", "", f"{self.stem}.exr"),)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return _seconds(self.extent[0] * self.extent[1], self.truth)
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Render it."""
+        from reports.measure.pictures import render_truth
+
+        options = PictureOptions(
+            views=(self.scene,),
+            sphere_size=self.extent,
+            plane_size=self.extent,
+            view=self.view,
+            truth=self.truth,
+            seed=self.seed,
+        )
+        render_truth(self.fabric, self.scene, options, out / self.products[0])
+
+
+class TruthFrames(Reference):
+    """The truth's frames of a fabric on the moving plane, for aliasing."""
+
+    kind: Literal["truth frames"] = "truth frames"
+    code: ClassVar = ("truth", "bench")
+    fabric: Coloured
+    """The fabric."""
+    options: FrameOptions
+    """Options of the frames and of the truth."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a fabric."""
+        for subject in subjects.fabrics:
+            yield cls.of(subject.fabric, subjects.recipe)
+
+    @classmethod
+    def of(cls, fabric: Fabric, recipe: Recipe) -> Self:
+        """Return the frames of a fabric."""
+        return cls(fabric=fabric, options=select(FrameOptions, recipe.bench))
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        width, height = self.options.frame_size
+        return _seconds(width * height * self.options.frames, self.options.frame_truth)
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Render them."""
+        from reports.measure.frames import render_frames
+
+        render_frames(self.fabric, self.options, out / self.products[0])
+
+
+class TruthEdge(Reference):
+    """The truth's edge of a cloth cylinder, for silhouettes."""
+
+    kind: Literal["truth edge"] = "truth edge"
+    code: ClassVar = ("truth", "bench")
+    fabric: Coloured
+    """The fabric."""
+    options: EdgeOptions
+    """Cylinder, camera, light and truth."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a fabric, where the recipe's queries are of curved cloth."""
+        for subject in subjects.fabrics:
+            if edge := cls.of(subject.fabric, subjects.recipe):
+                yield edge
+
+    @classmethod
+    def of(cls, fabric: Fabric, recipe: Recipe) -> Self | None:
+        """Return the edge of a fabric; None where no query of the recipe is of curved cloth."""
+        return cls(fabric=fabric, options=recipe.bench.edge) if recipe.dataset.queries.curvature[1] > 0 else None
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        pixels = max(round(self.options.depth / self.options.pixel), 1) * self.options.rows
+        return _seconds(pixels, self.options.truth)
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Render it."""
+        from reports.measure.silhouette import render_edge
+
+        render_edge(self.fabric, self.options, out / self.products[0])
+
+
+class LivePage(Reference):
+    """The live page of a fabric: cloth that the reader turns, in the browser, beside pictures of the truth."""
+
+    kind: Literal["live page"] = "live page"
+    endings: ClassVar = (".html",)
+    fabric: Coloured
+    """The fabric."""
+    pixels: int
+    """Along each side of the pictures of the truth and of other methods."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one for each fabric that the recipe lists."""
+        chosen = subjects.recipe.bench.live
+        for subject in subjects.fabrics:
+            if subject.fabric.name in chosen.fabrics:
+                yield cls(fabric=subject.fabric, pixels=chosen.pixels)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return _LIVE_SECONDS + _LIVE_VIEWS * self.pixels**2 * _POINTS_A_PIXEL * SECONDS_A_POINT
+
+    def versions(self) -> dict[str, int]:
+        """Return the versions of the truth, of the models that it shows, and of the page."""
+        shown = ("soft_nodes", "selvage", "map_material")
+        models = {name: versions.MODELS.get(name, 1) for name in shown}
+        return {"truth": versions.TRUTH, "viewer": versions.VIEWER} | models
+
+    def run(self, out: Path, progress: Progress) -> None:
+        """Write it."""
+        from reports.viewer.view import write_page
+
+        write_page(self.fabric, out / self.products[0], self.pixels)
+
+
+def _seconds(pixels: int, truth: TruthOptions) -> float:
+    return pixels * SECONDS_A_POINT * points_a_row(truth)
