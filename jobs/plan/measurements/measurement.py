@@ -63,7 +63,7 @@ class Measurement(Task):
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """What is measured: a model with its seed, a fabric, a view or a scene."""
+        """Names of the measured model with its seed, fabric, view or scene."""
         values = (getattr(self, name, None) for name in _SUBJECTS)
         return tuple(_label(value) for value in values if value is not None)
 
