@@ -34,7 +34,7 @@ GAP: Final = 2
 Floats = npt.NDArray[np.float64]
 
 
-class Surface(NamedTuple):
+class ClothSurface(NamedTuple):
     """Surface at given points; arrays of one shape.
 
     Attributes
@@ -56,7 +56,7 @@ class Surface(NamedTuple):
     tangent: Floats
 
 
-def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
+def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurface:
     """Evaluate the surface at points seen from above.
 
     Parameters
@@ -68,7 +68,7 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
 
     Returns
     -------
-    Surface
+    ClothSurface
         Arrays of the broadcast shape; formulas in the module's docstring.
     """
     draft = cells(fabric.weave)
@@ -94,10 +94,10 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> Surface:
         sign = 1.0 if family == WARP else -1.0
         height[here], n, t = _torus(specification, length, across[here], sign * (along[here] + offset), beneath[here])
         normal[here], tangent[here] = (n, t) if family == WARP else (_weft_to_fabric(n), _weft_to_fabric(t))
-    return Surface(yarn, beneath, height, normal, tangent)
+    return ClothSurface(yarn, beneath, height, normal, tangent)
 
 
-def surface_maps(fabric: Fabric, texels_per_yarn: int) -> Surface:
+def surface_maps(fabric: Fabric, texels_per_yarn: int) -> ClothSurface:
     """Evaluate the surface at the texel centres of one repeat.
 
     Parameters
@@ -109,7 +109,7 @@ def surface_maps(fabric: Fabric, texels_per_yarn: int) -> Surface:
 
     Returns
     -------
-    Surface
+    ClothSurface
         Arrays (picks * texels_per_yarn, ends * texels_per_yarn): rows along y, pick 0 in row 0.
     """
     ends, picks = fabric.weave.repeat

@@ -24,7 +24,7 @@ from pipeline.materials.layout import Layout
 from pipeline.materials.lobes import white_f0
 from pipeline.materials.reflectance import Reflectance
 from weaves.fabric import Fabric
-from weaves.surface import GAP, WARP, Surface, surface_at
+from weaves.surface import GAP, WARP, ClothSurface, surface_at
 
 SAMPLES_PER_YARN: Final = 16
 """Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
@@ -129,7 +129,7 @@ def _lowest(fabric: Fabric) -> float:
     return float(height[np.isfinite(height)].min())
 
 
-def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, factors: _Factors, lowest: float) -> Planes:
+def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, factors: _Factors, lowest: float) -> Planes:
     """Return the sums of single points."""
     yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
     tangent = surface.tangent
@@ -150,7 +150,7 @@ def _sums(fabric: Fabric, surface: Surface, x: Float64, y: Float64, factors: _Fa
     )
 
 
-def _colours(fabric: Fabric, surface: Surface, x: Float64, y: Float64, kind: int, factors: _Factors) -> Float64:
+def _colours(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, kind: int, factors: _Factors) -> Float64:
     """Return the diffuse (0), specular (1) or transmitted (2) colour of points, 0 in gaps."""
     name = ("diffuse", "specular", "diffuse_transmission")[kind]
     ends, picks = (

@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
-from pipeline.scenes.loading import Camera, Loaded, Window
+from pipeline.scenes.loading import Camera, FilmWindow, Loaded
 from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted, unit
 from pipeline.scenes.rays import aovs_of, blocked, first_hits, off
 from pipeline.scenes.scene import Cloth
@@ -52,7 +52,7 @@ _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
 
-class Frame(NamedTuple):
+class SceneFrame(NamedTuple):
     """A frame: what it shows of every cloth, and what is no cloth."""
 
     gbuffers: dict[str, GBuffer]
@@ -66,8 +66,8 @@ class Frame(NamedTuple):
 
 
 def render(
-    loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None, window: Window | None = None
-) -> Frame:
+    loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None, window: FilmWindow | None = None
+) -> SceneFrame:
     """Return what every pixel of a frame shows.
 
     Parameters
@@ -78,7 +78,7 @@ def render(
         Which one; 0 is the first.
     size : (int, int), optional
         Width and height in pixels; the film's unless given.
-    window : Window, optional
+    window : FilmWindow, optional
         The part of it that is rendered, H by W pixels; all unless given.
 
     Raises
@@ -100,7 +100,7 @@ def render(
     something = aovs["shape_index"][..., 0] > 0
     forward = camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
     depth = np.where(something, (aovs["position"] - camera.to_world[:3, 3]) @ forward, 0.0)
-    return Frame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
+    return SceneFrame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
 
 
 def _gbuffer(

@@ -22,7 +22,7 @@ from weaves.fabric import Fabric, load_fabric, preset_names
 Floats = npt.NDArray[np.float64]
 
 
-class Window(NamedTuple):
+class FilmWindow(NamedTuple):
     """A rectangle of a film, in pixels."""
 
     left: int
@@ -75,7 +75,7 @@ class Camera:
         depth = (position - self.to_world[:3, 3]) @ self.to_world[:3, 2]
         return np.asarray(depth / (depth - self.settings["near_clip"]))
 
-    def sensor(self, mi: Any, size: tuple[int, int], window: Window | None = None) -> Any:
+    def sensor(self, mi: Any, size: tuple[int, int], window: FilmWindow | None = None) -> Any:
         """Return Mitsuba's sensor, with one ray through the centre of every pixel of a window, or of the whole film."""
         film = {"type": "hdrfilm", "width": size[0], "height": size[1], "component_format": "float32"}
         if window is not None:

@@ -24,8 +24,8 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
-from pipeline.scenes.frame import Frame, render
-from pipeline.scenes.loading import Loaded, Window
+from pipeline.scenes.frame import SceneFrame, render
+from pipeline.scenes.loading import FilmWindow, Loaded
 from pipeline.scenes.shade import coloured, compose
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
@@ -48,7 +48,7 @@ _AHEAD = 3  # windows under way: threads have work while a frame is traced
 Plane = npt.NDArray[np.float32]
 
 
-class Answerer(Protocol):
+class PictureMethod(Protocol):
     """A method that answers any query."""
 
     def rows(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
@@ -85,12 +85,12 @@ class TruthAnswers:
         return component_colours(fabric, queries, self._options, seed).mean.astype(np.float32)
 
 
-class Part(NamedTuple):
+class PicturePart(NamedTuple):
     """A window of a picture, finished.
 
     Attributes
     ----------
-    window : Window
+    window : FilmWindow
         Which pixels.
     planes : dict of float32 (H, W, C)
         ``rgb``; with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share of a
@@ -100,7 +100,7 @@ class Part(NamedTuple):
         Queries, and those that the fallback answered.
     """
 
-    window: Window
+    window: FilmWindow
     planes: dict[str, Plane]
     queries: int
     fallback: int
@@ -113,13 +113,13 @@ def sharpened(loaded: Loaded, side: int) -> Loaded:
     return replace(loaded, options=loaded.options.model_copy(update={"pixel_sigma": side * variance**0.5}))
 
 
-def windows(size: tuple[int, int], queries_a_pixel: int) -> list[Window]:
+def windows(size: tuple[int, int], queries_a_pixel: int) -> list[FilmWindow]:
     """Return windows that cover a picture, from its top left, of at most `QUERIES` queries each."""
     pixels = max(1, QUERIES // queries_a_pixel)
     width = min(size[0], pixels)
     height = min(size[1], max(1, pixels // width))
     return [
-        Window(left, top, min(width, size[0] - left), min(height, size[1] - top))
+        FilmWindow(left, top, min(width, size[0] - left), min(height, size[1] - top))
         for top in range(0, size[1], height)
         for left in range(0, size[0], width)
     ]
@@ -127,21 +127,21 @@ def windows(size: tuple[int, int], queries_a_pixel: int) -> list[Window]:
 
 def picture(
     loaded: Loaded,
-    answerer: Answerer,
+    answerer: PictureMethod,
     pool: Executor,
     size: tuple[int, int],
     frame: float = 0.0,
     side: int = 1,
     layers: bool = False,
     seed: int = 0,
-) -> Iterator[Part]:
+) -> Iterator[PicturePart]:
     """Yield the windows of a frame.
 
     Parameters
     ----------
     loaded : Loaded
         The scene.
-    answerer : Answerer
+    answerer : PictureMethod
         The method.
     pool : Executor
         Threads that answer queries.
@@ -164,7 +164,7 @@ def picture(
     fine, names = sharpened(loaded, side), (loaded.scene.name, frame, seed)
     under_way: deque[_UnderWay] = deque()
     for window in windows(size, side**2 * (len(loaded.lights) + 1)):
-        traced = render(fine, frame, (side * size[0], side * size[1]), Window(*(side * edge for edge in window)))
+        traced = render(fine, frame, (side * size[0], side * size[1]), FilmWindow(*(side * edge for edge in window)))
         under_way.append(_UnderWay(fine, answerer, pool, window, traced, (*names, *window)))
         if len(under_way) == _AHEAD:
             yield under_way.popleft().part(side, layers)
@@ -176,7 +176,13 @@ class _UnderWay:
     """A window that has been traced and whose queries are being answered."""
 
     def __init__(
-        self, loaded: Loaded, answerer: Answerer, pool: Executor, window: Window, frame: Frame, names: Sequence[object]
+        self,
+        loaded: Loaded,
+        answerer: PictureMethod,
+        pool: Executor,
+        window: FilmWindow,
+        frame: SceneFrame,
+        names: Sequence[object],
     ) -> None:
         self._loaded, self._answerer, self._pool, self._names = loaded, answerer, pool, names
         self._window, self._frame = window, frame
@@ -184,7 +190,7 @@ class _UnderWay:
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
 
-    def part(self, side: int, layers: bool) -> Part:
+    def part(self, side: int, layers: bool) -> PicturePart:
         """Return the finished window, when its queries are answered."""
         frame = self._frame
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
@@ -207,7 +213,7 @@ class _UnderWay:
         if layers:
             planes |= {name: _middle(plane, side) for name, plane in _seen(frame).items()}
         found = [int(np.isfinite(values[:, 4]).sum()) for values in answers.values()]
-        return Part(self._window, planes, sum(map(len, answers.values())), sum(found))
+        return PicturePart(self._window, planes, sum(map(len, answers.values())), sum(found))
 
     def _fabric(self, key: str) -> Fabric:
         return self._loaded.cloths[key][1]
@@ -240,7 +246,7 @@ def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float
     return np.concatenate([np.empty(shape, np.float32), *(future.result() for future in asked)])
 
 
-def _seen(frame: Frame) -> dict[str, Plane]:
+def _seen(frame: SceneFrame) -> dict[str, Plane]:
     """Return what each ray meets: depth, normal, and of cloth the place, the footprint and its number."""
     height, width = frame.backdrop.shape[:2]
     planes = {name: np.zeros((height * width, channels), np.float32) for name, channels in _OF_CLOTH.items()}

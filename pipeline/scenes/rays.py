@@ -13,7 +13,7 @@ Floats = npt.NDArray[np.float64]
 _OFF = 2e-5  # float32 knows a position to 6e-8 of its size
 
 
-class Hits(NamedTuple):
+class FirstHits(NamedTuple):
     """Where N rays hit first; NaN where they miss."""
 
     distance: Floats
@@ -34,7 +34,7 @@ def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Fl
     return np.asarray(world.ray_test(_rays(mi, origin, direction, distance)))
 
 
-def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> Hits:
+def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> FirstHits:
     """Return where N rays hit first."""
     if mi.variant().startswith("scalar") or not len(origin):
         found = np.full((len(origin), 7), np.nan)
@@ -48,7 +48,7 @@ def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> Hits:
             np.asarray(column, np.float64).reshape(-1, len(origin)).T for column in (hit.t, hit.sh_frame.n, hit.dp_du)
         ]
         found = np.where(np.asarray(hit.is_valid())[:, None], np.concatenate(planes, axis=1), np.nan)
-    return Hits(found[:, 0], found[:, 1:4], found[:, 4:])
+    return FirstHits(found[:, 0], found[:, 1:4], found[:, 4:])
 
 
 def radiance(mi: Any, environment: Any, direction: Floats) -> Floats:

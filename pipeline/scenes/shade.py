@@ -68,7 +68,7 @@ def compose(
     """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
 
     A place shows coverage L + (1 - coverage + coverage transparency) background, L the sum of irradiance times f_P
-    over its lights. The background is a scene's `Frame.backdrop`: cloth behind cloth is not seen, neither through gaps
+    over its lights. The background is `SceneFrame.backdrop`: cloth behind cloth is not seen, neither through gaps
     nor past a silhouette.
 
     Parameters

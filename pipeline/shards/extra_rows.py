@@ -11,12 +11,12 @@ from pydantic import Field
 
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.angular_samples import AngularSamples
-from pipeline.shards.silhouettes import Silhouettes
+from pipeline.shards.silhouettes import SilhouetteRows
 
 Kind = Literal["components", "angular_samples", "opacity", "grazing_cosine"]
 """Kinds of rows, each with its columns (`pipeline.shards.schema`): a data set's own, and those of extra rows."""
 
-ExtraRows = Annotated[AngularSamples | Silhouettes, Field(discriminator="kind")]
+ExtraRows = Annotated[AngularSamples | SilhouetteRows, Field(discriminator="kind")]
 """Any set of extra rows, distinguished by its kind."""
 
 

@@ -19,7 +19,7 @@ SPLITS: Final = ("train", "validation", "test")
 _OF_PUBLISHED: Final = "croissant.json"
 
 
-class Piece(NamedTuple):
+class RowPiece(NamedTuple):
     """Rows of one fabric and split in one file.
 
     Attributes
@@ -61,14 +61,14 @@ class DatasetRows(NamedTuple):
         Every fabric.
     roles : dict of str to list of str
         Names of the fabrics in each role.
-    pieces : list of Piece
+    pieces : list of RowPiece
         All rows that every model may read, in their order.
     """
 
     folder: Path
     fabrics: dict[str, Fabric]
     roles: dict[Role, list[str]]
-    pieces: list[Piece]
+    pieces: list[RowPiece]
 
     @classmethod
     def load(cls, folder: Path) -> DatasetRows:
@@ -79,7 +79,7 @@ class DatasetRows(NamedTuple):
         manifest = Manifest.load(folder)
         return cls(folder, dict(manifest.fabrics), dict(manifest.roles), list(_shards(manifest, folder)))
 
-    def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[Piece]:
+    def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[RowPiece]:
         """Return the pieces of a split, fabric after fabric.
 
         Parameters
@@ -96,7 +96,7 @@ class DatasetRows(NamedTuple):
         """
         if split not in SPLITS:
             raise BadInput(str(self.folder), "split", split, nearest(split, SPLITS))
-        by_fabric: dict[str, list[Piece]] = {}
+        by_fabric: dict[str, list[RowPiece]] = {}
         for piece in self.pieces:
             if piece.split == split:
                 by_fabric.setdefault(piece.fabric, []).append(piece)
@@ -111,14 +111,14 @@ class DatasetRows(NamedTuple):
         return [piece for name in chosen for piece in by_fabric[name]]
 
 
-def _shards(manifest: Manifest, folder: Path) -> Iterator[Piece]:
+def _shards(manifest: Manifest, folder: Path) -> Iterator[RowPiece]:
     """Yield the shards that every model may read; extra rows of single models have other columns or no splits."""
     for shard in sorted(manifest.shards, key=lambda shard: shard.start):
         if shard.kind == "components":
-            yield Piece(folder / shard.file, shard.fabric, shard.split, shard.rows, joined=False)
+            yield RowPiece(folder / shard.file, shard.fabric, shard.split, shard.rows, joined=False)
 
 
-def _joined(contents: Published, folder: Path) -> Iterator[Piece]:
+def _joined(contents: Published, folder: Path) -> Iterator[RowPiece]:
     for entry in contents.files:
         for fabric, rows in entry.rows.items():
-            yield Piece(folder / entry.file, fabric, entry.split or "", rows, joined=True)
+            yield RowPiece(folder / entry.file, fabric, entry.split or "", rows, joined=True)

@@ -33,7 +33,7 @@ _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 Double = npt.NDArray[np.float64]
 
 
-class Silhouettes(BaseModel):
+class SilhouetteRows(BaseModel):
     """Which queries about a fabric's silhouette are answered, and how.
 
     Centres are uniform in the repeat, footprints log-uniform, curvatures uniform in their root up to the largest, and

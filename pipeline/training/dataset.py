@@ -24,7 +24,7 @@ from torch.utils.data import IterableDataset, get_worker_info
 from pipeline.atomic import atomic_path
 from pipeline.models.method import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.pieces import Piece
+from pipeline.shards.pieces import RowPiece
 from pipeline.shards.schema import QUERY_COLUMNS
 from pipeline.shards.store import read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
@@ -43,7 +43,7 @@ _READERS: Final = 4  # shards that are read at the same time
 _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
 
-class Rows:
+class TrainingRows:
     """A table of rows, fabric after fabric.
 
     Parameters
@@ -59,7 +59,7 @@ class Rows:
         self.starts = np.concatenate([[0], np.cumsum(self.counts)])
 
 
-def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> Rows:
+def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> TrainingRows:
     """Return the training rows of fabrics, mapped from `cache`, which is written anew: an older one may be damaged.
 
     Parameters
@@ -85,7 +85,7 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
         with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
             for _ in pool.map(fill, parts, starts):
                 pass
-    return Rows(np.load(cache, mmap_mode="r"), counts)
+    return TrainingRows(np.load(cache, mmap_mode="r"), counts)
 
 
 class Order:
@@ -145,7 +145,7 @@ class Batches:
 
     Parameters
     ----------
-    rows : Rows
+    rows : TrainingRows
         The table.
     order : Order
         Its order.
@@ -153,7 +153,7 @@ class Batches:
         Where the batches go; a GPU holds the whole table if it takes less than half of the free memory.
     """
 
-    def __init__(self, rows: Rows, order: Order, device: torch.device) -> None:
+    def __init__(self, rows: TrainingRows, order: Order, device: torch.device) -> None:
         self.rows, self.order, self.device = rows, order, device
         self._resident: Tensor | None = None
         if device.type == "cuda" and rows.table.nbytes < torch.cuda.mem_get_info(device)[0] // 2:
@@ -183,7 +183,7 @@ class RowStream(IterableDataset[dict[str, Tensor]]):
 
     Parameters
     ----------
-    pieces : sequence of Piece
+    pieces : sequence of RowPiece
         The rows, fabric after fabric; this order numbers the fabrics.
     rows : int
         Most rows of a batch, >= 1; no batch has rows of two pieces.
@@ -191,7 +191,7 @@ class RowStream(IterableDataset[dict[str, Tensor]]):
         Seed of the order; None keeps that of the pieces.
     """
 
-    def __init__(self, pieces: Sequence[Piece], rows: int = 4096, seed: int | None = 0) -> None:
+    def __init__(self, pieces: Sequence[RowPiece], rows: int = 4096, seed: int | None = 0) -> None:
         if rows < 1:
             raise BadInput("torch", "rows", rows, "must be at least 1")
         if seed is not None and seed < 0:

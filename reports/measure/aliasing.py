@@ -28,7 +28,7 @@ HALF_NYQUIST: Final = 0.25
 """Half the Nyquist frequency, in cycles a pixel."""
 
 
-class Spectrum(NamedTuple):
+class TemporalSpectrum(NamedTuple):
     """Radially averaged power of pictures."""
 
     frequency: Floats
@@ -90,7 +90,7 @@ def excess_energy(
     return (spectrum(frames, noise).high - spectrum(truth, truth_noise).high) / scale
 
 
-def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Spectrum:
+def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> TemporalSpectrum:
     """Return the power spectrum averaged over frames, less the part of noise.
 
     Parameters
@@ -124,4 +124,4 @@ def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Spectrum:
     inside = ring < len(edges) - 1
     count = np.bincount(ring[inside], minlength=len(edges) - 1)
     total = np.bincount(ring[inside], weights=power.ravel()[inside], minlength=len(edges) - 1)
-    return Spectrum(0.5 * (edges[1:] + edges[:-1]), total / count, float(power[radius > HALF_NYQUIST].sum()))
+    return TemporalSpectrum(0.5 * (edges[1:] + edges[:-1]), total / count, float(power[radius > HALF_NYQUIST].sum()))

@@ -68,7 +68,7 @@ def lustrous(fabric: Fabric) -> Fabric:
     return fabric.model_copy(update={"name": fabric.name + _SHINY, **yarns})
 
 
-class Extremes(NamedTuple):
+class ExtremeInputs(NamedTuple):
     """Queries about one fabric."""
 
     queries: Queries
@@ -90,7 +90,7 @@ class Extremes(NamedTuple):
         return (place.astype(np.float64) + period * (FAR // period - 1)).astype(np.float32)
 
 
-def extremes(repeat: tuple[int, int]) -> Extremes:
+def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
     """Return the queries about a fabric of this repeat: 5 footprints x 9 pairs of angles x 2 places."""
     random = np.random.default_rng(0)
     # Sixteenths of a yarn: what single precision holds far away too.
@@ -100,7 +100,7 @@ def extremes(repeat: tuple[int, int]) -> Extremes:
     u, v = np.array([row[3] for row in rows], np.float32).T
     sigma = (size * math.sqrt(repeat[0] * repeat[1])).astype(np.float32)
     wi, wo = (_direction(theta, phi) for theta, phi in zip((light, viewer), _AZIMUTHS, strict=True))
-    return Extremes(Queries.round(u, v, sigma, wi, wo), size, np.maximum(light, viewer) == GRAZING, repeat)
+    return ExtremeInputs(Queries.round(u, v, sigma, wi, wo), size, np.maximum(light, viewer) == GRAZING, repeat)
 
 
 def measure_extremes(
@@ -149,7 +149,7 @@ def measure_extremes(
 
 
 def _measured(
-    subject: Record, method: Method, fabric: Fabric, inputs: Extremes, truth: Array
+    subject: Record, method: Method, fabric: Fabric, inputs: ExtremeInputs, truth: Array
 ) -> tuple[Array, list[Record]]:
     """Return a method's answers and the measurements of them alone."""
     near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))

@@ -54,7 +54,7 @@ class Contender(NamedTuple):
         return self._replace(queries=cut)
 
 
-class Timing(NamedTuple):
+class CallTiming(NamedTuple):
     """Cost of a query in nanoseconds."""
 
     samples: tuple[float, ...]
@@ -76,7 +76,7 @@ def time_side_by_side(
     warm_up: int = 3,
     clock: Callable[[], int] = time.perf_counter_ns,
     progress: Callable[[float], None] = lambda share: None,
-) -> list[Timing]:
+) -> list[CallTiming]:
     """Time methods in turns.
 
     Parameters
@@ -94,7 +94,7 @@ def time_side_by_side(
 
     Returns
     -------
-    list of Timing
+    list of CallTiming
         One a contender, in their order.
     """
     set_threads(1)
@@ -115,7 +115,7 @@ def time_side_by_side(
                 ran[index] += time.thread_time_ns() - ran_before
             progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
-        Timing(
+        CallTiming(
             tuple(reading / contender.rows for reading in readings), contender.rows, _waited(contender, readings, own)
         )
         for contender, readings, own in zip(contenders, elapsed, ran, strict=True)

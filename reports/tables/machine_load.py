@@ -1,7 +1,7 @@
 """How busy a machine was with other work while methods were timed on it.
 
 A method on one thread that has nothing to wait for runs all the time it takes. What it does not run
-(`reports.measure.timing.Timing.waited`), other work had the processor. Work on other cores that slows memory or the
+(`reports.measure.timing.CallTiming.waited`), other work had the processor. Work on other cores that slows memory or the
 clock is not seen by this.
 """
 

@@ -34,7 +34,7 @@ _EPI, _PPI = 9, 10  # bytes of a WeavePoint file: ends and picks per inch
 
 
 @dataclass(frozen=True)
-class Threads:
+class DraftThreads:
     """The ends, or the picks, of a draft file."""
 
     colours: tuple[str, ...]
@@ -55,9 +55,9 @@ class DraftFile:
     """Program that wrote it, with its version."""
     warp_over: Bools
     """True where the warp is on top, (picks, ends), the first pick and the first end first."""
-    ends: Threads
+    ends: DraftThreads
     """The warp yarns."""
-    picks: Threads
+    picks: DraftThreads
     """The weft yarns."""
     remarks: tuple[str, ...]
     """Sentences on what could not be used."""
@@ -230,7 +230,7 @@ def _table(pattern: PatternData, where: str) -> dict[int, str]:
 
 def _threads(
     pattern: PatternData, axis: str, count: int, table: Mapping[int, str], remarks: list[str], where: str
-) -> Threads:
+) -> DraftThreads:
     """Return the colours and lengths of the threads of the ``"warp"`` or ``"weft"``."""
     yarns = getattr(pattern, axis)
     named = getattr(pattern, f"{axis}_colors")
@@ -249,7 +249,7 @@ def _threads(
     if spacing and scale is None:
         found = f"the unit {yarns.units!r}" if yarns.units else "no unit"
         remarks.append(one_line(f"[{axis.upper()}] Spacing has {found}: known are {', '.join(CENTIMETRES)}", 160))
-    return Threads(
+    return DraftThreads(
         colours=tuple(table[index] for index in indices),
         width=thickness / spacing if spacing and thickness else None,
         per_cm=per_cm,

@@ -16,7 +16,7 @@ import numpy as np
 from weaves.colour import linear_rgb
 from weaves.colour_order import MOST_COLOURS
 from weaves.draft import LARGEST_REPEAT, Bools, Draft, smallest_period
-from weaves.draft_files.read import DraftFile, Threads
+from weaves.draft_files.read import DraftFile, DraftThreads
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 from weaves.validation import validated
@@ -139,7 +139,7 @@ def _refuse_loose(matrix: Bools, where: str) -> None:
 
 def _width(
     axis: str,
-    threads: Threads,
+    threads: DraftThreads,
     yarn: Yarn,
     like: str,
     given: Mapping[str, float],

@@ -18,7 +18,7 @@ from pipeline.cores import cores
 from pipeline.models.method import one_thread
 from pipeline.models.named import TRUTH
 from pipeline.scenes.loading import Loaded
-from pipeline.scenes.picture import Answerer, Part, Plane, picture
+from pipeline.scenes.picture import PictureMethod, PicturePart, Plane, picture
 from pipeline.truth.conventions import COMPONENTS
 from reports.images.exr import RGB, write_exr
 from reports.images.tiles import Bytes8, displayed, png
@@ -34,7 +34,7 @@ _HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
 class FilmMaker:
     """A scene, a method and threads that make frames, with a progress bar while they do."""
 
-    def __init__(self, loaded: Loaded, answerer: Answerer, size: tuple[int, int], how: Look, count: int) -> None:
+    def __init__(self, loaded: Loaded, answerer: PictureMethod, size: tuple[int, int], how: Look, count: int) -> None:
         self.size = size
         self._loaded, self._answerer, self._how, self._count = loaded, answerer, how, count
         self._queries = self._fallback = 0
@@ -107,7 +107,7 @@ class FilmMaker:
             "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}{own}",
         }
 
-    def _parts(self, frame: int, layers: bool) -> Iterator[Part]:
+    def _parts(self, frame: int, layers: bool) -> Iterator[PicturePart]:
         with one_thread():
             for part in picture(
                 self._loaded, self._answerer, self._pool, self.size, float(frame), self._how.side, layers
@@ -118,7 +118,7 @@ class FilmMaker:
                 self._bars.advance(self._bar, part.window.width * part.window.height)
 
 
-def _place(part: Part) -> tuple[slice, slice]:
+def _place(part: PicturePart) -> tuple[slice, slice]:
     left, top, width, height = part.window
     return slice(top, top + height), slice(left, left + width)
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from pipeline.models.options import LogK, Name, Options, Weight
 from pipeline.shards.extra_rows import ExtraRows
-from pipeline.shards.silhouettes import Silhouettes
+from pipeline.shards.silhouettes import SilhouetteRows
 
 
 class CurvedOptions(Options):
@@ -83,9 +83,9 @@ class CurvedOptions(Options):
         return self
 
     @property
-    def silhouettes(self) -> Silhouettes:
+    def silhouettes(self) -> SilhouetteRows:
         """The queries about the silhouette."""
-        return Silhouettes(
+        return SilhouetteRows(
             kind="opacity" if self.silhouette == "opacity" else "grazing_cosine",
             rows=self.silhouette_rows,
             points=self.silhouette_points,

@@ -22,7 +22,7 @@ from weaves.fabric import Fabric
 
 
 @dataclass(frozen=True, eq=False)
-class AngularSamples:
+class TexelSamples:
     """T texels of one repeat, each seen under the same n pairs of directions.
 
     Attributes
@@ -41,10 +41,10 @@ class AngularSamples:
     values: npt.NDArray[np.float16]
 
 
-_held: Final[WeakValueDictionary[str, AngularSamples]] = WeakValueDictionary()
+_held: Final[WeakValueDictionary[str, TexelSamples]] = WeakValueDictionary()
 
 
-def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> AngularSamples:
+def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> TexelSamples:
     """Return a fabric's samples from their columns; as long as they are in use, `angular_samples` finds them."""
     shape = options.angular_samples.grid(fabric)
     texels = shape[0] * shape[1]
@@ -52,11 +52,11 @@ def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.
     values = np.empty((len(wi), texels, 4), np.float16)
     for index, name in enumerate(COMPONENTS):
         values[..., index] = columns[name].reshape(len(wi), texels)
-    samples = _held[_key(fabric, options)] = AngularSamples(shape, wi, wo, values)
+    samples = _held[_key(fabric, options)] = TexelSamples(shape, wi, wo, values)
     return samples
 
 
-def angular_samples(fabric: Fabric, options: BtfOptions) -> AngularSamples:
+def angular_samples(fabric: Fabric, options: BtfOptions) -> TexelSamples:
     """Return a fabric's samples: those in use in this process, such as a training's, else computed now."""
     samples = _held.get(_key(fabric, options))
     if samples is not None:

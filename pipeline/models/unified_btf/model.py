@@ -37,7 +37,7 @@ from pipeline.models.networks.perceptron import perceptron
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.models.unified_btf.angular_samples import AngularSamples, angular_samples, read_samples
+from pipeline.models.unified_btf.angular_samples import TexelSamples, angular_samples, read_samples
 from pipeline.models.unified_btf.options import BtfOptions, UnifiedBtfOptions
 from pipeline.models.unified_btf.set_encoder import ANGLES, SetEncoder, Texels, angles_of, read_texels
 from pipeline.shards.queries import QueryOptions
@@ -60,14 +60,14 @@ class UnifiedBtfNetwork(EncoderDecoder):
     ----------
     options : BtfOptions
         The design.
-    samples : sequence of AngularSamples
+    samples : sequence of TexelSamples
         Samples of the training fabrics, addressed by index in batches; none for inference.
     """
 
     encoder: SetEncoder
     decoder: nn.Sequential
 
-    def __init__(self, options: BtfOptions, samples: Sequence[AngularSamples] = ()) -> None:
+    def __init__(self, options: BtfOptions, samples: Sequence[TexelSamples] = ()) -> None:
         super().__init__()
         self.options = options
         self.encoder, self.decoder = SetEncoder(options), decoder(options.latent, options.hidden)

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from pipeline.models.networks.losses import to_network
 from pipeline.models.networks.perceptron import perceptron
-from pipeline.models.unified_btf.angular_samples import AngularSamples
+from pipeline.models.unified_btf.angular_samples import TexelSamples
 from pipeline.models.unified_btf.options import BtfOptions
 
 ANGLES = 4
@@ -88,7 +88,7 @@ class Texels(NamedTuple):
         return Texels(self.shape, self.angles.to(device), self.values.to(device))
 
 
-def read_texels(samples: AngularSamples, options: BtfOptions) -> Texels:
+def read_texels(samples: TexelSamples, options: BtfOptions) -> Texels:
     """Bring samples into the encoder's space, once: half of a training step otherwise."""
     wi, wo, values = (torch.from_numpy(part) for part in (samples.wi, samples.wo, samples.values))
     if options.log_samples:

@@ -26,7 +26,7 @@ def parameter_count(options: WovenOptions) -> int:
     return 7 if options.transmission else 4
 
 
-class Cloth(NamedTuple):
+class WovenInputs(NamedTuple):
     """Inputs of the network from F fabrics, in standard position.
 
     Attributes
@@ -43,11 +43,13 @@ class Cloth(NamedTuple):
     parameters: Tensor
     placement: Placement
 
-    def take(self, index: Tensor) -> Cloth:
+    def take(self, index: Tensor) -> WovenInputs:
         """Return the fabrics at `index`."""
-        return Cloth(self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement)))
+        return WovenInputs(
+            self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement))
+        )
 
-    def begun(self, shares: npt.NDArray[np.float64]) -> Cloth:
+    def begun(self, shares: npt.NDArray[np.float64]) -> WovenInputs:
         """Return the same cloth, each repeat begun elsewhere: `shares` (F, 2) of it to the left and downwards.
 
         Queries follow exactly, maps to the nearest texel.
@@ -57,15 +59,15 @@ class Cloth(NamedTuple):
             torch.roll(one, (down, right), dims=(1, 2)) for one, (right, down) in zip(self.maps, texels, strict=True)
         ]
         start = self.placement.start - torch.from_numpy(shares.astype(np.float32)).to(self.maps.device)
-        return Cloth(torch.stack(maps), self.parameters, self.placement._replace(start=start))
+        return WovenInputs(torch.stack(maps), self.parameters, self.placement._replace(start=start))
 
-    def to(self, device: torch.device) -> Cloth:
+    def to(self, device: torch.device) -> WovenInputs:
         """Return the same on a device."""
         parts = (part.to(device) for part in self.placement)
-        return Cloth(self.maps.to(device), self.parameters.to(device), Placement(*parts))
+        return WovenInputs(self.maps.to(device), self.parameters.to(device), Placement(*parts))
 
 
-def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> Cloth:
+def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> WovenInputs:
     """Return the inputs of at least one fabric.
 
     Parameters
@@ -92,7 +94,7 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | 
         parameters.append(numbers + (more if options.transmission else []))
         placements.append(placement(fabric, symmetry, start))
     together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
-    return Cloth(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
+    return WovenInputs(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
 
 
 def _begun_at(fabric: Fabric, start: tuple[int, int]) -> Fabric:

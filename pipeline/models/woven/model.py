@@ -35,7 +35,7 @@ from pipeline.models.networks.losses import to_components, to_network, weighted_
 from pipeline.models.networks.residual import SLOPE
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.models.woven.cloth import Cloth, read_cloth
+from pipeline.models.woven.cloth import WovenInputs, read_cloth
 from pipeline.models.woven.decoder import Decoder, encode_patch
 from pipeline.models.woven.encoder import Encoder
 from pipeline.models.woven.options import WovenOptions
@@ -69,7 +69,7 @@ class WovenNetwork(EncoderDecoder):
                 nn.init.zeros_(layer.bias)
         self._cloth = read_cloth(fabrics, options) if fabrics else None
 
-    def encode(self, cloth: Cloth) -> Tensor:
+    def encode(self, cloth: WovenInputs) -> Tensor:
         """Return the latents (F, latent)."""
         latents: Tensor = self.encoder(cloth.maps, cloth.parameters)
         return latents

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.scenes import picture as pictures
 from pipeline.scenes.frame import render
-from pipeline.scenes.loading import Window, load
+from pipeline.scenes.loading import FilmWindow, load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers, picture, sharpened, windows
 from pipeline.scenes.shade import colours_of
@@ -62,7 +62,7 @@ def test_windows_cover_a_picture_once_and_are_small(size, queries):
 
 
 def test_a_window_shows_what_the_whole_frame_shows_there(table):
-    window = Window(5, 9, 20, 11)
+    window = FilmWindow(5, 9, 20, 11)
     part, frame = render(table, 1.0, SIZE, window), render(table, 1.0, SIZE)
     cut = slice(9, 20), slice(5, 25)
     np.testing.assert_allclose(part.backdrop, frame.backdrop[cut], atol=1e-6)

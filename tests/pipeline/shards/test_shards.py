@@ -12,7 +12,7 @@ from pipeline.shards.check import check_shard
 from pipeline.shards.generate import SHARD_TASK, ExtraShardTask, ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions
-from pipeline.shards.silhouettes import Silhouettes
+from pipeline.shards.silhouettes import SilhouetteRows
 from pipeline.shards.store import read_about, read_columns, read_shard, write_columns
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
@@ -32,7 +32,7 @@ TASK = ShardTask(
 SAMPLES = AngularSamples(
     texels_per_yarn=1, texel_sigma=0.5, samples=4, directions="projected_disc", max_angle=80.0, truth=TASK.truth
 )
-OPACITY = Silhouettes(
+OPACITY = SilhouetteRows(
     kind="opacity",
     rows=64,
     points=32,

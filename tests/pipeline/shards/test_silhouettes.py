@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pipeline.shards.silhouettes import Silhouettes
+from pipeline.shards.silhouettes import SilhouetteRows
 from pipeline.truth.geometry.opacity import grazing_cosine, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
-SMALL = Silhouettes(
+SMALL = SilhouetteRows(
     kind="opacity",
     rows=512,
     points=32,

@@ -6,7 +6,7 @@ from torch.utils.data import DataLoader
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import DatasetRows
 from pipeline.shards.store import write_shard
-from pipeline.training.dataset import COLUMNS, Batches, Order, Rows, RowStream, load_rows
+from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows, load_rows
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 
@@ -16,7 +16,7 @@ def rows_of(*counts):
     table = np.zeros((sum(counts), COLUMNS), np.float32)
     table[:, 0] = np.repeat(np.arange(len(counts)), counts)
     table[:, 1] = np.concatenate([np.arange(count) for count in counts])
-    return Rows(table, counts)
+    return TrainingRows(table, counts)
 
 
 def test_order_is_a_function_of_seed_and_step():

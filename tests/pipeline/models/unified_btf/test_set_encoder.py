@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.unified_btf.angular_samples import AngularSamples
+from pipeline.models.unified_btf.angular_samples import TexelSamples
 from pipeline.models.unified_btf.options import UnifiedBtfOptions
 from pipeline.models.unified_btf.set_encoder import SetEncoder, angles_of, read_texels
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -10,13 +10,13 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
 
 
-def made_up(count: int, texels: int = 6, seed: int = 0) -> AngularSamples:
+def made_up(count: int, texels: int = 6, seed: int = 0) -> TexelSamples:
     """Return smooth, positive samples of texels that differ, without asking the truth."""
     drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
     phase = np.arange(4 * texels).reshape(texels, 4)
     wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
     values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
-    return AngularSamples((1, texels), drawn.wi, drawn.wo, values.astype(np.float16))
+    return TexelSamples((1, texels), drawn.wi, drawn.wo, values.astype(np.float16))
 
 
 def encoder() -> SetEncoder:
@@ -26,7 +26,7 @@ def encoder() -> SetEncoder:
     return built
 
 
-def encoded(model: SetEncoder, samples: AngularSamples, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
+def encoded(model: SetEncoder, samples: TexelSamples, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
     _, angles, values = read_texels(samples, OPTIONS)
     latents: torch.Tensor = model(angles[chosen], values[chosen].to(torch.float32))
     return latents
@@ -75,7 +75,7 @@ def test_averaged_latents_are_the_latent_of_the_averaged_texel():
     """Exactly so where no ReLU of the latent is on its other side: all of the encoder behind it is linear in values."""
     samples, model = made_up(200), encoder()
     values = samples.values.astype(np.float32).mean(axis=1, keepdims=True)  # not rounded to half precision
-    together = AngularSamples((1, 1), samples.wi, samples.wo, values)
+    together = TexelSamples((1, 1), samples.wi, samples.wo, values)
     for offset, tolerance in ((10.0, 1e-5), (-10.0, 1e-5)):
         model.join.bias.fill_(offset)
         expected = encoded(model, together)[0]

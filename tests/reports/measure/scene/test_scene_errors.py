@@ -14,7 +14,7 @@ from reports.images.exr import film, read_exr
 from reports.measure.scene import scene_errors
 from reports.measure.scene.scene_errors import measure_scene, time_scene, write_truth
 from reports.measure.scene.shot import read_shot, shoot
-from reports.measure.timing import Timing
+from reports.measure.timing import CallTiming
 from reports.options import ImageOptions, RepeatOptions, SceneBenchOptions
 from weaves.errors import BadInput
 
@@ -170,7 +170,7 @@ def test_a_frames_time_weighs_every_cloth_by_its_queries(shot, monkeypatch):
     def readings(contenders, repeats, warm_up):
         assert [len(contender.queries) for contender in contenders] == [1] * 2 * len(counts)
         return [
-            Timing(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
+            CallTiming(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
             for index, _ in enumerate(contenders)
         ]
 
