@@ -6,10 +6,10 @@
     cloth = {"type": "twillight", "fabric": "denim", "yarns": 400.0}
 
 Import it at any time: with a variant set, that one is used; without one, the fastest that works is set. How to use it:
-docs/mitsuba.md. Properties: `pipeline.mitsuba.options` and `pipeline.mitsuba.integrator`.
+docs/mitsuba.md. Properties: `pipeline.mitsuba.worn` and `pipeline.mitsuba.integrator`.
 """
 
-from pipeline.mitsuba.evaluated import evaluated
+from pipeline.mitsuba.integrator import evaluated
 from pipeline.mitsuba.register import register
 
 __all__ = ["evaluated"]

@@ -24,7 +24,7 @@ from pipeline.atomic import atomic_write, disk_errors
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
-FILES: Final = "files"
+_FILES: Final = "files"
 """Key of a listing that has the SHA-256 of each file, by its path in the folder."""
 
 Hashes = dict[str, set[str]]
@@ -91,9 +91,9 @@ def _move(new: Path, folder: Path, listing: str, own: Hashes) -> None:
         if (place.exists() or place.is_symlink()) and name not in own:
             raise _refusal(place, "is in the way", f"{listing} does not name it")
     about = json.loads((new / listing).read_text(encoding="utf-8")) if (new / listing).is_file() else {}
-    about[FILES] = {**hashes, listing: _content_sha256(about)}
+    about[_FILES] = {**hashes, listing: _content_sha256(about)}
     (new / listing).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    known = {name: sorted(own.get(name, set()) | {about[FILES][name]}) for name in about[FILES]}
+    known = {name: sorted(own.get(name, set()) | {about[_FILES][name]}) for name in about[_FILES]}
     left = {name: sorted(values) for name, values in own.items() if name not in known}
     atomic_write(new.parent / "journal.json", json.dumps({**known, **left}).encode())
     for name in hashes:
@@ -125,7 +125,7 @@ def _own(folder: Path, listing: str) -> Hashes:
     own: Hashes = {}
     path = folder / listing
     if path.exists() or path.is_symlink():
-        own = {name: {sha256} for name, sha256 in _hashes(path, _json(path).get(FILES)).items()}
+        own = {name: {sha256} for name, sha256 in _hashes(path, _json(path).get(_FILES)).items()}
     journal = folder / f".tmp-{listing}" / "journal.json"
     if journal.exists():
         for name, hashes in _hashes(journal, _json(journal)).items():
@@ -155,7 +155,7 @@ def _json(path: Path) -> dict[str, Any]:
 
 def _content_sha256(listing: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a listing's own content, without its hashes."""
-    content = {key: value for key, value in listing.items() if key != FILES}
+    content = {key: value for key, value in listing.items() if key != _FILES}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -13,7 +13,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from pipeline.mitsuba.options import ClothOptions
+from pipeline.mitsuba.worn import ClothOptions
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 ROOT = Path(__file__).parents[1]

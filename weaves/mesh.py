@@ -20,7 +20,7 @@ from weaves.surface import WARP, WEFT, Floats, surface_at
 
 INSIDE: Final = 1e-12
 """Distance inside a piece at which its border is sampled, so that it is on top there."""
-STEP: Final = 1e-6
+LEAST_STEP: Final = 1e-6
 """Pieces whose heights differ by less than this meet without a wall, in yarn spacings."""
 
 Integers = npt.NDArray[np.int64]
@@ -177,7 +177,7 @@ def _lay(profile: Floats, grid: Floats, piece: _Piece, column: Literal[0, -1] | 
 
 def _steps(border: float, grid: Floats, left: Floats, right: Floats) -> Mesh:
     """Stand triangles between two profiles (picks, ends, steps, 2), their open side to the lower one."""
-    right = np.where(np.abs(left - right) < STEP, left, right)
+    right = np.where(np.abs(left - right) < LEAST_STEP, left, right)
     rise = left - right
     pick, end, step = np.nonzero((rise != 0).any(axis=-1))
     y = pick + grid[np.stack([step, step + 1])]

@@ -7,7 +7,7 @@ from typing import Final
 
 from jobs.recipe.recipe import Recipe
 from pipeline.models.domain import PHYSICS
-from pipeline.shader.limits import MOST_CELLS
+from pipeline.shader.limits import MOST_REPEAT_CELLS
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
@@ -112,8 +112,8 @@ def _check_live(recipe: Recipe, where: str) -> None:
             allowed = f"must be a seen or unseen fabric of the recipe; {nearest(name, measured)}"
             raise BadInput(where, "bench.live.fabrics", name, allowed)
         ends, picks = measured[name].weave.repeat
-        if ends * picks > MOST_CELLS:
-            allowed = f"its repeat has {ends * picks:,} cells, a live page takes at most {MOST_CELLS:,}"
+        if ends * picks > MOST_REPEAT_CELLS:
+            allowed = f"its repeat has {ends * picks:,} cells, a live page takes at most {MOST_REPEAT_CELLS:,}"
             raise BadInput(where, "bench.live.fabrics", name, allowed)
 
 

@@ -43,12 +43,12 @@ def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Map
     file = read_draft(draft)
     yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
-    found = fabric_of(file, yarns, own, str(draft), given)
-    atomic_write(out, found.fabric.to_toml().encode())
+    drafted = fabric_of(file, yarns, own, str(draft), given)
+    atomic_write(out, drafted.fabric.to_toml().encode())
     console = Terminal()
     program = f", written by {file.program}" if file.program else ""
     console.print(f"{out}: fabric {own} from the draft {file.title!r}{program}", soft_wrap=True)
-    for heading, sentences in (("Read:", found.read), ("Assumed:", found.assumed)):
+    for heading, sentences in (("Read:", drafted.read), ("Assumed:", drafted.assumed)):
         console.print(heading)
         for sentence in sentences:
             console.print(f"- {sentence}", soft_wrap=True)

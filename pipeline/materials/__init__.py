@@ -1,5 +1,5 @@
 """Texture maps of a fabric for programs that know materials, not yarns.
 
-layout (yarns and texels of a map), planes (sums of the surface over texels, and their mip levels), reflectance (what
-the truth returns of an even sky), lobes (GGX and Charlie sheen), textures (the maps). No files are written here.
+planes (layout of a map, sums of the surface over its texels, mip levels), lobes (what the truth returns of an even sky;
+GGX and Charlie sheen), textures (the maps), lookup (a material of maps, evaluated). No files are written here.
 """

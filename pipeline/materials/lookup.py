@@ -23,17 +23,15 @@ import numpy as np
 from pipeline.analytic.taps import taps
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.materials.layout import Layout
-from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie
-from pipeline.materials.planes import Planes
-from pipeline.materials.reflectance import even_sky
+from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, even_sky
+from pipeline.materials.planes import Layout, Planes
 from pipeline.materials.textures import Constants, textures
 from pipeline.truth.query import Queries
 
 TAPS: Final = 16
 """Most readings along a footprint's longer axis."""
 
-CHANNELS: Final = 15
+TEXEL_CHANNELS: Final = 15
 """Numbers of a texel: opacity, base (2), F0 (2), through (2), normal (3), tangent (3), alpha along and across."""
 
 _0, _1, _HALF, _4 = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(4.0)
@@ -48,7 +46,7 @@ class MipLevels(NamedTuple):
 
     Attributes
     ----------
-    texels : float32 (T, CHANNELS)
+    texels : float32 (T, TEXEL_CHANNELS)
         All levels, finest first, row by row.
     levels : int64 (L, 3)
         First texel, columns and rows of each level.
@@ -76,7 +74,7 @@ class MipLevels(NamedTuple):
     taps: Float64
 
 
-def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64, specular: float) -> MipLevels:
+def mip_levels(level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float) -> MipLevels:
     """Return the maps of a cloth at all levels, down to one texel.
 
     Parameters
@@ -85,7 +83,7 @@ def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64
         Sums of the finest level; red is the warp's, green the weft's.
     material : Constants
         Numbers of the material.
-    found : Layout
+    shown : Layout
         Yarns and texels of the finest level.
     sheen : float64 (4,)
         Share of the sheen of each component.
@@ -106,7 +104,7 @@ def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64
             maps.alpha_along[..., None],
             maps.alpha_across[..., None],
         )
-        parts.append(np.concatenate(planes, axis=-1).reshape(-1, CHANNELS))
+        parts.append(np.concatenate(planes, axis=-1).reshape(-1, TEXEL_CHANNELS))
         levels.append((first, width, height))
         first += width * height
         if width == height == 1:
@@ -115,8 +113,8 @@ def mip_levels(level: Planes, material: Constants, found: Layout, sheen: Float64
     return MipLevels(
         texels=np.concatenate(parts).astype(np.float32),
         levels=np.array(levels, np.int64),
-        extent=np.array([found.ends, found.picks], np.float64),
-        finest=math.sqrt(found.ends / found.width * found.picks / found.height),
+        extent=np.array([shown.ends, shown.picks], np.float64),
+        finest=math.sqrt(shown.ends / shown.width * shown.picks / shown.height),
         sheen=sheen.astype(np.float32),
         specular=np.float32(specular),
         white=_white_sheen(),
@@ -132,10 +130,12 @@ def answer(maps: MipLevels, queries: Queries) -> Float32:
 
 def _white_sheen() -> Float32:
     """Return the reflectance of a white sheen at cosines (i + 1/2) / `_VIEWS`."""
-    wi, found = even_sky(4096), []
+    wi, shares = even_sky(4096), []
     for cosine in (np.arange(_VIEWS) + 0.5) / _VIEWS:
-        found.append(math.pi * charlie(wi, np.array([math.sqrt(1.0 - cosine**2), 0.0, cosine]), SHEEN_ROUGHNESS).mean())
-    return np.array(found, np.float32)
+        shares.append(
+            math.pi * charlie(wi, np.array([math.sqrt(1.0 - cosine**2), 0.0, cosine]), SHEEN_ROUGHNESS).mean()
+        )
+    return np.array(shares, np.float32)
 
 
 @allocating_kernel
@@ -143,7 +143,7 @@ def _answer(
     maps: MipLevels, u: Float32, v: Float32, major: Float32, minor: Float32, angle: Float32, wi: Float32, wo: Float32
 ) -> Float32:
     result = np.zeros((len(u), 4), np.float32)
-    read = np.zeros(CHANNELS, np.float32)
+    read = np.zeros(TEXEL_CHANNELS, np.float32)
     for row in range(len(u)):
         read[:] = _0
         _read(maps, u[row], v[row], major[row], minor[row], angle[row], read)
@@ -184,7 +184,7 @@ def _add(texels: Float32, level: Index, x: float, y: float, share: np.float32, r
         for dx in range(2):
             weight = share * weight_y * (right if dx == 1 else _1 - right)
             texel = first + ((line + dy + height) % height) * width + (column + dx + width) % width
-            for c in range(CHANNELS):
+            for c in range(TEXEL_CHANNELS):
                 read[c] += weight * texels[texel, c]
 
 

@@ -1,4 +1,8 @@
-"""Sums of a fabric's surface over the texels of a map, and their mip levels.
+"""Layout of tiling maps, the sums of a fabric's surface over their texels, and mip levels of these.
+
+A map shows whole repeats of weave and colours, so that it tiles. Its sides are powers of two, so that mip levels are
+exact. Among these layouts the texels are square within 1 % where that is possible, else as square as possible; then a
+yarn has as many texels as possible; then the map is as small as possible.
 
 A texel holds sums over its points, weighted by the coverage c (1 on a yarn, 0 in a gap). They are linear, so a texel
 of the next mip level is the mean of four texels, and nothing that differs below a texel is lost:
@@ -14,17 +18,32 @@ normals [Olano2010LEAN].
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.materials.layout import Layout
-from pipeline.materials.lobes import white_f0
-from pipeline.materials.reflectance import Reflectance
+from pipeline.materials.lobes import Reflectance, white_f0
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.surface import GAP, WARP, ClothSurface, surface_at
+
+SMALLEST_MAP: Final = 64
+"""Shortest longer side, in texels."""
+
+LARGEST_MAP: Final = 4096
+"""Longest side, in texels: the sums of such a map take 1.5 GB."""
+
+LEAST_TEXELS_PER_YARN: Final = 4
+"""Fewest texels along a yarn spacing."""
+
+_SQUARE: Final = 0.01
+"""Difference of the sides of a texel that counts as none."""
+
+_COPIES: Final = 16
+"""Most repeats along the shorter side."""
 
 SAMPLES_PER_YARN: Final = 16
 """Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
@@ -37,6 +56,28 @@ _BAND: Final = 1 << 18
 
 _Factors = tuple[Float64, Float64, Float64]
 """Factors of the diffuse, the specular and the transmitted colour, by family."""
+
+
+class Layout(NamedTuple):
+    """Extent of a map.
+
+    Attributes
+    ----------
+    ends, picks : int
+        Yarns along x and along y: whole repeats.
+    width, height : int
+        Texels along x and along y: powers of two.
+    """
+
+    ends: int
+    picks: int
+    width: int
+    height: int
+
+    @property
+    def texels_per_yarn(self) -> float:
+        """Texels along a yarn spacing, in the direction that has fewer."""
+        return min(self.width / self.ends, self.height / self.picks)
 
 
 class Planes(NamedTuple):
@@ -69,24 +110,74 @@ class Planes(NamedTuple):
         return Planes(*(_halved(plane) for plane in self))
 
 
-def planes(fabric: Fabric, found: Layout, share: Reflectance) -> Planes:
+def layout(fabric: Fabric, size: int) -> Layout:
+    """Return the layout of a fabric's maps.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        The cloth.
+    size : int
+        Texels of the longer side.
+
+    Raises
+    ------
+    BadInput
+        If the size is no power of two from `SMALLEST_MAP` to `LARGEST_MAP`, or too small for the repeat.
+    """
+    if not SMALLEST_MAP <= size <= LARGEST_MAP or size & (size - 1):
+        raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST_MAP} to {LARGEST_MAP}")
+    best = min(_candidates(fabric.repeat, size), key=_order)
+    if best.texels_per_yarn < LEAST_TEXELS_PER_YARN:
+        needed = size
+        while needed * best.texels_per_yarn / size < LEAST_TEXELS_PER_YARN:
+            needed *= 2
+        ends, picks = fabric.repeat
+        allowed = f"the repeat of {ends} ends and {picks} picks needs {needed}"
+        if needed > LARGEST_MAP:
+            allowed += f", and at most {LARGEST_MAP} are possible"
+        raise BadInput("export", "size", size, allowed)
+    return best
+
+
+def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
+    """Return layouts whose longer side has `size` texels."""
+    layouts = []
+    for halvings in range(4):
+        for width, height in ((size, size >> halvings), (size >> halvings, size)):
+            for copies in range(1, _COPIES + 1):
+                # As many repeats along the other side as make texels nearly square.
+                rows = max(1, round(copies * repeat[0] * height / (width * repeat[1])))
+                columns = max(1, round(copies * repeat[1] * width / (height * repeat[0])))
+                layouts.append(Layout(copies * repeat[0], rows * repeat[1], width, height))
+                layouts.append(Layout(columns * repeat[0], copies * repeat[1], width, height))
+    return layouts
+
+
+def _order(candidate: Layout) -> tuple[float, float, int]:
+    """Return the key by which the best layout is the least."""
+    aspect = abs(math.log(candidate.width * candidate.picks / (candidate.height * candidate.ends)))
+    return max(aspect, _SQUARE), -candidate.texels_per_yarn, candidate.width * candidate.height
+
+
+def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level.
 
     Parameters
     ----------
     fabric : Fabric
         The cloth.
-    found : Layout
+    shown : Layout
         Yarns and texels of the map.
     share : Reflectance
         Reflectance of the families.
     """
-    per_texel = _samples(found)
-    width, height = found.width * per_texel, found.height * per_texel
+    per_texel = _samples(shown)
+    width, height = shown.width * per_texel, shown.height * per_texel
     lowest = _lowest(fabric)
     factors = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
-    x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (found.ends / width)
-    y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (found.picks / height)
+    x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
+    y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
     bands = []
     for first in range(0, height, rows):
@@ -98,24 +189,24 @@ def planes(fabric: Fabric, found: Layout, share: Reflectance) -> Planes:
     return Planes(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
 
 
-def yarn_ids(fabric: Fabric, found: Layout) -> npt.NDArray[np.int32]:
+def yarn_ids(fabric: Fabric, shown: Layout) -> npt.NDArray[np.int32]:
     """Return the number of the yarn at each texel centre, (H, W): 0 in gaps, then the ends, then the picks."""
-    x = (np.arange(found.width) + 0.5) * (found.ends / found.width)
-    y = (np.arange(found.height) + 0.5) * (found.picks / found.height)
-    rows = max(1, _BAND // found.width)
+    x = (np.arange(shown.width) + 0.5) * (shown.ends / shown.width)
+    y = (np.arange(shown.height) + 0.5) * (shown.picks / shown.height)
+    rows = max(1, _BAND // shown.width)
     bands = []
-    for first in range(0, found.height, rows):
+    for first in range(0, shown.height, rows):
         part = y[first : first + rows]
         yarn = surface_at(fabric, x[None, :], part[:, None]).yarn
-        end, pick = 1 + x.astype(np.int32), 1 + found.ends + part.astype(np.int32)
+        end, pick = 1 + x.astype(np.int32), 1 + shown.ends + part.astype(np.int32)
         bands.append(np.where(yarn == GAP, 0, np.where(yarn == WARP, end[None, :], pick[:, None])).astype(np.int32))
     return np.concatenate(bands)
 
 
-def _samples(found: Layout) -> int:
+def _samples(shown: Layout) -> int:
     """Return the points of a texel along each side, a power of two."""
     count = 1
-    while count * found.texels_per_yarn < SAMPLES_PER_YARN:
+    while count * shown.texels_per_yarn < SAMPLES_PER_YARN:
         count *= 2
     return count
 

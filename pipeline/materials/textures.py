@@ -27,9 +27,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.materials.lobes import ggx_reflectance, sheen_reflectance, white_f0
+from pipeline.materials.lobes import Reflectance, ggx_reflectance, sheen_reflectance, white_f0
 from pipeline.materials.planes import PAIRS, Planes
-from pipeline.materials.reflectance import Reflectance
 from weaves.fabric import Fabric
 
 _TINY: Final = 1e-6

@@ -2,7 +2,7 @@
 
     {"type": "twillight", "fabric": "denim", "yarns": 400.0}
 
-Properties are the fields of `pipeline.mitsuba.options.ClothOptions`. A footprint is, in this order: the property
+Properties are the fields of `pipeline.mitsuba.worn.ClothOptions`. A footprint is, in this order: the property
 `sigma`; the ray's partial derivatives (`si.duv_dx`, `si.duv_dy`), which the integrator `twillight_path` keeps at every
 bounce; the property `pixel_angle`. Components: 0 reflection, 1 transmission, 2 light straight through gaps and yarns,
 which neither `eval` nor `pdf` knows, because it is a delta lobe (Null). Cloth counts as flat across a footprint.
@@ -17,17 +17,58 @@ from typing import Any, Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
-from pipeline.mitsuba.columns import Columns
-from pipeline.mitsuba.options import ClothOptions
-from pipeline.mitsuba.worn import Hits, Worn
+from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from weaves.errors import BadInput
 from weaves.validation import validated
 
-NAME: Final = "twillight"
+BSDF: Final = "twillight"
 """Name of the plugin."""
 
-REFLECTION, TRANSMISSION, STRAIGHT = range(3)
+REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
 """Components."""
+
+
+class RayValues:
+    """Values of Mitsuba as NumPy arrays with one row a ray, and back, for scalar and for vectorised variants.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba, its variant set.
+    count : int
+        Rays; 1 where the variant is scalar.
+    """
+
+    def __init__(self, mi: Any, count: int) -> None:
+        self._mi, self._count = mi, count
+        self._scalar = mi.variant().startswith("scalar")
+
+    def number(self, value: Any) -> Float64:
+        """Return a number of each ray, (N,)."""
+        return np.broadcast_to(np.asarray(value, np.float64).reshape(-1), (self._count,))
+
+    def vector(self, value: Any) -> Float64:
+        """Return the vector of each ray, (N, its length)."""
+        rows = np.asarray(value, np.float64)
+        rows = rows.reshape(len(rows), -1).T
+        return np.broadcast_to(rows, (self._count, rows.shape[1]))
+
+    def active(self, value: Any) -> Index:
+        """Return which rays are active."""
+        chosen: Mask = np.broadcast_to(np.asarray(value, np.bool_).reshape(-1), (self._count,))
+        return np.flatnonzero(chosen)
+
+    def to_mitsuba(self, kind: Any, values: Any, rows: Index, elsewhere: float = 0.0) -> Any:
+        """Return numbers (n,) or vectors (n, c) of the rays `rows` as Mitsuba's `kind`; other rays have `elsewhere`."""
+        values = np.asarray(values)
+        if self._scalar:
+            if values.ndim == 1:
+                return kind(values[0].item() if len(rows) else elsewhere)
+            return kind(*(values[0].tolist() if len(rows) else [elsewhere] * values.shape[1]))
+        type_of = np.uint32 if kind is self._mi.UInt32 else np.bool_ if kind is self._mi.Bool else np.float32
+        whole = np.full((self._count, *values.shape[1:]), elsewhere, type_of)
+        whole[rows] = values
+        return kind(np.ascontiguousarray(whole.T))
 
 
 def bsdf_class(mi: Any, dr: Any) -> type[Any]:
@@ -52,7 +93,7 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
             given = {name: props[name] for name in props.keys()}  # noqa: SIM118, not a mapping
-            self._worn = Worn(validated(ClothOptions, given, f"bsdf {NAME}"))
+            self._worn = Worn(validated(ClothOptions, given, f"bsdf {BSDF}"))
             self.m_components = [reduce(or_, kind, everywhere) for kind in kinds]
             self.m_flags = reduce(or_, self.m_components)
 
@@ -73,15 +114,15 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
             columns, rows, hits = _hits(mi, dr, si, active, sample1, sample2)
             random = np.column_stack([columns.number(sample1), columns.vector(sample2)])[rows]
             wo, pdf, straight, weight = self._worn.sample(hits, random) if len(rows) else _NOTHING
-            component = np.where(straight, STRAIGHT, _component(hits, wo))
+            component = np.where(straight, STRAIGHT_THROUGH, _component(hits, wo))
             weight = np.where(enabled(ctx, component)[:, None], weight, 0.0)
-            found = mi.BSDFSample3f()
-            found.wo = columns.to_mitsuba(mi.Vector3f, wo, rows)
-            found.pdf = columns.to_mitsuba(mi.Float, pdf, rows)
-            found.eta = columns.to_mitsuba(mi.Float, np.ones(len(rows)), rows, 1.0)
-            found.sampled_type = columns.to_mitsuba(mi.UInt32, types[component], rows)
-            found.sampled_component = columns.to_mitsuba(mi.UInt32, component, rows)
-            return found, columns.to_mitsuba(mi.Spectrum, weight, rows)
+            drawn = mi.BSDFSample3f()
+            drawn.wo = columns.to_mitsuba(mi.Vector3f, wo, rows)
+            drawn.pdf = columns.to_mitsuba(mi.Float, pdf, rows)
+            drawn.eta = columns.to_mitsuba(mi.Float, np.ones(len(rows)), rows, 1.0)
+            drawn.sampled_type = columns.to_mitsuba(mi.UInt32, types[component], rows)
+            drawn.sampled_component = columns.to_mitsuba(mi.UInt32, component, rows)
+            return drawn, columns.to_mitsuba(mi.Spectrum, weight, rows)
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
             """Return the share of light that goes straight through."""
@@ -91,7 +132,7 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def to_string(self) -> str:
             """Return the properties as text."""
-            return f"{NAME}[{self._worn.options}]"
+            return f"{BSDF}[{self._worn.options}]"
 
         def _evaluated(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
             columns, rows, hits = _hits(mi, dr, si, active, wo)
@@ -111,24 +152,24 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 _NOTHING: Any = (np.empty((0, 3)), np.empty(0), np.empty(0, np.bool_), np.empty((0, 3)))
 
 
-def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[Columns, Index, Hits]:
+def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValues, Index, RayHits]:
     """Return the active rows with a viewer on either side, and what they meet; `others` have the same length."""
     scalar = mi.variant().startswith("scalar")
     if not scalar and dr.flag(dr.JitFlag.SymbolicScope):
         allowed = "render inside `with twillight_mitsuba.evaluated():`"
-        raise BadInput(f"bsdf {NAME}", "", "a recorded loop", allowed)
+        raise BadInput(f"bsdf {BSDF}", "", "a recorded loop", allowed)
     normal, du = si.sh_frame.n, si.dp_du
     handed = dr.dot(dr.cross(du, si.dp_dv), normal)
     names = (si.uv, si.wi, si.to_local(si.n), si.duv_dx, si.duv_dy)
     numbers = (handed, si.t, dr.norm(du))
     if not scalar:
         dr.eval(names, numbers, active)
-    columns = Columns(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
+    columns = RayValues(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
     rows = columns.active(active)
     uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
     handed, distance, length = (columns.number(value)[rows] for value in numbers)
     seen, traced = np.abs(viewer[:, 2]) > 0.0, np.isfinite(distance) & (length > 0.0)
-    hits = Hits(
+    hits = RayHits(
         uv,
         viewer,
         outward,
@@ -136,9 +177,9 @@ def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[Columns
         np.stack([duv_dx, duv_dy], axis=-1),
         np.where(traced, distance, 0.0) / np.where(traced, length, 1.0),
     )
-    return columns, rows[seen], Hits(*(column[seen] for column in hits))
+    return columns, rows[seen], RayHits(*(column[seen] for column in hits))
 
 
-def _component(hits: Hits, light: Float64 | Float32) -> Index:
+def _component(hits: RayHits, light: Float64 | Float32) -> Index:
     """Return the component of each light, (N,)."""
     return np.where(hits.viewer[:, 2] * light[:, 2] < 0.0, TRANSMISSION, REFLECTION)

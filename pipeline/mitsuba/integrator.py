@@ -3,31 +3,46 @@
     {"type": "twillight_path", "max_depth": 8, "rr_depth": 5, "hide_emitters": False}
 
 Otherwise it is Mitsuba's `path`. At the camera a ray's footprint is a pixel's Gaussian less the variance that the
-film's filter adds, so that cloth is equally sharp with any number of samples; pipeline.mitsuba.path has the rest.
+film's filter adds, so that cloth is equally sharp with any number of samples.
+
+Emitters are sampled at every bounce, and both ways to a light are weighted by the power heuristic [Veach1995Combining].
+A footprint after a bounce is a disc across the ray, of deviation
+
+    sqrt(width^2 + blur^2),    width += spread t,    blur += scatter t
+
+with `width` and `spread` of the camera's cone. `scatter` gathers earlier bounces: a direction of density p stands for
+the solid angle 1/p, a disc of variance 1/(4 pi p) along each axis [Bekaert2003Footprint]. Light straight through gaps
+and other delta lobes scatter nothing.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from pipeline.mitsuba import bsdf
-from pipeline.mitsuba.evaluated import evaluated
-from pipeline.mitsuba.footprint import PIXEL
-from pipeline.mitsuba.path import Path
+from pipeline.mitsuba.bsdf import BSDF
+from pipeline.mitsuba.worn import PIXEL
 from pipeline.scenes.loading import has_uv
 from weaves.errors import BadInput
 from weaves.validation import validated
 
-NAME: Final = "twillight_path"
+INTEGRATOR: Final = "twillight_path"
 """Name of the plugin."""
 
 
 MOST_RAYS: Final = 2**20
 """Most rays that are traced at a time; a ray takes about a kilobyte."""
+
+MOST_SCATTER: Final = 0.5
+"""Largest square of `scatter`, in radians squared: that of a direction drawn evenly from a hemisphere."""
+
+FLAGS: Final = ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals")
+"""Flags of Dr.Jit that are off inside."""
 
 
 class PathOptions(BaseModel):
@@ -43,6 +58,28 @@ class PathOptions(BaseModel):
     """True hides lights that the camera sees."""
 
 
+@contextmanager
+def evaluated() -> Iterator[None]:
+    """Let Dr.Jit evaluate loops and calls at once, not record them: NumPy answers queries, and cannot be recorded.
+
+    The integrator `twillight_path` does so itself, others need it around them. Only inside: there Mitsuba's `aov` gives
+    wrong normals, and `path` loses light (version 3.9.1).
+
+    Examples
+    --------
+    >>> import mitsuba as mi
+    >>> mi.set_variant("scalar_rgb")
+    >>> with evaluated():
+    ...     pass  # mi.render(scene, integrator=mi.load_dict({"type": "path"}))
+    """
+    import drjit as dr
+
+    with ExitStack() as stack:
+        for name in FLAGS:
+            stack.enter_context(dr.scoped_set_flag(getattr(dr.JitFlag, name), False))
+        yield
+
+
 def integrator_class(mi: Any, dr: Any) -> type[Any]:
     """Return the class of the plugin for the variant of Mitsuba that is set."""
 
@@ -52,7 +89,7 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
         def __init__(self, props: Any) -> None:
             mi.SamplingIntegrator.__init__(self, props)
             given = {name: props[name] for name in props.keys()}  # noqa: SIM118, not a mapping
-            self._options = validated(PathOptions, given, f"integrator {NAME}")
+            self._options = validated(PathOptions, given, f"integrator {INTEGRATOR}")
             self._samples, self._deviation = 0, PIXEL
 
         def render(
@@ -94,12 +131,12 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
             # Mitsuba has divided differentials by the root of the samples.
             ray.scale_differential(self._deviation / PIXEL * math.sqrt(sampler.sample_count()))
             options = self._options
-            path = Path(mi, dr, scene, sampler, options.max_depth, options.rr_depth, options.hide_emitters)
+            path = _Path(mi, dr, scene, sampler, options.max_depth, options.rr_depth, options.hide_emitters)
             return (*path.trace(ray, mi.Bool(active)), [])
 
         def to_string(self) -> str:
             """Return the properties as text."""
-            return f"{NAME}[{self._options}]"
+            return f"{INTEGRATOR}[{self._options}]"
 
     return TwillightPath
 
@@ -126,7 +163,161 @@ def ray_deviation(rfilter: Any, samples: int) -> float:
 def _refuse_bare(mi: Any, scene: Any) -> None:
     """Refuse a scene in which a mesh wears cloth and has no uv coordinates."""
     for shape in scene.shapes():
-        worn = shape.bsdf() is not None and str(shape.bsdf()).startswith(f"{bsdf.NAME}[")
+        worn = shape.bsdf() is not None and str(shape.bsdf()).startswith(f"{BSDF}[")
         if worn and shape.is_mesh() and not has_uv(mi, shape):
             name = shape.id() or shape.class_name()
-            raise BadInput("scene", "shape", name, f"a shape that wears {bsdf.NAME} needs uv coordinates")
+            raise BadInput("scene", "shape", name, f"a shape that wears {BSDF} needs uv coordinates")
+
+
+class _Bounce(NamedTuple):
+    """Where paths came from, the density of their direction, and whether it was that of a delta lobe."""
+
+    place: Any
+    pdf: Any
+    delta: Any
+
+
+class _Path:
+    """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once.
+
+    Parameters
+    ----------
+    mi, dr : module
+        Mitsuba, its variant set, and Dr.Jit.
+    scene, sampler
+        What is rendered, and where random numbers come from.
+    max_depth, rr_depth, hide_emitters
+        As for Mitsuba's `path`.
+    """
+
+    def __init__(
+        self, mi: Any, dr: Any, scene: Any, sampler: Any, max_depth: int, rr_depth: int, hide_emitters: bool
+    ) -> None:
+        self._mi, self._dr, self._scene, self._sampler = mi, dr, scene, sampler
+        self._max_depth, self._rr_depth, self._hide = max_depth, rr_depth, hide_emitters
+        self._scalar = mi.variant().startswith("scalar")
+        self._context = mi.BSDFContext()
+
+    def trace(self, ray: Any, active: Any) -> tuple[Any, Any]:
+        """Return the radiance along rays with differentials, and whether they hit anything."""
+        mi, dr, sampler = self._mi, self._dr, self._sampler
+        cone = _Cone(mi, dr)
+        light, throughput, valid = mi.Spectrum(0.0), mi.Spectrum(1.0), mi.Bool(False)
+        before = _Bounce(dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True))
+        depth = 0
+        while True:
+            si = self._scene.ray_intersect(ray, active)
+            if depth == 0:
+                valid = si.is_valid()
+            if depth > 0 or not self._hide:
+                light += throughput * self._emitted(si, before, active)
+            depth += 1
+            active = active & si.is_valid()
+            if depth == self._max_depth or not dr.any(active):
+                break
+            cone.meet(ray, si)
+            to_light, lobe, direction, end = sampler.next_2d(), sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
+            self._evaluate(si, to_light, lobe, direction, end, active, cone.state)
+            light += throughput * self._lit(si, to_light, active)
+            drawn, weight = si.bsdf().sample(self._context, si, lobe, direction, active)
+            throughput *= weight
+            before = _Bounce(si, drawn.pdf, mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta))
+            cone.scatter(drawn.pdf, before.delta)
+            ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
+            largest = dr.max(throughput)
+            active = active & (largest > 0.0)
+            if depth >= self._rr_depth:
+                kept = dr.minimum(largest, 0.95)
+                active = active & (end < kept)
+                throughput /= dr.maximum(kept, 1e-8)
+            self._evaluate(light, throughput, active, ray, before.pdf, before.delta, cone.state)
+        return light, valid
+
+    def _emitted(self, si: Any, before: _Bounce, active: Any) -> Any:
+        """Return the light of emitters that rays hit, weighted against `_lit`."""
+        mi, dr, scene = self._mi, self._dr, self._scene
+        emitter = si.emitter(scene, active)
+        if self._scalar and emitter is None:
+            return mi.Spectrum(0.0)
+        emitted = mi.DirectionSample3f(scene, si, before.place)
+        sampled = active & ~before.delta if not self._scalar else active and not before.delta
+        other = scene.pdf_emitter_direction(before.place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
+        weight = dr.select(before.delta, 1.0, self._heuristic(before.pdf, other))
+        return weight * emitter.eval(si, active)
+
+    def _lit(self, si: Any, numbers: Any, active: Any) -> Any:
+        """Return the light of emitters that are sampled, weighted against `_emitted`."""
+        mi, dr, scene = self._mi, self._dr, self._scene
+        bsdf = si.bsdf()
+        wanted = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        towards, power = scene.sample_emitter_direction(si, numbers, True, wanted)
+        wanted = wanted & (towards.pdf != 0.0) & (dr.max(power) > 0.0)
+        if not dr.any(wanted):
+            return mi.Spectrum(0.0)
+        wo = si.to_local(towards.d)
+        self._evaluate(wo, wanted, power, towards)
+        value, pdf = bsdf.eval_pdf(self._context, si, wo, wanted)
+        weight = dr.select(towards.delta, 1.0, self._heuristic(towards.pdf, pdf))
+        return dr.select(wanted, weight * value * power, 0.0)
+
+    def _heuristic(self, own: Any, other: Any) -> Any:
+        """Return own^2 / (own^2 + other^2), 0 where both are 0."""
+        sum_of_squares = own * own + other * other
+        return self._dr.select(sum_of_squares > 0.0, own * own / self._dr.maximum(sum_of_squares, 1e-30), 0.0)
+
+    def _evaluate(self, *values: Any) -> None:
+        if not self._scalar:
+            self._sampler.schedule_state()
+            self._dr.eval(*values)
+
+
+class _Cone:
+    """Footprints of rays along their paths."""
+
+    def __init__(self, mi: Any, dr: Any) -> None:
+        self._mi, self._dr = mi, dr
+        self._width: Any = None
+        self._spread: Any = None
+        self._blur: Any = None
+        self._scatter: Any = None
+
+    @property
+    def state(self) -> tuple[Any, ...]:
+        """Width, spread, blur and scatter."""
+        return (self._width, self._spread, self._blur, self._scatter)
+
+    def meet(self, ray: Any, si: Any) -> None:
+        """Set the partial derivatives of what rays meet; those of the first rays are their own."""
+        mi, dr = self._mi, self._dr
+        if self._width is None:
+            self._start(ray, si)
+            return
+        self._width = self._width + self._spread * si.t
+        self._blur = self._blur + self._scatter * si.t
+        size = dr.sqrt(self._width * self._width + self._blur * self._blur) / PIXEL
+        across, along = mi.coordinate_system(ray.d)
+        # Parallel rays through the disc: their places on the tangent plane are its footprint.
+        beside = mi.RayDifferential3f(ray)
+        beside.o_x, beside.o_y = ray.o + across * size, ray.o + along * size
+        beside.d_x, beside.d_y = ray.d, ray.d
+        beside.has_differentials = True
+        si.compute_uv_partials(beside)
+
+    def scatter(self, pdf: Any, delta: Any) -> None:
+        """Widen the rays by a bounce into a direction of this density."""
+        dr = self._dr
+        added = dr.minimum(1.0 / (4.0 * math.pi * dr.maximum(pdf, 1e-6)), MOST_SCATTER)
+        square = self._scatter * self._scatter + dr.select(delta, 0.0, added)
+        self._scatter = dr.sqrt(dr.minimum(square, MOST_SCATTER))
+
+    def _start(self, ray: Any, si: Any) -> None:
+        mi, dr = self._mi, self._dr
+        self._width = self._spread = self._blur = self._scatter = mi.Float(0.0)
+        if not ray.has_differentials:
+            return
+        si.compute_uv_partials(ray)
+        right, down = (si.dp_du * change.x + si.dp_dv * change.y for change in (si.duv_dx, si.duv_dy))
+        width = PIXEL * dr.sqrt(dr.abs(dr.dot(dr.cross(right, down), ray.d)))
+        known = dr.isfinite(width) & (si.t > 0.0)
+        self._width = dr.select(known, width, 0.0)
+        self._spread = dr.select(known, width / dr.maximum(si.t, 1e-12), 0.0)

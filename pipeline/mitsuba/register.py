@@ -1,11 +1,15 @@
-"""The plugins entered into Mitsuba, for the variant that is set and for each that is set later."""
+"""The plugins entered into Mitsuba, for the variant that is set and each that is set later; scenes that wear them."""
 
 from __future__ import annotations
 
 import warnings
 from typing import Any, Final
 
-from pipeline.mitsuba import bsdf, integrator
+from pipeline.mitsuba.bsdf import BSDF, bsdf_class
+from pipeline.mitsuba.integrator import INTEGRATOR, integrator_class
+from pipeline.models.patch_bsdf import USUAL
+from pipeline.scenes.loading import Loaded
+from pipeline.scenes.scene import PREFIX
 from pipeline.scenes.variant import llvm_works
 from weaves.errors import BadInput
 
@@ -40,6 +44,28 @@ def register() -> Any:
     return mi
 
 
+def dress(loaded: Loaded, method: str = USUAL) -> Any:
+    """Let the shapes of a loaded scene wear their cloth as a BSDF, and return Mitsuba's scene.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scene; it is changed.
+    method : str
+        The method that evaluates the cloth (`pipeline.models.named`).
+    """
+    mi = register()
+    worn = {}
+    for key, (cloth, fabric) in loaded.cloths.items():
+        properties = {"fabric": cloth.fabric or fabric.name, "yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1]}
+        worn[key] = mi.load_dict({"type": BSDF, "method": method, "turn": cloth.turn, **properties})
+    for shape in loaded.world.shapes():
+        name = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
+        if name.startswith(PREFIX):
+            shape.set_bsdf(worn[name.removeprefix(PREFIX)])
+    return loaded.world
+
+
 def best_variant() -> str:
     """Return llvm_ad_rgb where it works, which a fresh process tries first; else scalar_rgb, with a warning."""
     if llvm_works():
@@ -61,6 +87,5 @@ def _enter(mi: Any) -> None:
     if variant in _registered or not _rgb(variant):
         return
     _registered.add(variant)
-    worn, path = bsdf.bsdf_class(mi, dr), integrator.integrator_class(mi, dr)
-    mi.register_bsdf(bsdf.NAME, worn)
-    mi.register_integrator(integrator.NAME, path)
+    mi.register_bsdf(BSDF, bsdf_class(mi, dr))
+    mi.register_integrator(INTEGRATOR, integrator_class(mi, dr))

@@ -7,6 +7,9 @@ to the viewer and its wo to the light: they are `viewer` and `light` here, wo an
 A light on one side of the surface and on the other of its shading normal gives nothing; so no light leaks through
 interpolated normals. Views more grazing than allowed are tilted (`pipeline.scenes.places.tilted`).
 
+A footprint is the Gaussian of `PIXEL` pixels under J = d(u, v in yarns)/d(pixel): its axes are J's left singular
+vectors, its deviations `PIXEL` times the singular values [Igehy1999RayDifferentials].
+
 Rows are answered in runs of fixed length, on all cores. A method that draws points at random takes the seed of a run
 from the run's own directions: a picture depends on the seed of its rays alone.
 """
@@ -21,20 +24,20 @@ from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from pipeline.analytic.importance.lobes import Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.cores import cores
-from pipeline.mitsuba.footprint import LARGEST, PIXEL, Footprints
-from pipeline.mitsuba.options import ClothOptions
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import one_thread
 from pipeline.models.named import TRUTH, named_method
-from pipeline.models.patch_bsdf import PatchBSDF, Sample
+from pipeline.models.patch_bsdf import USUAL, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.places import tilted
+from pipeline.scenes.scene import Cloth, Yarns
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -42,6 +45,14 @@ from weaves.fabric import Fabric, load_fabric
 
 RUN: Final = 2**14
 """Rows that a thread answers at a time."""
+
+PIXEL: Final = SceneOptions().pixel_sigma
+"""Standard deviation of a pixel's Gaussian, in pixels."""
+
+LARGEST_FOOTPRINT: Final = SceneOptions().largest_sigma
+"""Both axes of a footprint are cut here, in yarn spacings; where derivatives are not finite, they are this long."""
+
+_SMALLEST = 1e-6
 
 _KEPT = 2**20  # rows of lobes that are kept for the next call: 250 megabytes
 _TRUTH = TruthOptions(estimator="auto", relative_error=0.1, min_count=64, max_count=256)  # many rays share a pixel
@@ -51,7 +62,74 @@ _FLAT = 1e-6  # least |cosine| of a light
 Part = TypeVar("Part")
 
 
-class Hits(NamedTuple):
+class ClothOptions(BaseModel):
+    """Cloth of a shape, the method that evaluates it, and the size of its footprints."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    fabric: str
+    """A preset, or the path of a fabric's TOML."""
+    method: str = USUAL
+    """The method that evaluates the cloth: a model that comes with the package or learns nothing, with ``:k`` for a
+    setting; the folder of a trained model; or ``truth``."""
+    yarns: Yarns = 100.0
+    """Yarn spacings in one unit of u and of v."""
+    yarns_v: Yarns | None = None
+    """Yarn spacings in one unit of v, if they differ from those of u."""
+    turn: float = Field(default=0.0, ge=-360, le=360)
+    """Angle from u to the weft, in degrees, as the front shows it."""
+    sigma: float | None = Field(default=None, gt=0, le=1e6)
+    """Standard deviation of every footprint, in yarn spacings, whatever the ray; left out: from the ray."""
+    pixel_angle: float | None = Field(default=None, gt=0, le=1)
+    """Angle of a pixel as the camera sees it, in radians: the footprint of a ray that has no differentials. It is too
+    small after a bounce."""
+
+    @property
+    def cloth(self) -> Cloth:
+        """The cloth, as scenes describe it."""
+        return Cloth(fabric=self.fabric, yarns=(self.yarns, self.yarns_v or self.yarns), turn=self.turn)
+
+
+class Footprints(NamedTuple):
+    """N footprints; columns as in `pipeline.truth.query.Queries`."""
+
+    sigma: Float32
+    sigma_minor: Float32
+    angle: Float32
+
+    @classmethod
+    def of(cls, jacobian: Float64) -> Footprints:
+        """Return the footprints of N pixels, from d(uv in yarns)/d(pixel), (N, 2, 2)."""
+        lost = np.asarray(~np.isfinite(jacobian).all(axis=(1, 2)))
+        j = np.where(lost[:, None, None], np.eye(2) * (LARGEST_FOOTPRINT / PIXEL), jacobian)
+        j = np.clip(j, -1e12, 1e12)
+        # Eigenvalues of J J^T in closed form; the smaller one from the determinant, free of cancellation.
+        xx, yy, xy = (np.einsum("ni,ni->n", j[:, a], j[:, b]) for a, b in ((0, 0), (1, 1), (0, 1)))
+        apart = np.hypot(0.5 * (xx - yy), xy)
+        major = np.sqrt(0.5 * (xx + yy) + apart)
+        area = np.abs(j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0])
+        minor = area / np.maximum(major, 1e-150)
+        angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
+        return cls(_cut(PIXEL * major), _cut(PIXEL * minor), angle.astype(np.float32))
+
+    @classmethod
+    def round(cls, sigma: Float64) -> Footprints:
+        """Return N round footprints."""
+        size = _cut(sigma)
+        return cls(size, size, np.zeros_like(size))
+
+    @classmethod
+    def joined(cls, chosen: Mask, one: Footprints, other: Footprints) -> Footprints:
+        """Return `one` where chosen, (N,), and `other` elsewhere."""
+        return cls(*(np.where(chosen, a, b) for a, b in zip(one, other, strict=True)))
+
+
+def _cut(deviation: Float64) -> Float32:
+    """Return deviations cut to the sizes that queries may have."""
+    return np.clip(deviation, _SMALLEST, LARGEST_FOOTPRINT).astype(np.float32)
+
+
+class RayHits(NamedTuple):
     """N places of a shape that rays meet, in its local frame.
 
     Attributes
@@ -104,43 +182,43 @@ class Worn:
         """The fabric."""
         return self._bsdf.fabric
 
-    def eval(self, hits: Hits, light: Float64) -> Float64:
+    def eval(self, hits: RayHits, light: Float64) -> Float64:
         """Return the BSDF times the cosine to N lights, linear RGB (N, 3), 1/sr."""
         result = self._ask(self._queries(hits, light), lambda rows, seed, lobes: self._bsdf.eval(rows, seed))
         return np.where(_lit(hits, light)[:, None], np.concatenate(result), 0.0)
 
-    def pdf(self, hits: Hits, light: Float64) -> Float32:
+    def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
         looks = self._queries(hits, light)
         lobes = self._lobes(hits)
         return np.concatenate(self._ask(looks, lambda rows, seed, known: self._bsdf.pdf(rows, known), lobes))
 
-    def sample(self, hits: Hits, random: Float64) -> Sample:
+    def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
         looks, lobes = self._looks(hits), self._lobes(hits)
         runs = [slice(start, start + RUN) for start in range(0, len(random), RUN)]
         tasks = [(looks.take(run), random[run], known) for run, known in zip(runs, lobes, strict=True)]
-        found = _on_all_cores(
+        parts = _on_all_cores(
             lambda task: self._bsdf.sample(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks
         )
-        wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*found, strict=True))
+        wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, self._from_cloth(wi.astype(np.float64)))
         weight[~straight & ~_lit(hits, light)] = 0.0
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
-    def transparency(self, hits: Hits) -> Float32:
+    def transparency(self, hits: RayHits) -> Float32:
         """Return the share of light from straight behind that reaches the viewer of each hit, (N,)."""
         method = self._bsdf.method
         parts = self._ask(self._looks(hits), lambda rows, seed, lobes: method.transparency(self.fabric, rows, seed))
         return np.concatenate(parts)
 
-    def _queries(self, hits: Hits, light: Float64) -> Queries:
+    def _queries(self, hits: RayHits, light: Float64) -> Queries:
         towards = self._to_cloth(light)
         # A light in the plane has no answer; it counts as dark (`_lit`).
         towards[:, 2] = np.where(np.abs(towards[:, 2]) < _FLAT, _FLAT, towards[:, 2])
         return self._looks(hits)._replace(wi=towards.astype(np.float32))
 
-    def _looks(self, hits: Hits) -> Queries:
+    def _looks(self, hits: RayHits) -> Queries:
         """Return the footprint and viewer of each hit as queries, lit from the viewer."""
         yarns = np.stack([np.ones_like(hits.handed), hits.handed], axis=-1) * self.options.cloth.yarns
         place = (hits.uv * yarns) @ self._turn.T
@@ -160,22 +238,22 @@ class Worn:
             np.zeros(len(wo), np.float32),
         )
 
-    def _footprints(self, hits: Hits, yarns: Float64) -> Footprints:
+    def _footprints(self, hits: RayHits, yarns: Float64) -> Footprints:
         if self.options.sigma is not None:
             return Footprints.round(np.full(len(hits.uv), self.options.sigma))
         traced = np.asarray(hits.jacobian.any(axis=(1, 2)))
-        found = Footprints.of(self._turn @ (hits.jacobian * yarns[..., None]))
+        of_rays = Footprints.of(self._turn @ (hits.jacobian * yarns[..., None]))
         if traced.all():
-            return found
+            return of_rays
         if self.options.pixel_angle is None:
             raise BadInput(
                 f"bsdf {self.fabric.name}", "pixel_angle", None, "a ray without a footprint: use the integrator "
                 "twillight_path, or state pixel_angle or sigma",
             )  # fmt: skip
         width = PIXEL * self.options.pixel_angle * hits.spread * self.options.yarns
-        return Footprints.joined(traced, found, Footprints.round(np.nan_to_num(width, nan=LARGEST)))
+        return Footprints.joined(traced, of_rays, Footprints.round(np.nan_to_num(width, nan=LARGEST_FOOTPRINT)))
 
-    def _lobes(self, hits: Hits) -> list[Lobes]:
+    def _lobes(self, hits: RayHits) -> list[Lobes]:
         """Return the lobes of each run; those of the last call if its hits were the same."""
         looks, known = self._looks(hits), self._known
         if known is not None and all(map(np.array_equal, known[0], looks)):
@@ -207,7 +285,7 @@ class Worn:
         return result
 
 
-def _lit(hits: Hits, light: Float64) -> Mask:
+def _lit(hits: RayHits, light: Float64) -> Mask:
     """Return which lights are on one side of both normals, and not in the plane, (N,)."""
     facing = np.einsum("ni,ni->n", hits.outward, light) * np.where(hits.outward[:, 2] < 0.0, -1.0, 1.0)
     known = hits.outward.any(axis=1)

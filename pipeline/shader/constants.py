@@ -122,7 +122,7 @@ def constants() -> dict[str, float | int]:
     first, second, third = curved_horizons.CURVATURES
     hidden_cosine, hidden_straight = vars(lobes)["_HIDDEN"]
     red, green, blue = LUMINANCE
-    found: dict[str, object] = {
+    values: dict[str, object] = {
         "TEXTURE_WIDTH": TEXTURE_WIDTH,
         "PI": math.pi,
         "INVERSE_PI": 1.0 / math.pi,
@@ -154,18 +154,18 @@ def constants() -> dict[str, float | int]:
         "LUMINANCE_BLUE": blue,
     }
     for name, (module, columns) in ARRAYS.items():
-        found |= {column: vars(module)[column] for column in columns}
+        values |= {column: vars(module)[column] for column in columns}
         extra = CELLS_OF_GROUP if name == "GROUP" else ()
-        found |= {column: len(columns) + index for index, column in enumerate(extra)}
-        found[f"{name}_COLUMNS"] = len(columns) + len(extra)
+        values |= {column: len(columns) + index for index, column in enumerate(extra)}
+        values[f"{name}_COLUMNS"] = len(columns) + len(extra)
     for module, names in _SAME.items():
-        found |= {name: vars(module)[name] for name in names}
+        values |= {name: vars(module)[name] for name in names}
     for module, renamed in _RENAMED.items():
-        found |= {name: vars(module)[own] for name, own in renamed.items()}
-    return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in found.items()}  # type: ignore[arg-type]
+        values |= {name: vars(module)[own] for name, own in renamed.items()}
+    return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in values.items()}  # type: ignore[arg-type]
 
 
 def shared_constants() -> dict[str, float | int]:
     """Return the constants of the source that needs no tables: arithmetic, queries and colours."""
-    found, names = constants(), ("TEXTURE_WIDTH", "TINY", "PI", "RIGHT", *_RENAMED[float32])
-    return {name: found[name] for name in (*names, *(name for name in found if name.startswith("LUMINANCE")))}
+    values, names = constants(), ("TEXTURE_WIDTH", "TINY", "PI", "RIGHT", *_RENAMED[float32])
+    return {name: values[name] for name in (*names, *(name for name in values if name.startswith("LUMINANCE")))}

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict
 from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.golden import ANSWERS, DENSITY, QUERY_COLUMNS, TRANSPARENCY, Golden
-from pipeline.shader.limits import MOST_CELLS, MOST_NODES
+from pipeline.shader.golden import ANSWER_COLUMNS, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
+from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.tables import ClothTables, Place
 from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput
@@ -226,7 +226,7 @@ def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collectio
         level=level,
         colours=colours(fabric),
         repeat=(int(tables.scalars["ends"]), int(tables.scalars["picks"])),
-        limits={"nodes": MOST_NODES, "cells": MOST_CELLS},
+        limits={"nodes": MOST_NODES, "cells": MOST_REPEAT_CELLS},
         kinds=sorted(kinds),
         scalars=tables.scalars,
         back_scalars=tables.back_scalars,
@@ -250,15 +250,15 @@ def vectors(golden: Golden) -> dict[str, Any]:
     a model without them. `steady` is the share of the queries tried whose answer does not hang on the last digit of a
     place; the others are not listed.
     """
-    whole = golden.answers.shape[1] == ANSWERS
+    whole = golden.answers.shape[1] == ANSWER_COLUMNS
     return {
-        "columns": QUERY_COLUMNS,
+        "columns": GOLDEN_COLUMNS,
         "queries": _short(golden.rows),
         "groups": golden.groups,
         "components": _short(golden.answers[:, :4]),
         "bounds": _short(golden.answers[:, 4:8]),
-        "transparency": _short(golden.answers[:, TRANSPARENCY]) if whole else [],
-        "density": _short(golden.answers[:, DENSITY]) if whole else [],
+        "transparency": _short(golden.answers[:, TRANSPARENCY_COLUMN]) if whole else [],
+        "density": _short(golden.answers[:, DENSITY_COLUMN]) if whole else [],
         "steady": golden.steady,
     }
 
@@ -267,8 +267,8 @@ def _short(values: Float32) -> list[Any]:
     """Return numbers of single precision with the fewest digits that tell all of them apart."""
     # `str` keeps to NumPy's print options, which other packages change.
     numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
-    found: list[Any] = np.array(numbers).reshape(values.shape).tolist()
-    return found
+    short: list[Any] = np.array(numbers).reshape(values.shape).tolist()
+    return short
 
 
 def trained_ranges(domain: Domain | None) -> dict[str, tuple[float, float]]:

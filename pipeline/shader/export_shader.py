@@ -49,7 +49,7 @@ def write_shader(
     language : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
     kind : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of KINDS, or EVERY.
+        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
     level : int, optional
         Level of detail of the soft nodes.
     kinds : collection of str
-        Of KINDS.
+        Of QUERY_KINDS.
 
     Raises
     ------

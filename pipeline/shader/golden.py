@@ -27,7 +27,7 @@ from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.colour import LUMINANCE
 
-QUERY_COLUMNS: Final = (
+GOLDEN_COLUMNS: Final = (
     "u", "v", "deviation_x", "deviation_y", "correlation", "wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z", "curvature"
 )  # fmt: skip
 """Columns of a query as the shader takes it."""
@@ -35,7 +35,7 @@ QUERY_COLUMNS: Final = (
 STEADY: Final = 1e-5
 """Largest change of a golden answer if the last digits of its footprint change, as a share of the range."""
 
-TRANSPARENCY, DENSITY, ANSWERS = 8, 9, 10
+TRANSPARENCY_COLUMN, DENSITY_COLUMN, ANSWER_COLUMNS = 8, 9, 10
 """Columns of answers after components and bounds, and the number of all."""
 
 _SEED = 20
@@ -81,8 +81,8 @@ class Golden(NamedTuple):
     Attributes
     ----------
     rows : float32 (N, 12)
-        QUERY_COLUMNS.
-    answers : float32 (N, ANSWERS) or (N, 8)
+        GOLDEN_COLUMNS.
+    answers : float32 (N, ANSWER_COLUMNS) or (N, 8)
         Components; bounds; of models that know them transparency, and density of wi in the mixture of the lobes, 1/sr.
     groups : dict
         First row and end of the rows of each of GROUPS.
@@ -103,7 +103,7 @@ def rows_of(queries: Queries) -> Float32:
 
 
 Answering = Callable[[Queries], Float32]
-"""Answers of N queries, all viewers on one side: components and bounds (N, 8), or all ANSWERS."""
+"""Answers of N queries, all viewers on one side: components and bounds (N, 8), or all ANSWER_COLUMNS."""
 
 
 def golden(sides: Sides, read: Answering | None = None) -> Golden:
@@ -137,7 +137,7 @@ def golden_of(groups: Mapping[str, Group], repeat: tuple[int, int], read: Answer
 
 
 def read_sides(sides: Sides, queries: Queries) -> Float32:
-    """Return the answers of N queries by pipeline.analytic, float32 (N, ANSWERS); all viewers are on one side.
+    """Return the answers of N queries by pipeline.analytic, float32 (N, ANSWER_COLUMNS); all viewers are on one side.
 
     Bounds are known with light and viewer on one side; else they are the components.
     """
@@ -145,18 +145,18 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
     table = sides.back if back else sides.front
     assert table is not None
     seen = queries.turned() if back else queries
-    result = np.empty((len(queries.u), ANSWERS), np.float32)
+    result = np.empty((len(queries.u), ANSWER_COLUMNS), np.float32)
     behind = seen.wi[:, 2] < 0.0
     if not behind.all():
-        found = read_queries(table, seen.take(~behind))
-        result[~behind, :4], result[~behind, 4:8] = found.components, found.bounds
+        reflected = read_queries(table, seen.take(~behind))
+        result[~behind, :4], result[~behind, 4:8] = reflected.components, reflected.bounds
     if behind.any():
         result[behind, :4] = result[behind, 4:8] = read_behind(table, seen.take(behind))[:, :4]
-    result[:, TRANSPARENCY] = transparency(table, seen)
+    result[:, TRANSPARENCY_COLUMN] = transparency(table, seen)
     lobes = lobes_of(sides, queries)
-    wi, wo, density = (np.ascontiguousarray(a, np.float32) for a in (queries.wi, queries.wo, result[:, DENSITY]))
+    wi, wo, density = (np.ascontiguousarray(a, np.float32) for a in (queries.wi, queries.wo, result[:, DENSITY_COLUMN]))
     density_rows(lobes, wi, wo, density)
-    result[:, DENSITY] = density
+    result[:, DENSITY_COLUMN] = density
     return result
 
 
@@ -215,7 +215,7 @@ def _front(rng: np.random.Generator, count: int) -> Float32:
 
 
 def _steady(read: Answering, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
-    """Return which queries are steady, and the answers of all, (N, ANSWERS)."""
+    """Return which queries are steady, and the answers of all, (N, ANSWER_COLUMNS)."""
     answer = read(queries)
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))

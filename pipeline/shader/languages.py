@@ -94,17 +94,17 @@ def slangc() -> Path | None:
         for name in ("slangc", "slangc.exe"):
             if (own := Path(spec.origin).parent / "bin" / name).is_file():
                 return own
-    found = shutil.which("slangc")
-    return None if found is None else Path(found)
+    program = shutil.which("slangc")
+    return None if program is None else Path(program)
 
 
 def compiler_for(languages: Sequence[str]) -> Path:
     """Return slangc; BadInput, naming the languages that need it, if it is not there."""
-    found = slangc()
-    if found is None:
+    compiler = slangc()
+    if compiler is None:
         allowed = f"slangc is needed: pip install --no-deps slangtorch; {SOURCE} is written without it"
         raise BadInput("export", "language", ", ".join(languages), allowed)
-    return found
+    return compiler
 
 
 def translate(
@@ -130,7 +130,7 @@ def translate(
     WorkFailed
         If slangc refuses the source.
     """
-    found: dict[str, list[str]] = {}
+    written: dict[str, list[str]] = {}
     for name in languages:
         (folder / name).mkdir()
         language = LANGUAGES[name]
@@ -139,8 +139,8 @@ def translate(
             if not present.entries:
                 continue
             compile_program(compiler, source, present, language.target, folder / name / program.file)
-            found.setdefault(name, []).append(f"{name}/{program.file}")
-    return found
+            written.setdefault(name, []).append(f"{name}/{program.file}")
+    return written
 
 
 def compile_program(compiler: Path, source: Path, program: Program, target: str, path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Final
 MOST_NODES: Final = 1024
 """Most fixed nodes of a table, those that fill up blocks included."""
 
-MOST_CELLS: Final = 1024
+MOST_REPEAT_CELLS: Final = 1024
 """Most cells of a repeat, ends times picks."""
 
 MOST_HEIGHT: Final = 8192

@@ -101,12 +101,12 @@ class Weights:
         activation, last : str
             Functions of the outputs of all layers but the last, and of the last.
         """
-        found = []
+        described = []
         for index, layer in enumerate(layers):
             rows = np.zeros((4 * quads(len(layer.weights)), layer.weights.shape[1]), np.float32)
             rows[: len(layer.weights)] = layer.weights
             name = f"{network} {index}"
-            found.append(
+            described.append(
                 PlacedLayer(
                     network=network,
                     biases=self.add(f"{name} biases", layer.biases, "biases"),
@@ -114,7 +114,7 @@ class Weights:
                     activation=last if index == len(layers) - 1 else activation,
                 )
             )
-        return found
+        return described
 
     def buffer(self) -> Buffer:
         """Return the description of the buffer."""
@@ -180,7 +180,7 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
     level : int, optional
         Level of detail of the soft nodes: that of the training.
     kinds : collection of str
-        Of KINDS.
+        Of QUERY_KINDS.
 
     Raises
     ------
@@ -192,8 +192,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
         raise BadInput("export", "level", level, f"leave it out: {method.name} was trained with level {trained}")
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, trained, kinds)
-    found, (weights, described, network) = tables(sides), correction(method, fabric)
-    about_tables = descriptor(fabric, trained, found, kinds)
+    cloth, (weights, described, network) = tables(sides), correction(method, fabric)
+    about_tables = descriptor(fabric, trained, cloth, kinds)
     about = Networks(
         name=method.name,
         trained_on=trained_ranges(method.domain),
@@ -210,8 +210,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
     return Shader(
         SELVAGE,
         SELVAGE_SOURCES,
-        {"layout.slang": layout_slang(found), "network.slang": network},
-        table_files(found) | weights.files(),
+        {"layout.slang": layout_slang(cloth), "network.slang": network},
+        table_files(cloth) | weights.files(),
         about_tables.model_copy(
             update={
                 "model": SELVAGE,
@@ -249,7 +249,7 @@ def correction(method: Selvage, fabric: Fabric) -> tuple[Weights, list[PlacedLay
 
 
 def _selvage_answers(method: Selvage, fabric: Fabric, sides: Sides, queries: Queries) -> Float32:
-    """Return the soft nodes' answers, with corrected components in front, (N, ANSWERS)."""
+    """Return the soft nodes' answers, with corrected components in front, (N, ANSWER_COLUMNS)."""
     result = read_sides(sides, queries)
     front = (queries.wi[:, 2] > 0.0) & (queries.wo[:, 2] > 0.0)
     if front.any():

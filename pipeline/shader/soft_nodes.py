@@ -32,7 +32,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     level : int, optional
         Level of detail k, one of DETAILS; the usual one if left out.
     kinds : collection of str
-        Of KINDS.
+        Of QUERY_KINDS.
 
     Raises
     ------
@@ -44,13 +44,13 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
         raise BadInput("export", "level", level, f"must be one of {', '.join(map(str, DETAILS))}")
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, level, kinds)
-    found = tables(sides)
+    cloth = tables(sides)
     return Shader(
         SOFT_NODES,
         SOFT_NODES_SOURCES,
-        {"layout.slang": layout_slang(found)},
-        table_files(found),
-        descriptor(fabric, level, found, kinds),
+        {"layout.slang": layout_slang(cloth)},
+        table_files(cloth),
+        descriptor(fabric, level, cloth, kinds),
         golden(sides),
         nodes_of(level, sides),
         True,

@@ -30,13 +30,13 @@ from pipeline.analytic.soft_nodes.waves import TOGETHER
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants
-from pipeline.shader.limits import MOST_CELLS, MOST_HEIGHT, MOST_NODES
+from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 
 BEHIND: Final = "behind"
 CURVATURE: Final = "curvature"
-KINDS: Final = (BEHIND, CURVATURE)
+QUERY_KINDS: Final = (BEHIND, CURVATURE)
 """Kinds of queries beside light and viewer in front of flat cloth, as `pipeline.models` names them."""
 
 EVERY: Final = "all"
@@ -120,13 +120,13 @@ _MEANINGS: Final = {
 def wanted_kinds(names: Collection[str]) -> frozenset[str]:
     """Return the kinds that names choose; BadInput if one is none."""
     for name in names:
-        if name not in (*KINDS, EVERY):
-            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join((*KINDS, EVERY))}")
-    return frozenset(KINDS if EVERY in names else names)
+        if name not in (*QUERY_KINDS, EVERY):
+            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join((*QUERY_KINDS, EVERY))}")
+    return frozenset(QUERY_KINDS if EVERY in names else names)
 
 
 def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
-    """Return the tables of a fabric at a level of detail, for KINDS of queries."""
+    """Return the tables of a fabric at a level of detail, for QUERY_KINDS of queries."""
     behind, curved = BEHIND in kinds, CURVATURE in kinds
     reflected, transmitted = colours(fabric), colours(fabric, transmitted=True)
     return Sides(
@@ -137,33 +137,33 @@ def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
 
 
 def refuse_large_repeat(fabric: Fabric) -> None:
-    """Refuse a repeat of more than MOST_CELLS cells, before it is tabulated."""
+    """Refuse a repeat of more than MOST_REPEAT_CELLS cells, before it is tabulated."""
     picks, ends = fabric.weave.warp_over.shape
-    if ends * picks > MOST_CELLS:
-        allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"
+    if ends * picks > MOST_REPEAT_CELLS:
+        allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
         raise BadInput("export", "shader", f"{ends} ends × {picks} picks", allowed)
 
 
 def tables(sides: Sides) -> ClothTables:
     """Return the buffers of a cloth without threads of their own; BadInput above MOST_NODES or MOST_HEIGHT."""
-    found = [_side(table) for table in (sides.front, sides.back) if table is not None]
-    _refuse_large_tables(found)
+    known = [_side(table) for table in (sides.front, sides.back) if table is not None]
+    _refuse_large_tables(known)
     shared = {"colours": sides.colours, "point_places": point_places(POINTS)}
-    first = found[0]
+    first = known[0]
     own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
-    integers, numbers = _Buffer(own * len(found)), _Buffer(len(first.numbers) * len(found))
+    integers, numbers = _Buffer(own * len(known)), _Buffer(len(first.numbers) * len(known))
     of_shared = numbers.add(shared)
     heads: list[dict[str, int | float]] = []
     node = grid = 0
-    for prefix, side in zip(("", "back_"), found, strict=False):
+    for prefix, side in zip(("", "back_"), known, strict=False):
         offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
         heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
     return ClothTables(
         integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
         numbers.filled([value for head in heads for value in head.values() if isinstance(value, float)], np.float32),
-        np.ascontiguousarray(np.concatenate([side.rows.reshape(-1, 4) for side in found]), np.float32),
-        np.concatenate([side.grid for side in found]),
+        np.ascontiguousarray(np.concatenate([side.rows.reshape(-1, 4) for side in known]), np.float32),
+        np.concatenate([side.grid for side in known]),
         heads[0],
         heads[1] if len(heads) > 1 else {},
         {"integers": integers.places, "numbers": numbers.places},
@@ -183,13 +183,13 @@ class _Buffer:
 
     def add(self, arrays: dict[str, npt.NDArray[Any]], prefix: str = "") -> dict[str, int]:
         """Add arrays; return their first elements by name."""
-        found = {}
+        starts = {}
         for name, values in arrays.items():
             meaning = f"of the back: {_MEANINGS[name]}" if prefix else _MEANINGS[name]
             self.places[prefix + name] = Place(self._stop, values.shape, meaning)
-            found[name], self._stop = self._stop, self._stop + values.size
+            starts[name], self._stop = self._stop, self._stop + values.size
             self._values.append(values.ravel())
-        return found
+        return starts
 
     def filled(self, scalars: list[Any], kind: type) -> npt.NDArray[Any]:
         """Return all numbers."""
@@ -262,13 +262,13 @@ def _side(table: Table) -> _Side:
     return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
 
 
-def _refuse_large_tables(found: Sequence[_Side]) -> None:
+def _refuse_large_tables(known: Sequence[_Side]) -> None:
     """Refuse tables above MOST_NODES or MOST_HEIGHT."""
-    count = max(len(side.rows) for side in found)
+    count = max(len(side.rows) for side in known)
     if count > MOST_NODES:
         allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
         raise BadInput("export", "shader", f"{count:,} nodes", allowed)
-    size = sum(len(side.grid) for side in found)
+    size = sum(len(side.grid) for side in known)
     if size > TEXTURE_WIDTH * MOST_HEIGHT:
         allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
         raise BadInput("export", "shader", f"{size:,} horizons", allowed)
@@ -288,10 +288,10 @@ def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> st
     return "\n".join([*lines, ""])
 
 
-def layout_slang(found: ClothTables) -> str:
+def layout_slang(cloth: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
     lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
-    kinds = {name: "int" if isinstance(value, int) else "float" for name, value in found.scalars.items()}
+    kinds = {name: "int" if isinstance(value, int) else "float" for name, value in cloth.scalars.items()}
     lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]
     lines += ["Table load_table_at(int first_integer, int first_number) {", "    Table table;"]
@@ -356,14 +356,14 @@ def _rules() -> tuple[Float32, Float32, Float32]:
     return own["_GAUSS_PLACES"], own["_GAUSS_WEIGHTS"], hermite
 
 
-def table_files(found: ClothTables) -> dict[str, bytes]:
+def table_files(cloth: ClothTables) -> dict[str, bytes]:
     """Return the files of the four buffers, by their paths."""
-    rows = np.pad(found.grid, (0, -found.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
+    rows = np.pad(cloth.grid, (0, -cloth.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
     return {
-        "tables/integers.i32": found.integers.astype("<i4").tobytes(),
-        "tables/numbers.f32": found.numbers.astype("<f4").tobytes(),
-        "tables/nodes.f32": found.nodes.astype("<f4").tobytes(),
-        "tables/nodes.f16": found.nodes.astype("<f2").tobytes(),
+        "tables/integers.i32": cloth.integers.astype("<i4").tobytes(),
+        "tables/numbers.f32": cloth.numbers.astype("<f4").tobytes(),
+        "tables/nodes.f32": cloth.nodes.astype("<f4").tobytes(),
+        "tables/nodes.f16": cloth.nodes.astype("<f2").tobytes(),
         "tables/grid.png": _png(rows),
     }
 

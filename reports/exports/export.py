@@ -23,7 +23,7 @@ class ExportKind(NamedTuple):
     suffix: str = ""
 
 
-KINDS: Final = {
+EXPORTS: Final = {
     "mesh": ExportKind("reports.exports.mesh:write_mesh", ".ply"),
     "wif": ExportKind("reports.exports.export:write_draft", ".wif"),
     "maps": ExportKind("reports.exports.maps:write_maps"),
@@ -41,7 +41,7 @@ def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
     fabric : Fabric
         The cloth.
     kind : str
-        One of `KINDS`.
+        One of `EXPORTS`.
     path : Path
         File or folder to write.
     **options
@@ -52,13 +52,13 @@ def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
     BadInput
         If an option, the path or the fabric cannot be used; `where` is ``export`` and `key` the option or the kind.
     """
-    module, name = KINDS[kind].writer.split(":")
+    module, name = EXPORTS[kind].writer.split(":")
     write = getattr(import_module(module), name)
     for option, value in options.items():
         if option not in signature(write).parameters:
             raise BadInput("export", option, value, f"is not for {kind}; leave it out")
-    if path.suffix != KINDS[kind].suffix and KINDS[kind].suffix:
-        raise BadInput("export", kind, str(path), f"a path that ends in {KINDS[kind].suffix} is needed")
+    if path.suffix != EXPORTS[kind].suffix and EXPORTS[kind].suffix:
+        raise BadInput("export", kind, str(path), f"a path that ends in {EXPORTS[kind].suffix} is needed")
     return str(write(fabric, path, **options))
 
 

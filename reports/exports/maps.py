@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.folders import own_files
-from pipeline.materials.layout import Layout, layout
-from pipeline.materials.lobes import SHEEN_ROUGHNESS
-from pipeline.materials.planes import planes, yarn_ids
-from pipeline.materials.reflectance import reflectance
+from pipeline.materials.lobes import SHEEN_ROUGHNESS, reflectance
+from pipeline.materials.planes import Layout, layout, planes, yarn_ids
 from pipeline.materials.textures import (
     Constants,
     Textures,

@@ -20,8 +20,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.materials.layout import Layout
 from pipeline.materials.lobes import SHEEN_ROUGHNESS
+from pipeline.materials.planes import Layout
 from pipeline.materials.textures import Constants, Textures, across_direction, gltf_strength
 from pipeline.scenes.shipped import DRAPE_YARNS, drape_surface
 from reports.images.texture import png_bytes
@@ -152,7 +152,7 @@ class _Mesh(NamedTuple):
     faces: npt.NDArray[np.uint32]
 
 
-def write_sample(path: Path, fabric: Fabric, found: Layout, level: Textures, material: Constants) -> None:
+def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, material: Constants) -> None:
     """Write the sample.
 
     Parameters
@@ -161,7 +161,7 @@ def write_sample(path: Path, fabric: Fabric, found: Layout, level: Textures, mat
         File to write, ending in ``.glb``.
     fabric : Fabric
         The cloth.
-    found : Layout
+    shown : Layout
         Yarns of a map.
     level : Textures
         Maps of the level to embed.
@@ -171,7 +171,7 @@ def write_sample(path: Path, fabric: Fabric, found: Layout, level: Textures, mat
     import pygltflib as gltf
 
     file = _File(gltf)
-    mesh = _draped(fabric, found)
+    mesh = _draped(fabric, shown)
     attributes = gltf.Attributes(
         POSITION=file.vertices(mesh.points, gltf.VEC3),
         NORMAL=file.vertices(mesh.normals, gltf.VEC3),
@@ -278,13 +278,13 @@ class _File:
         return len(self.document.accessors) - 1
 
 
-def _draped(fabric: Fabric, found: Layout) -> _Mesh:
+def _draped(fabric: Fabric, shown: Layout) -> _Mesh:
     """Return the mesh of the scene `drape`, in the size in which the cloth's yarns have their spacing."""
     points, normals, lengths = drape_surface()
     metres = DRAPE_YARNS * spacing_cm(fabric) / 100.0
     per_cm = np.array(yarns_per_cm(fabric))
     # Texture coordinates count maps; those of glTF run downwards.
-    uv = lengths * metres * 100.0 * per_cm / (found.ends, found.picks)
+    uv = lengths * metres * 100.0 * per_cm / (shown.ends, shown.picks)
     tangents = _tangents(points, normals, uv)
     rows, columns = points.shape[:2]
     corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)

@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.mitsuba.dress import dress
-from pipeline.mitsuba.register import register
+from pipeline.mitsuba.register import dress, register
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import Loaded, load
 from pipeline.scenes.options import SceneOptions

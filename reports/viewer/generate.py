@@ -45,11 +45,11 @@ def shipped(name: str) -> str:
 def sources() -> dict[str, bytes]:
     """Return the files that the shaders are made of, by name."""
     fabric = load_fabric("gingham")
-    found = {name: (_SOURCES / name).read_bytes() for name in SELVAGE_SOURCES}
-    found["cloth.slang"] = (HOME / "cloth.slang").read_bytes()
-    found["layout.slang"] = layout_slang(tables(tabulate_sides(fabric, 1, ()))).encode()
-    found["network.slang"] = correction(network(), fabric)[2].encode()
-    return found
+    files = {name: (_SOURCES / name).read_bytes() for name in SELVAGE_SOURCES}
+    files["cloth.slang"] = (HOME / "cloth.slang").read_bytes()
+    files["layout.slang"] = layout_slang(tables(tabulate_sides(fabric, 1, ()))).encode()
+    files["network.slang"] = correction(network(), fabric)[2].encode()
+    return files
 
 
 def mark(files: dict[str, bytes]) -> str:
@@ -69,8 +69,8 @@ def shader(name: str, files: dict[str, bytes]) -> str:
         program = Program(f"{name}.frag", main.name, ("cloth",), "fragment", True)
         made = Path(folder) / program.file
         compile_program(compiler, Path(folder), program, LANGUAGES["glsles"].target, made)
-        found = made.read_text(encoding="utf-8")
-    version, _, rest = found.partition("\n")
+        program_text = made.read_text(encoding="utf-8")
+    version, _, rest = program_text.partition("\n")
     return f"{version}\n{mark(files)}\n{rest}"
 
 

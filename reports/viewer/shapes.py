@@ -19,7 +19,7 @@ Shape = Literal["plane", "sphere", "drape"]
 
 SHAPES: Final[tuple[Shape, ...]] = ("plane", "sphere", "drape")
 
-SPREAD: Final = 0.27
+VIEW_SPREAD: Final = 0.27
 """Tangent of half the angle of view."""
 
 HALF_ARC: Final = math.radians(72.0)
@@ -117,7 +117,7 @@ def seen(camera: Viewpoint, size: int, ends: int) -> Seen:
     right = np.array([math.cos(turn), math.sin(turn), 0.0])
     radius = sphere_radius(ends)
     eye = camera.distance * toward + _middle(camera, toward, radius)
-    step = 2.0 * SPREAD / size
+    step = 2.0 * VIEW_SPREAD / size
     to_right, upwards = step * right, step * np.cross(toward, right)
     pixel = np.arange(size) + 0.5 - 0.5 * size
     across, up = (values.ravel() for values in np.meshgrid(pixel, pixel))
@@ -187,7 +187,7 @@ def _on_sphere(eye: Floats, ray: Floats, radius: float) -> _Places:
 
 
 def _on_drape(eye: Floats, ray: Floats) -> _Places:
-    found = _Places(
+    places = _Places(
         np.full(len(ray), -1.0), np.zeros((len(ray), 2)), np.ones((len(ray), 2)),
         *(np.tile(axis, (len(ray), 1)) for axis in np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])),
     )  # fmt: skip
@@ -203,14 +203,14 @@ def _on_drape(eye: Floats, ray: Floats) -> _Places:
             height = eye[:, 2] + reach * ray[:, 2]
             own = (inside > 0.0) & (np.abs(at[:, 0]) <= math.sin(HALF_ARC)) & (side * at[:, 1] > 0.0)
             own &= (np.abs(height) <= HALF_HEIGHT) & (reach > 0.0)
-            own &= (found.reach < 0.0) | (reach < found.reach)
+            own &= (places.reach < 0.0) | (reach < places.reach)
             n = side * np.stack([at[:, 0], -at[:, 1], np.zeros(len(at))], axis=-1)
-            found.reach[own] = reach[own]
-            found.n[own] = n[own]
-            found.x[own] = np.stack([-n[:, 1], n[:, 0], n[:, 2]], axis=-1)[own]
+            places.reach[own] = reach[own]
+            places.n[own] = n[own]
+            places.x[own] = np.stack([-n[:, 1], n[:, 0], n[:, 2]], axis=-1)[own]
             turned = np.arctan2(at[:, 0], side * at[:, 1])
-            found.uv[own] = np.stack([middle + radius * turned, height], axis=-1)[own]
-    return found
+            places.uv[own] = np.stack([middle + radius * turned, height], axis=-1)[own]
+    return places
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

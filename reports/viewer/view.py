@@ -28,7 +28,7 @@ from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.limits import MOST_CELLS, MOST_NODES
+from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.networks import correction
 from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
 from pipeline.truth.estimator import estimate
@@ -40,7 +40,7 @@ from reports.viewer.generate import network, shipped
 from reports.viewer.shapes import (
     HALF_ARC,
     HALF_HEIGHT,
-    SPREAD,
+    VIEW_SPREAD,
     Seen,
     Viewpoint,
     arcs,
@@ -72,14 +72,14 @@ STILL: Final = "Drape"
 
 STILL_SIZE: Final = 384
 
-BENDS: Final = (0.6, 1.0, 1.4)
+BEND_FACTORS: Final = (0.6, 1.0, 1.4)
 """Factors of the bends of both yarns."""
 
 WIDTHS: Final = (0.8, 1.0, 1.25)
 NARROWER: Final = (0.65, 0.8, 1.0)
 """Factors of the widths of both yarns: the second ones if yarns would overlap."""
 
-STEEPEST: Final = 85.0
+STEEPEST_BEND: Final = 85.0
 """Largest bend of a yarn, degrees."""
 
 TWISTED: Final = 30.0
@@ -110,8 +110,8 @@ def write_page(fabric: Fabric, path: Path, truth: int = 160) -> str:
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
         raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
     picks, ends = fabric.weave.warp_over.shape
-    if ends * picks > MOST_CELLS:
-        allowed = f"the shader takes repeats of at most {MOST_CELLS:,} cells"
+    if ends * picks > MOST_REPEAT_CELLS:
+        allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
         raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
     shown = content(fabric, truth)
     page = whole_page(shown)
@@ -153,7 +153,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
     """
     ends = fabric.weave.repeat[0]
     factors = bends(fabric), widths(fabric)
-    found: list[dict[str, Any]] = []
+    of_shapes: list[dict[str, Any]] = []
     grids: list[str] = []
     for bend in factors[0]:
         for width in factors[1]:
@@ -164,7 +164,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
             about = {"bend": bend, "width": width, "grid": len(grids)}
             grids.append(packed(of_shape[0][1].front.grid.ravel()))
             kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
-            found += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+            of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
     return {
@@ -178,13 +178,13 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "widths": factors[1],
         "columns": {"sin": SIN_TWIST, "cos": COS_TWIST, "roughness": ALPHA, "relief": BETA, "blend": BLEND},
         "gap": GAP,
-        "tables": found,
-        "selvage": _selvage(fabric, found),
+        "tables": of_shapes,
+        "selvage": _selvage(fabric, of_shapes),
         "grids": grids,
         "tiles": [*methods, TRUTH] if truth else [],
         "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
         "shapes": {
-            "spread": SPREAD,
+            "spread": VIEW_SPREAD,
             "radius": sphere_radius(ends),
             "half_arc": HALF_ARC,
             "half_height": HALF_HEIGHT,
@@ -198,7 +198,11 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
 def bends(fabric: Fabric) -> tuple[float, ...]:
     """Return the factors of the bends: 1 alone if the yarns are flat."""
     steepest = max(fabric.warp.bend, fabric.weft.bend)
-    return tuple(factor for factor in BENDS if factor <= 1.0 or steepest * factor <= STEEPEST) if steepest else (1.0,)
+    return (
+        tuple(factor for factor in BEND_FACTORS if factor <= 1.0 or steepest * factor <= STEEPEST_BEND)
+        if steepest
+        else (1.0,)
+    )
 
 
 def widths(fabric: Fabric) -> tuple[float, ...]:
@@ -234,24 +238,24 @@ def _twist(yarn: Yarn) -> float:
 
 def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any]:
     """Return a table for the page."""
-    found, table = tables(sides), sides.front
+    cloth, table = tables(sides), sides.front
     return about | {
         "bends": (fabric.warp.bend, fabric.weft.bend),
         "widths": (fabric.warp.width, fabric.weft.width),
         "twists": (_twist(fabric.warp), _twist(fabric.weft)),
         "count": int(table.evenly.size),
-        "stride": found.scalars["stride"],
-        "yarn": found.places["numbers"]["yarn"].offset,
-        "yarn_columns": found.places["numbers"]["yarn"].shape[1],
-        "thickness": [*(name for name, value in found.scalars.items() if isinstance(value, float))].index("thickness"),
-        "integers": packed(found.integers),
-        "numbers": packed(found.numbers),
-        "nodes": packed(found.nodes),
-        "families": packed(_families(table, found)),
+        "stride": cloth.scalars["stride"],
+        "yarn": cloth.places["numbers"]["yarn"].offset,
+        "yarn_columns": cloth.places["numbers"]["yarn"].shape[1],
+        "thickness": [*(name for name, value in cloth.scalars.items() if isinstance(value, float))].index("thickness"),
+        "integers": packed(cloth.integers),
+        "numbers": packed(cloth.numbers),
+        "nodes": packed(cloth.nodes),
+        "families": packed(_families(table, cloth)),
     }
 
 
-def _families(table: Table, found: ClothTables) -> npt.NDArray[np.uint8]:
+def _families(table: Table, cloth: ClothTables) -> npt.NDArray[np.uint8]:
     """Return the family of every node; those that fill up blocks count as gaps."""
     families = np.full(table.evenly.size, GAP, np.uint8)
     for group in table.groups.astype(np.int64):
@@ -263,31 +267,31 @@ def _yarn(yarn: Yarn) -> dict[str, float]:
     return {"roughness": yarn.roughness, "twist": yarn.twist, "blend": yarn.blend}
 
 
-def _selvage(fabric: Fabric, found: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+def _selvage(fabric: Fabric, shown: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """Return the weights of the network for the fabric; None if the page lacks the table that it corrects."""
     method = network()
     level = method.options.level
-    if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in found):
+    if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in shown):
         return None
     return {"level": level, "weights": packed(correction(method, fabric)[0].values)}
 
 
 def _methods(fabric: Fabric) -> dict[str, Method]:
     """Return TILES without those that cannot answer for the fabric, such as maps too small for its repeat."""
-    found: dict[str, Method] = {}
+    methods: dict[str, Method] = {}
     for name in TILES:
         method = named_method(name, "view", "")
         try:
             method.prepare(fabric)
         except BadInput:
             continue
-        found[name] = method
-    return found
+        methods[name] = method
+    return methods
 
 
 def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict[str, Method]) -> dict[str, Any]:
     """Return a view with its tiles: components as half floats, -1 where there is no cloth, row 0 the lowest."""
-    found: dict[str, Any] = {"name": name, **camera._asdict(), "size": size}
+    view: dict[str, Any] = {"name": name, **camera._asdict(), "size": size}
     if size:
         ends = fabric.weave.repeat[0]
         picture = seen(camera, size, ends)
@@ -296,9 +300,9 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
         tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
         tiles[TRUTH] = answers.mean
-        found["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
-        found["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
-    return found
+        view["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
+        view["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
+    return view
 
 
 def _components(picture: Seen, values: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:

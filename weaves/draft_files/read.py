@@ -21,7 +21,7 @@ from dtx_to_wif.twa_reader import WIF_FILE_NAME
 
 from weaves.colour_order import MOST_THREADS
 from weaves.draft import Bools
-from weaves.draft_files.wif_sections import MOST_BYTES, MOST_USED, checked_wif
+from weaves.draft_files.wif_sections import MOST_USED, MOST_WIF_BYTES, checked_wif
 from weaves.errors import BadInput, one_line
 from weaves.reading import read_bytes
 
@@ -74,13 +74,13 @@ def read_draft(path: Path) -> DraftFile:
     Raises
     ------
     BadInput
-        If the suffix is unknown, the file cannot be read, is larger than `MOST_BYTES`, or describes no draft.
+        If the suffix is unknown, the file cannot be read, is larger than `MOST_WIF_BYTES`, or describes no draft.
     """
     where = str(path)
     if (reader := READERS.get(path.suffix.lower())) is None:
         raise BadInput(where, "", "no known draft file", f"its name must end in {', '.join(READERS)}")
     try:
-        content = read_bytes(path, MOST_BYTES, "a draft file")
+        content = read_bytes(path, MOST_WIF_BYTES, "a draft file")
     except FileNotFoundError as error:
         raise BadInput(where, "", "no such file", "the path of a draft file is needed") from error
     with warnings.catch_warnings(record=True) as noted:
@@ -100,11 +100,13 @@ def _read_twa(content: bytes, where: str) -> PatternData:
 
     def unpacked() -> bytes:
         with zipfile.ZipFile(io.BytesIO(content)) as archive, archive.open(WIF_FILE_NAME) as file:
-            return file.read(MOST_BYTES + 1)
+            return file.read(MOST_WIF_BYTES + 1)
 
     text = _called(unpacked, where, "a TempoWeave draft")
-    if len(text) > MOST_BYTES:
-        raise BadInput(where, "", f"{WIF_FILE_NAME} has more than {MOST_BYTES:,} bytes", "at most so many are allowed")
+    if len(text) > MOST_WIF_BYTES:
+        raise BadInput(
+            where, "", f"{WIF_FILE_NAME} has more than {MOST_WIF_BYTES:,} bytes", "at most so many are allowed"
+        )
     return _read_wif(text, where)
 
 
@@ -204,7 +206,7 @@ def _woven(
 ) -> Bools:
     """Return where an end is on a shaft that its pick names, bool (picks, ends)."""
     shafts = max([0, *(shaft for sets in (threading, lifts) for numbers in sets.values() for shaft in numbers)])
-    if shafts > MOST_THREADS or min([0, *threading, *(shaft for one in threading.values() for shaft in one)]) < 0:
+    if shafts > MOST_THREADS or min([0, *threading, *(shaft for each in threading.values() for shaft in each)]) < 0:
         raise BadInput(where, "[THREADING]", shafts, f"shafts from 1 to {MOST_THREADS} are needed")
     lifted = np.zeros((shafts + 1, picks), np.bool_)
     for pick, numbers in lifts.items():
@@ -219,13 +221,13 @@ def _woven(
 def _table(pattern: PatternData, where: str) -> dict[int, str]:
     """Return the colours of a file in 8 bits."""
     least, most = pattern.color_range or (0, 255)
-    found = {}
+    colours_by_number = {}
     for index, levels in pattern.color_table.items():
         shares = [(level - least) / (most - least) for level in levels]
         if not all(0 <= share <= 1 for share in shares):
             raise BadInput(where, f"[COLOR TABLE] {index}", levels, f"numbers from {least} to {most} are needed")
-        found[index] = "#" + "".join(f"{round(255 * share):02x}" for share in shares)
-    return found
+        colours_by_number[index] = "#" + "".join(f"{round(255 * share):02x}" for share in shares)
+    return colours_by_number
 
 
 def _threads(
@@ -247,8 +249,8 @@ def _threads(
         remarks.append(f"[{axis.upper()}] has {per_cm:.3g} yarns per cm, which is not used: 0.1 to 1000 are allowed")
         per_cm = None
     if spacing and scale is None:
-        found = f"the unit {yarns.units!r}" if yarns.units else "no unit"
-        remarks.append(one_line(f"[{axis.upper()}] Spacing has {found}: known are {', '.join(CENTIMETRES)}", 160))
+        stated = f"the unit {yarns.units!r}" if yarns.units else "no unit"
+        remarks.append(one_line(f"[{axis.upper()}] Spacing has {stated}: known are {', '.join(CENTIMETRES)}", 160))
     return DraftThreads(
         colours=tuple(table[index] for index in indices),
         width=thickness / spacing if spacing and thickness else None,

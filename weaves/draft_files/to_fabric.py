@@ -133,8 +133,8 @@ def _refuse_loose(matrix: Bools, where: str) -> None:
     for section, thread, lines in (("[THREADING]", "end", matrix.T), ("[TREADLING] or [LIFTPLAN]", "pick", matrix)):
         for number, line in enumerate(lines, 1):
             if line.all() or not line.any():
-                found = f"{thread} {number} of {section} never changes side"
-                raise BadInput(where, "", found, "it is not woven in, so this is not a cloth")
+                sentence = f"{thread} {number} of {section} never changes side"
+                raise BadInput(where, "", sentence, "it is not woven in, so this is not a cloth")
 
 
 def _width(

@@ -18,13 +18,13 @@ from weaves.colour_order import MOST_THREADS
 from weaves.errors import BadInput
 from weaves.reading import MIB
 
-MOST_BYTES: Final = 4 * MIB
+MOST_WIF_BYTES: Final = 4 * MIB
 """Most bytes of a draft file."""
 
 MOST_USED: Final = MIB
 """Most letters of the sections that are read; others, such as pictures of single programs, are left out before."""
 
-MOST_LETTERS: Final = 8192
+MOST_LINE_LETTERS: Final = 8192
 """Most letters of a line."""
 
 MOST_ENTRIES: Final = 16 * MOST_THREADS
@@ -168,9 +168,12 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
             inside = begun and name in known
             kept += [f"[{name.replace(' ', '_')}]"] * inside
         elif inside and line:
-            if len(line) > MOST_LETTERS:
+            if len(line) > MOST_LINE_LETTERS:
                 raise BadInput(
-                    where, "", f"{section_name(name)} has a line of {len(line):,} letters", f"at most {MOST_LETTERS:,}"
+                    where,
+                    "",
+                    f"{section_name(name)} has a line of {len(line):,} letters",
+                    f"at most {MOST_LINE_LETTERS:,}",
                 )
             kept.append(line)
     if not begun:
@@ -182,7 +185,7 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
         parser.read_string("\n".join(kept))
     except ParsingError as error:
         number, line = error.errors[0][0], kept[error.errors[0][0] - 1]
-        section = next(one for one in reversed(kept[:number]) if one.startswith("["))
+        section = next(entry for entry in reversed(kept[:number]) if entry.startswith("["))
         raise BadInput(
             where, "", f"{section_name(section[1:-1])} has the line {line}", "a line is KEY=VALUE"
         ) from error

@@ -46,8 +46,8 @@ def wif_text(fabric: Fabric) -> str:
     axes = []
     for key, repeat, order in (("ends", threading, orders[0]), ("picks", treadling, orders[1])):
         if (threads := lcm(len(repeat), len(order))) > MOST_THREADS:
-            found = f"structure and colours repeat together after {threads:,} {key}"
-            raise BadInput(fabric.name, "", found, f"at most {MOST_THREADS:,} can be written to a draft file")
+            needed = f"structure and colours repeat together after {threads:,} {key}"
+            raise BadInput(fabric.name, "", needed, f"at most {MOST_THREADS:,} can be written to a draft file")
         numbers = {index + 1: {repeat[index % len(repeat)] + 1} for index in range(threads)}
         colours = {index + 1: table.index(order[index % len(order)]) + 1 for index in range(threads)}
         axes.append((numbers, colours))

@@ -14,10 +14,9 @@ from typing import Any, Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
-from pipeline.materials.layout import layout
-from pipeline.materials.lookup import CHANNELS, MipLevels, answer, mip_levels
-from pipeline.materials.planes import planes
-from pipeline.materials.reflectance import reflectance
+from pipeline.materials.lobes import reflectance
+from pipeline.materials.lookup import TEXEL_CHANNELS, MipLevels, answer, mip_levels
+from pipeline.materials.planes import layout, planes
 from pipeline.materials.textures import constants
 from pipeline.models.map_material.options import MapMaterialOptions
 from pipeline.models.per_fabric import PerFabric
@@ -59,7 +58,7 @@ class MapMaterial:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of all levels at 8 bits a number, as programs store them."""
-        return len(self._maps.of(fabric).texels) * CHANNELS
+        return len(self._maps.of(fabric).texels) * TEXEL_CHANNELS
 
 
 def restore(options: MapMaterialOptions, trained: Sequence[tuple[dict[str, Any], Any]]) -> list[MapMaterial]:

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.materials.lobes import charlie, ggx, ggx_density
-from pipeline.materials.reflectance import even_sky
+from pipeline.materials.lobes import charlie, even_sky, ggx, ggx_density
 from pipeline.truth.scattering.microflake import density
 
 

@@ -5,11 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.materials.layout import Layout
-from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, ggx, white_f0
+from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, even_sky, ggx, reflectance, white_f0
 from pipeline.materials.lookup import answer, mip_levels
-from pipeline.materials.planes import Planes
-from pipeline.materials.reflectance import even_sky, reflectance
+from pipeline.materials.planes import Layout, Planes
 from pipeline.materials.textures import Constants
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric

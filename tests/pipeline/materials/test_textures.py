@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.materials.layout import layout
-from pipeline.materials.lobes import white_f0
-from pipeline.materials.planes import planes
-from pipeline.materials.reflectance import reflectance
+from pipeline.materials.lobes import reflectance, white_f0
+from pipeline.materials.planes import layout, planes
 from pipeline.materials.textures import across_direction, constants, gltf_strength, openpbr_roughness, textures
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

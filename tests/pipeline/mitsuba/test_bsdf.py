@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.mitsuba.bsdf import STRAIGHT
-from pipeline.mitsuba.options import ClothOptions
-from pipeline.mitsuba.worn import Hits, Worn
+from pipeline.mitsuba.bsdf import STRAIGHT_THROUGH
+from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM, unit
 
 LEVEL = 0.01
@@ -39,7 +38,7 @@ def interaction(mi, viewer, count=1):
 
 def hits(viewer):
     zero = np.zeros((1, 3))
-    return Hits(np.array([UV]), np.array([viewer]), zero, np.ones(1), np.zeros((1, 2, 2)), np.zeros(1))
+    return RayHits(np.array([UV]), np.array([viewer]), zero, np.ones(1), np.zeros((1, 2, 2)), np.zeros(1))
 
 
 def number(value):
@@ -142,7 +141,7 @@ def chi_square(mi, name, cells, nodes, samples):
     def draw(random):
         si = interaction(mi, unit(theta, phi).tolist(), dr.width(random))
         sample, _ = bsdf.sample(context, si, random[0], [random[1], random[2]])
-        return sample.wo, dr.select(sample.sampled_component == STRAIGHT, mi.Float(0.0), mi.Float(1.0))
+        return sample.wo, dr.select(sample.sampled_component == STRAIGHT_THROUGH, mi.Float(0.0), mi.Float(1.0))
 
     return mi.chi2.ChiSquareTest(
         domain=mi.chi2.SphericalDomain(),

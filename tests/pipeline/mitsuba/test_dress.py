@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from pipeline.mitsuba.dress import dress
-from pipeline.mitsuba.footprint import PIXEL
+from pipeline.mitsuba.register import dress
+from pipeline.mitsuba.worn import PIXEL
 from pipeline.models.named import named_method
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions

@@ -8,7 +8,7 @@ import pytest
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shader.golden import GROUPS, read_sides, rows_of
-from pipeline.shader.tables import KINDS, tabulate_sides
+from pipeline.shader.tables import QUERY_KINDS, tabulate_sides
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
@@ -138,7 +138,7 @@ def test_curvature_counts_as_flat_without_its_tables(cpp, exported, read):
 def test_queries_of_every_kind_that_are_not_golden_are_answered(cpp, exported, read, name):
     """As of those in front, at most 1 % may hang on the last digit of a place."""
     cloth, rng, count = read(exported(name, kinds=(EVERY,))), np.random.default_rng(12), 600
-    sides = tabulate_sides(load_fabric(name), 2, KINDS)
+    sides = tabulate_sides(load_fabric(name), 2, QUERY_KINDS)
     for number, group in enumerate(GROUPS.values()):
         z, turn = rng.uniform(0.02, 1.0, (2, count)), rng.uniform(0.0, 2.0 * np.pi, (2, count))
         level = np.sqrt(1.0 - z**2)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.shader.golden import DENSITY, TRANSPARENCY
+from pipeline.shader.golden import DENSITY_COLUMN, TRANSPARENCY_COLUMN
 from tests.pipeline.shader.conftest import missing
 
 PAGE = Path(__file__).parents[3] / "docs" / "shader.md"
@@ -63,7 +63,7 @@ def test_the_node_answers_the_golden_queries(exported, read, tmp_path):
     values = np.where(
         through[:, None], cloth.answers[:, :4] @ colours[[0, 1, 4, 5]], cloth.answers[:, :4] @ colours[:4]
     )  # fmt: skip
-    expected = np.column_stack([values, cloth.answers[:, [DENSITY, TRANSPARENCY]]])
+    expected = np.column_stack([values, cloth.answers[:, [DENSITY_COLUMN, TRANSPARENCY_COLUMN]]])
     for start, stop in cloth.groups.values():
         span = np.ptp(expected[start:stop], axis=0)
         assert (np.abs(found - expected)[start:stop] < 1e-5 * span).all()

@@ -123,7 +123,7 @@ def find(truth, levels, bends, still):
     """Return what the page has of FABRIC at its own width, with pictures of the truth of `truth` pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DETAILS", levels)
-        patch.setattr(module, "BENDS", bends)
+        patch.setattr(module, "BEND_FACTORS", bends)
         patch.setattr(module, "NARROWER", (1.0,))
         patch.setattr(module, "STILL_SIZE", still)
         return content(load_fabric(FABRIC), truth)

@@ -11,7 +11,7 @@ import pytest
 from pipeline.shader.languages import slangc
 from reports.viewer import view
 from reports.viewer.generate import SHADERS, mark, shader, shipped, sources
-from reports.viewer.view import BENDS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
+from reports.viewer.view import BEND_FACTORS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
 from tests.reports.viewer.conftest import opened, write
 from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
 from weaves.fabric import load_fabric, preset_names
@@ -50,7 +50,7 @@ def test_the_page_is_one_file_without_addresses(small):
 @pytest.mark.parametrize("name", preset_names())
 def test_factors_keep_yarns_within_their_ranges(name):
     fabric = load_fabric(name)
-    assert bends(fabric) in ((1.0,), BENDS[:2], BENDS) and widths(fabric) in (WIDTHS, NARROWER)
+    assert bends(fabric) in ((1.0,), BEND_FACTORS[:2], BEND_FACTORS) and widths(fabric) in (WIDTHS, NARROWER)
     for bend in bends(fabric):
         for width in widths(fabric):
             for yarn in (bent(fabric, bend, width).warp, bent(fabric, bend, width).weft):

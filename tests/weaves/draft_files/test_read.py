@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
 from weaves.draft import Draft, smallest_repeat
 from weaves.draft_files.read import read_draft
-from weaves.draft_files.wif_sections import MOST_BYTES
+from weaves.draft_files.wif_sections import MOST_WIF_BYTES
 from weaves.errors import MOST_LETTERS, BadInput
 
 SAMPLES = {str(path): Path(path.locate()) for path in files("dtx-to-wif") if "test_data" in path.parts}
@@ -216,7 +216,7 @@ MALFORMED = {
     "long gap": (wif(TEXT=("a" + " " * 8000 + "b\n") * 100, THREADING=None), "[THREADING]"),
     "long number": (wif(THREADING="1=" + "9" * 5000), "[THREADING] 1"),
     "many lines": (wif(THREADING="1=1\n" * 70_000), "lines"),
-    "large": ("[WIF]\n" + "x" * MOST_BYTES, f"{MOST_BYTES:,}"),
+    "large": ("[WIF]\n" + "x" * MOST_WIF_BYTES, f"{MOST_WIF_BYTES:,}"),
 }  # fmt: skip
 
 

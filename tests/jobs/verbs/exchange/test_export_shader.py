@@ -48,7 +48,7 @@ def test_too_many_nodes_cells_and_horizons_are_refused(twillight, monkeypatch, t
     monkeypatch.setattr(tables, "MOST_HEIGHT", 16)
     code, _, complaint = twillight("export", "gingham", "--shader", "x")
     assert code == 2 and "horizons" in complaint
-    monkeypatch.setattr(tables, "MOST_CELLS", 3)
+    monkeypatch.setattr(tables, "MOST_REPEAT_CELLS", 3)
     monkeypatch.setattr(soft_nodes, "tabulate_sides", None)  # cells are counted before any work
     code, _, complaint = twillight("export", "gingham", "--shader", "x")
     assert code == 2 and "at most 3 cells" in complaint and not list(tmp_path.iterdir())

@@ -24,7 +24,7 @@ def test_bad_input_is_one_sentence(capsys, monkeypatch, tmp_path, tokens, allowe
 
 
 def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(view, "MOST_CELLS", 3)
+    monkeypatch.setattr(view, "MOST_REPEAT_CELLS", 3)
     monkeypatch.setattr(view, "content", None)
     assert main(["view", "gingham", "--out", str(tmp_path / "x.html")]) == 2
     assert "at most 3 cells" in capsys.readouterr().err and not list(tmp_path.iterdir())

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pipeline.materials.reflectance import even_sky, reflectance
+from pipeline.materials.lobes import even_sky, reflectance
 from pipeline.models.map_material.options import MapMaterialOptions
 from pipeline.models.method import Method
 from pipeline.models.registry import load_methods

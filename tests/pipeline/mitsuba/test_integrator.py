@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.mitsuba.evaluated import evaluated
-from pipeline.mitsuba.footprint import PIXEL, Footprints
-from pipeline.mitsuba.integrator import ray_deviation
-from pipeline.mitsuba.path import MOST_SCATTER, _Cone
+from pipeline.mitsuba.integrator import MOST_SCATTER, _Cone, evaluated, ray_deviation
+from pipeline.mitsuba.worn import PIXEL, Footprints
 from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
