@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count, cycle, islice
 from pathlib import Path
@@ -17,8 +18,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
-from pipeline.models.added.guarded import load_function
+from pipeline.models.added.guarded import Guarded, load_function
 from pipeline.scenes.shade import colours_of
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.estimator import estimate
@@ -177,14 +179,13 @@ def measure_timing(
         sample.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
 
     truth = TruthOptions.model_validate(manifest.about["truth"])
+    _prepare(methods, [cloth for cloth, _ in sample])
     entries, records, edits = [], [], count(1)
     for index, method in enumerate(methods):
         progress(0.3 * index / len(methods))
         covered = [(cloth, queries) for cloth, queries in sample if method.covers(cloth)]
         if not covered:
             continue
-        for cloth, _ in covered:
-            method.prepare(cloth)
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
         entries.append((subject, affordable(Contender(method.predict, covered))))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
@@ -218,6 +219,19 @@ def _times(
         if math.isfinite(timing.waited):
             records.append(subject.of("waited", timing.waited, repeats))
     return records
+
+
+def _prepare(methods: Sequence[Method], fabrics: Sequence[Fabric]) -> None:
+    """Prepare every fabric for every method, on all cores but for code from outside: only the clock needs them idle."""
+    with ThreadPoolExecutor(cores()) as ours, ThreadPoolExecutor(1) as theirs:
+        started = [
+            (theirs if isinstance(method, Guarded) else ours).submit(method.prepare, cloth)
+            for method in methods
+            for cloth in fabrics
+            if method.covers(cloth)
+        ]
+        for future in started:
+            future.result()
 
 
 def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:

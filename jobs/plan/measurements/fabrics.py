@@ -216,10 +216,7 @@ class OnUnseenPopulation(Measurement):
 
 
 class ErrorsBySize(Measurement):
-    """Errors of one training of a model by the size of footprints, on the held-out queries of all fabrics.
-
-    Those of the first training are measured with its times.
-    """
+    """Errors of one training of a model by the size of footprints, on the held-out queries of all fabrics."""
 
     kind: Literal["errors by size"] = "errors by size"
     seconds: ClassVar = 3.0
@@ -232,11 +229,10 @@ class ErrorsBySize(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a model and seed after its first."""
+        """Yield one a model and seed."""
         dataset = subjects.dataset([subject.fabric.name for subject in subjects.fabrics])
         for model in subjects.models:
-            if not model.is_first:
-                yield cls(model=model.whole, dataset=dataset, seed=subjects.recipe.bench.seed)
+            yield cls(model=model.whole, dataset=dataset, seed=subjects.recipe.bench.seed)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure all classes of footprints."""
