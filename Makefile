@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures viewer-shader report run list plan generate check train bench status savings readme results test tests test-slow faults lint pins clean
+.PHONY: pictures viewer-shader report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint rooms pins clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -46,12 +46,21 @@ results: $(READY)
 test: $(READY)
 	@$(MAKE) --no-print-directory --jobs 2 lint tests
 
+QUICK := not slow and not faults and not external
+
 tests: $(READY)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow and not faults" --numprocesses logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "$(QUICK)" --numprocesses logical --maxprocesses 8 --dist worksteal
+
+# Every test but the faults. CONTRIBUTING.md says how long each lane takes and which change needs it.
+test-all: test test-external test-slow
+
+# Tests that start a server, a cluster, a browser or a compiler.
+test-external: $(READY)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "external and not slow and not faults" --numprocesses 2 --dist loadscope
 
 # The tests marked slow: long statistics, every kernel compiled from nothing, every recipe made small. Takes long.
 test-slow: $(READY)
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m "slow and not faults"
 
 # Kills, full disks, wrong clocks, signals and damaged files; every run ends with the bytes of an undisturbed one.
 faults: $(READY)
@@ -71,6 +80,10 @@ lint: $(READY)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/python -m tests.lint
+
+# The picture of the rooms in CONTRIBUTING.md.
+rooms: $(READY)
+	$(BIN)/python -m tests.lint.rooms
 
 # PyTorch's build for the CPU alone is taken where the package index has it: it needs no CUDA.
 # Nothing is installed again until the pinned versions or the package's own description change.

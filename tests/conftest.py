@@ -1,7 +1,34 @@
-"""Order of the tests: the longest one starts first, so that no core waits for it at the end."""
+"""What all tests share: one cache of compiled kernels, the lane of programs that are started, the order."""
 
-_FIRST = "tests/jobs/test_smoke.py"
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+# Processes that tests start, also those in copies of the tree, read the kernels that this tree has compiled.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "__pycache__"))
+
+STARTED = {"cpp", "selvage_cpp", "neumip_cpp", "webgl", "browse", "llvm", "switch"}
+"""Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
+
+QUICK = "not slow and not faults and not external"
+"""The lane of `make test`, whose number of tests has a budget."""
 
 
-def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
+def pytest_itemcollected(item):
+    if STARTED.intersection(getattr(item, "fixturenames", ())):
+        item.add_marker(pytest.mark.external)
+
+
+def pytest_collection_finish(session):
+    """Keep the number of tests within its budget when the whole lane is collected."""
+    config = session.config
+    if config.args_source is not config.ArgsSource.TESTPATHS or config.option.markexpr != QUICK:
+        return
+    limit = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["budgets"]["tests"]
+    config.cache.set("budgets/tests", len(session.items))
+    if len(session.items) > limit:
+        raise pytest.UsageError(f"{len(session.items):,} tests, the budget is {limit:,} (pyproject.toml)")

@@ -16,7 +16,6 @@ from pipeline.shards.schema import SCHEMAS
 from pipeline.truth.estimator import ESTIMATORS
 from reports.tables.markdown import block, with_block
 from reports.tables.readme import BLOCK
-from tests.lint.architecture import ORDER
 from weaves.fabric import PRESETS, load_fabric
 
 ROOT = Path(__file__).parents[1]
@@ -116,12 +115,6 @@ def test_targets_of_make_exist(path):
     (phony,) = re.findall(r"^\.PHONY: (.+)$", text_of(ROOT / "Makefile"), re.M)
     asked = {tokens[0] for tokens in commands_of(path, "make")}
     assert asked - {"VERB"} <= set(phony.split())
-
-
-def test_the_order_of_packages_is_that_of_the_architecture():
-    (order,) = re.findall(r"`(weaves ← [^`]+)`", text_of(ROOT / "CONTRIBUTING.md"))
-    places = [ORDER.index(name) for name in order.split(" ← ")]
-    assert places == sorted(places)
 
 
 def test_every_verb_is_in_the_readme():

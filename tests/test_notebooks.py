@@ -17,6 +17,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
+pytestmark = pytest.mark.external  # kernels of notebooks
+
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 

@@ -16,6 +16,8 @@ import pytest
 
 from jobs.cli import main
 
+pytestmark = pytest.mark.external  # commands that take minutes
+
 ROOT = Path(__file__).parents[1]
 
 

@@ -16,6 +16,8 @@ import pytest
 from pipeline.mitsuba.worn import ClothOptions
 from pipeline.scenes.variant import llvm_works, mitsuba
 
+pytestmark = pytest.mark.external  # a renderer with a compiler of its own
+
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "mitsuba.md").read_text(encoding="utf-8")
 KEPT = ROOT / "docs" / "pictures" / "cloth.png"

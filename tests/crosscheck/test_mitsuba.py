@@ -23,6 +23,8 @@ from weaves.fabric import load_fabric
 from weaves.families import Satin, Twill
 from weaves.mesh import repeat_mesh
 
+pytestmark = pytest.mark.external  # another renderer
+
 mi.set_variant("scalar_rgb")
 
 SIDE = 512

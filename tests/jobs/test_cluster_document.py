@@ -18,6 +18,8 @@ from jobs.run.cluster import Scheduler
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 
+pytestmark = pytest.mark.external  # clusters of dask
+
 TESTS = Path(__file__).parent
 ROOT = TESTS.parents[1]
 TEXT = (ROOT / "jobs" / "CLUSTER.md").read_text(encoding="utf-8")

@@ -21,6 +21,8 @@ from pipeline.storage import place
 from tests.jobs import fake_stages
 from tests.jobs.s3_server import serving
 
+pytestmark = pytest.mark.external  # an S3 server
+
 RECIPE = """
 name = "stored"
 [dataset]

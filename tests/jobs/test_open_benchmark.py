@@ -12,6 +12,8 @@ import pytest
 
 from reports.record import read_records
 
+pytestmark = pytest.mark.external  # a cluster of dask
+
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
 (METRIC,) = re.findall(r"^`largest_error.py`:\n\n```python\n(.*?)^```$", TEXT, re.M | re.S)

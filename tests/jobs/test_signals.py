@@ -8,6 +8,9 @@ import time
 from pathlib import Path
 
 import psutil
+import pytest
+
+pytestmark = pytest.mark.external  # processes with clusters of dask
 
 ROOT = Path(__file__).parents[2]
 START = "import sys; from jobs.entry import main; sys.exit(main())"

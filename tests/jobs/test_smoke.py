@@ -1,9 +1,13 @@
 """The whole way, from fabrics to the page, on the smallest recipe; then again, and again with a damaged file."""
 
+import pytest
+
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
+
+pytestmark = pytest.mark.external  # a cluster of dask
 
 
 def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):

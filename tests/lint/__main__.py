@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 
-from tests.lint import architecture, budgets, words
+from tests.lint import architecture, budgets, rooms, words
 
 
 def main() -> int:
     """Print everything that is wrong, and the table; return 1 if anything is wrong."""
     text, exceeded = budgets.table()
-    wrong = [*architecture.problems(), *words.problems(), *exceeded]
+    wrong = [*architecture.problems(), *words.problems(), *rooms.problems(), *exceeded]
     print(text)
     for sentence in wrong:
         print(sentence, file=sys.stderr)

@@ -200,6 +200,7 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files)
         assert first.split("/")[-1] == second.split("/")[-1]
 
 
+@pytest.mark.external
 def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
     """`generate` makes the rows of both recipes; either folder is whole, with a manifest of its own."""
     for old, new in (

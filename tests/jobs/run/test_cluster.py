@@ -23,6 +23,8 @@ from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from weaves.errors import BadInput, WorkFailed
 
+pytestmark = pytest.mark.external  # clusters of dask
+
 TESTS = Path(__file__).parents[1]
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parents[1])])}
 

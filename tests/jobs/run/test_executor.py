@@ -20,6 +20,8 @@ from jobs.run.outcome import work
 from jobs.run.receipt import measure
 from weaves.errors import BadInput, WorkFailed
 
+pytestmark = pytest.mark.external  # clusters of dask
+
 HERE = Path(__file__).parents[1]
 
 

@@ -12,6 +12,8 @@ from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from weaves.errors import WorkFailed
 
+pytestmark = pytest.mark.external  # clusters of dask
+
 HERE = Path(__file__).parents[1]
 
 

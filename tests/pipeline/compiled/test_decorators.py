@@ -120,6 +120,12 @@ def answers(process: subprocess.Popen[str]) -> str:
     return out
 
 
+@pytest.fixture(autouse=True)
+def _caches_of_their_own(monkeypatch):
+    """Copies of the tree compile their kernels themselves."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+
+
 @pytest.fixture
 def copies(tmp_path: Path) -> list[Path]:
     """Return three folders with the decorators and small kernels, nothing compiled."""

@@ -33,7 +33,7 @@ def use():
         mi.set_variant(before)
 
 
-@pytest.fixture(params=["scalar_rgb", pytest.param("llvm_ad_rgb", marks=NEEDS_LLVM)])
+@pytest.fixture(params=["scalar_rgb", pytest.param("llvm_ad_rgb", marks=[NEEDS_LLVM, pytest.mark.external])])
 def mi(request, use):
     """Return Mitsuba with the plugins, in each variant."""
     return use(request.param)

@@ -14,7 +14,6 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import picture
 from pipeline.scenes.shipped import SHIPPED
-from pipeline.scenes.variant import llvm_works
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
 
 METHOD = "soft_nodes:2"
@@ -68,7 +67,7 @@ def test_each_pixel_is_that_of_our_renderer(use, name):
 
     At the border of a shadow and at a silhouette, rays start at other distances from the surface: one pixel in 50.
     """
-    variant = "llvm_ad_rgb" if llvm_works() else "scalar_rgb"
+    variant = "scalar_rgb"
     use(variant)
     size = (24, 18)
     wanted = own_picture(sunlit(name, variant), size)

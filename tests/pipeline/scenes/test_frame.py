@@ -221,6 +221,7 @@ def test_frames_move_the_camera_to_the_right():
     assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
 
 
+@pytest.mark.external
 @pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 def test_variants_agree():
     one, other = (
@@ -235,6 +236,7 @@ def test_variants_agree():
     assert abs(len(one.place) - len(other.place)) < 0.002 * len(one.place)
 
 
+@pytest.mark.external
 @pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 def test_variants_agree_on_who_wears_what_and_on_the_lamp():
     """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""

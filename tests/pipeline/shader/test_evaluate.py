@@ -12,6 +12,8 @@ from pipeline.shader.tables import QUERY_KINDS, tabulate_sides
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
+pytestmark = pytest.mark.external  # slangc and g++
+
 FABRICS = sorted(path.stem for path in Path(__file__).parents[3].glob("weaves/presets/*.toml"))
 FEW = ("gingham", "polyester_lining")
 UNSEEN = ("gauze", "silk_charmeuse", "crepe")

@@ -11,6 +11,8 @@ import pytest
 from pipeline.shader.golden import DENSITY_COLUMN, TRANSPARENCY_COLUMN
 from tests.pipeline.shader.conftest import missing
 
+pytestmark = pytest.mark.external  # slangc, g++ and Chromium
+
 PAGE = Path(__file__).parents[3] / "docs" / "shader.md"
 
 

@@ -11,6 +11,8 @@ import pytest
 from tests.pipeline.shader.conftest import missing
 from tests.pipeline.shader.test_evaluate import worst
 
+pytestmark = pytest.mark.external  # slangc and Chromium
+
 OPTIONS = ("--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan")
 
 

@@ -24,6 +24,7 @@ def test_the_shaders_are_made_of_their_source(name):
     assert mark(sources()) in shipped(name), "run `make viewer-shader`"
 
 
+@pytest.mark.external
 @pytest.mark.parametrize("name", SHADERS)
 def test_slangc_makes_the_shaders_again(name):
     if slangc() is None:
@@ -57,6 +58,7 @@ def test_factors_keep_yarns_within_their_ranges(name):
                 type(yarn).model_validate(yarn.model_dump())
 
 
+@pytest.mark.external
 def test_a_page_draws_what_python_does(small, tmp_path):
     """The one test of the browser that is not slow."""
     with opened(write(small, tmp_path), tmp_path / "profile") as page:
