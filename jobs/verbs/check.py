@@ -7,15 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from cyclopts import Parameter
 from rich.progress import track
 from rich.table import Table
 
 from jobs.console import table_of
+from jobs.exits import print_error
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
 from pipeline.storage import is_local, place
@@ -24,6 +27,31 @@ from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.validation import read_toml
 
 WHERE = "check"
+
+
+def check(
+    subject: Annotated[str, Parameter(help="Recipe, folder of a data set, or fabric.")],
+    *,
+    repair: Annotated[bool, Parameter(help="Make the damaged and missing files of a recipe again.")] = False,
+    add: Add = NOTHING,
+    out: Out = OUT,
+    on: On = ON,
+) -> int:
+    """Check the files of a recipe, the shards of a data set, or a fabric's ground truth; return the exit code."""
+    found = resolve(subject, add)
+    if isinstance(found, Recipe):
+        from jobs.verbs import check_recipe
+
+        return check_recipe.repair(subject, out, on, add) if repair else check_recipe.check_recipe(subject, out, add)
+    if repair:
+        raise BadInput(WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
+    if isinstance(found, Fabric):
+        check_fabric(found)
+        return 0
+    faults = check_dataset(found)
+    for fault in faults:
+        print_error(fault)
+    return BadInput.exit_code if faults else 0
 
 
 def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:

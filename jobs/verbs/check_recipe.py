@@ -18,11 +18,10 @@ from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.cluster import Scheduler
 from jobs.run.faults import Fault, faults
 from jobs.run.ledger import Ledger
-from jobs.run.progress_forms import ProgressForm
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import WorkerFlags
 from jobs.verbs.run import work
 from weaves.errors import BadInput, WorkFailed
 
@@ -42,14 +41,7 @@ def check_recipe(name: str, out: Path, add: Sequence[str] = ()) -> int:
     return exit_code(found)
 
 
-def repair(
-    name: str,
-    out: Path,
-    scheduler: Scheduler,
-    workers: int,
-    progress: ProgressForm = "auto",
-    add: Sequence[str] = (),
-) -> int:
+def repair(name: str, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> int:
     """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
 
     Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
@@ -75,7 +67,7 @@ def repair(
     never = {stage for stage in never if _never(stage, found) == planned[stage]}
     if any(fault.kind != "foreign" for fault in found):
         if stages := [stage for stage in STAGES if stage not in never]:
-            work(name, stages, out, scheduler, workers, progress, add)
+            work(name, stages, out, on, add)
         found = _found(name, out, add)[1]
         if found:
             print_line("what is left:")

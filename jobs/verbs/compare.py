@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from cyclopts import Parameter
+
+from jobs.verbs.parameters import Local, OfSeveralPages
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
@@ -18,7 +21,13 @@ if TYPE_CHECKING:
 WHERE = "compare"
 
 
-def compare(a: Path, b: Path, recipe: str = "", other_machine: bool = False) -> None:
+def compare(
+    a: Annotated[Local, Parameter(help="Folder of products, folder of a page, or file of Records.")],
+    b: Annotated[Local, Parameter(help="Another one; the table shows B relative to A.")],
+    *,
+    recipe: OfSeveralPages = "",
+    other_machine: Annotated[bool, Parameter(help="Allow measurements of different machines.")] = False,
+) -> None:
     """Print the differences of B from A.
 
     Raises

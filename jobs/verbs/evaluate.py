@@ -3,23 +3,39 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from typing import Annotated
 
+from cyclopts import Parameter
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from jobs.console import number, table_of
 from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import FabricName, Place
 from pipeline.cores import cores
 from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput, nearest
-from weaves.fabric import Fabric
+from weaves.fabric import load_fabric
 from weaves.validation import validated
 
 WHERE = "evaluate"
+
+
+@dataclass(frozen=True)
+class TruthFlags:
+    """Options of the truth on the command line; None: the default of `pipeline.truth.options.TruthOptions`."""
+
+    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, quadrature, owen, mc, …")] = None
+    relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None
+    absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None
+    max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None
+    footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None
+    frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
+    normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
 
 
 def truth_options(**chosen: object) -> TruthOptions:
@@ -43,24 +59,32 @@ def truth_options(**chosen: object) -> TruthOptions:
 
 
 def evaluate(
-    fabric: Fabric,
-    queries: Path,
-    out: Path,
-    options: TruthOptions,
-    seed: int,
-    workers: int,
-    skip_bad: bool,
-    other: Answerer | None = None,
+    fabric: FabricName,
+    queries: Annotated[Place, Parameter(help="Parquet file of queries, with the columns of a shard.")],
+    *,
+    out: Annotated[Place, Parameter(help="Parquet file to write.")],
+    model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
+    extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
+    truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),
+    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
+    workers: Annotated[int, Parameter(help="Threads; 0: one per core.")] = 0,
+    skip_bad: Annotated[bool, Parameter(help="List rows that cannot be evaluated, and continue.")] = False,
 ) -> None:
-    """Evaluate the queries of a file on some threads (0: one per core) and print a summary.
-
-    `other`, if given, replaces the ground truth; torch then computes on the threads that call it.
+    """Evaluate the queries of a file, by the ground truth or a model, and print a summary.
 
     Raises
     ------
     BadInput
-        As `pipeline.shards.evaluate.evaluate_file`, and if the seed or the number of threads cannot be used.
+        As `pipeline.shards.evaluate.evaluate_file`, and if an option, the model, the seed or the number of threads
+        cannot be used.
     """
+    chosen = asdict(truth)
+    options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
+    if model is not None:
+        from jobs.verbs.evaluate_model import answerer, refuse_truth_options
+
+        refuse_truth_options(chosen | {"seed": seed or None})
+        other = answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
     if not 0 <= seed < 2**64:
@@ -72,7 +96,7 @@ def evaluate(
         bar = bars.add_task("evaluating", total=1.0)
         try:
             summary = evaluate_file(
-                fabric,
+                cloth,
                 queries,
                 out,
                 options,

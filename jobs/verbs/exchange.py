@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, FabricName, Local
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
 from weaves.draft_files.read import read_draft
@@ -16,21 +20,30 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Mapping[str, Mapping[str, float]]) -> None:
-    """Write the fabric of a draft file, and print what was read and what is assumed.
+@dataclass(frozen=True)
+class YarnFlags:
+    """Numbers of a yarn on the command line; None: those of the draft file, or of the fabric named by --like."""
 
-    Parameters
-    ----------
-    draft : Path
-        The draft file.
-    out : Path
-        Fabric file to write, ending in ``.toml``; whole or not at all.
-    like : str
-        Fabric whose yarns give what the draft does not state.
-    name : str or None
-        Name of the fabric; the default is that of the draft file, without letters that no name has.
-    given : mapping of mappings
-        Numbers of the yarns ``"warp"`` and ``"weft"`` in place of those of `like`.
+    width: Annotated[float | None, Parameter(help="Width in yarn spacings, in place of the file's.")] = None
+    bend: Annotated[float | None, Parameter(help="Largest inclination along a float, degrees.")] = None
+    twist: Annotated[float | None, Parameter(help="Angle of the fibres to the yarn's axis, degrees.")] = None
+    roughness: Annotated[float | None, Parameter(help="Roughness of the fibres.")] = None
+
+    def given(self) -> dict[str, float]:
+        """Return the numbers that are given."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+
+def import_draft(
+    draft: Annotated[Local, Parameter(help="Draft file: .wif, .wifw, .dtx, .wpo or .twa.")],
+    *,
+    out: Annotated[Local, Parameter(help="Fabric file to write, ending in .toml.")],
+    like: Annotated[str, Parameter(help="Fabric whose yarns give what a draft does not state.")] = "cotton_twill",
+    name: Annotated[str | None, Parameter(help="Name of the fabric; default: that of the draft file.")] = None,
+    warp: Annotated[YarnFlags, Parameter(name="--warp")] = YarnFlags(),
+    weft: Annotated[YarnFlags, Parameter(name="--weft")] = YarnFlags(),
+) -> None:
+    """Write the fabric of a draft file, and print what was read and what is assumed.
 
     Raises
     ------
@@ -43,7 +56,7 @@ def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Map
     file = read_draft(draft)
     yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
-    drafted = fabric_of(file, yarns, own, str(draft), given)
+    drafted = fabric_of(file, yarns, own, str(draft), {"warp": warp.given(), "weft": weft.given()})
     atomic_write(out, drafted.fabric.to_toml().encode())
     console = Terminal()
     program = f", written by {file.program}" if file.program else ""
@@ -54,37 +67,60 @@ def import_draft(draft: Path, out: Path, like: str, name: str | None, given: Map
             console.print(f"- {sentence}", soft_wrap=True)
 
 
-def export_fabric(name: str, paths: Mapping[str, Path | None], options: Mapping[str, Any]) -> None:
+def export_fabric(
+    fabric: FabricName,
+    *,
+    mesh: Annotated[Local | None, Parameter(help="Triangle mesh to write, ending in .ply.")] = None,
+    wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
+    maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
+    shader: Annotated[Local | None, Parameter(help="Folder of a shader with its tables to write.")] = None,
+    vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
+    repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
+    size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
+    model: Annotated[
+        str | None, Parameter(help="Of a shader: soft_nodes (default), selvage, or the folder of a trained neumip.")
+    ] = None,
+    level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None,
+    language: Annotated[
+        list[str],
+        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
+    ] = NOTHING,
+    kind: Annotated[
+        list[str],
+        Parameter(help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth."),
+    ] = NOTHING,
+) -> None:
     """Write a fabric for other programs, and print what was written.
-
-    Parameters
-    ----------
-    name : str
-        The fabric.
-    paths : mapping
-        File or folder of each kind of export; one is given.
-    options : mapping
-        Options of the exports; those that are None or empty are left out.
 
     Raises
     ------
     BadInput
         If not one path is given, or as `reports.exports.export.export`.
     """
+    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader}
+    options: dict[str, Any] = {"vertices": vertices, "repeats": repeats, "size": size, "model": model, "level": level}
+    options |= {"language": language, "kind": kind}
     flags = [f"--{kind}" for kind in paths]
     chosen = {kind: path for kind, path in paths.items() if path is not None}
     if len(chosen) != 1:
         allowed = f"one of {', '.join(flags[:-1])} and {flags[-1]} is needed"
         raise BadInput("export", "", " and ".join(f"--{kind}" for kind in chosen) or "nothing", allowed)
-    ((kind, path),) = chosen.items()
+    ((what, path),) = chosen.items()
     given = {key: value for key, value in options.items() if value not in (None, [])}
-    _write("export", name, kind, path, given)
+    _write("export", fabric, what, path, given)
 
 
-def view(name: str, out: Path, truth: int) -> None:
-    """Write the page of a fabric, with tiles of `truth` pixels along each side, and print what was written."""
+def view(
+    fabric: FabricName,
+    *,
+    out: Annotated[Local, Parameter(help="Page to write, ending in .html.")],
+    truth: Annotated[
+        int, Parameter(help="Pixels along each side of the pictures by the truth and other methods; 0: none.")
+    ] = 160,
+) -> None:
+    """Write the page of a fabric, and print what was written."""
     with Terminal().status("tables and tiles"):
-        _write("view", name, "viewer", out, {"truth": truth}, viewer="out")
+        _write("view", fabric, "viewer", out, {"truth": truth}, viewer="out")
 
 
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:

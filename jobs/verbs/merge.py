@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from cyclopts import Parameter
 
 from jobs.console import MOST_SENTENCES, number, print_line, table_of
 from jobs.plan.dataset import DATASETS
@@ -20,6 +22,7 @@ from jobs.run.receipt import Product, Receipt
 from jobs.run.store import LEDGER
 from jobs.terminal import Terminal
 from jobs.verbs.compare import records_file
+from jobs.verbs.parameters import Local, OfSeveralPages
 from pipeline.atomic import link
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
@@ -42,8 +45,13 @@ class Part(NamedTuple):
     """Paths of its sound products, relative to the folder."""
 
 
-def merge(sources: Sequence[Path], out: Path) -> int:
-    """Join folders of products in `out`, which may hold products itself; return the exit code.
+def merge(
+    a: Annotated[Local, Parameter(help="Folder of products.")],
+    b: Annotated[Local, Parameter(help="Another one, for example of another machine.")],
+    *,
+    out: Annotated[Local, Parameter(help="Folder of all products; created if need be.")],
+) -> int:
+    """Join two folders of products in `out`, which may hold products itself; return the exit code.
 
     Raises
     ------
@@ -52,6 +60,7 @@ def merge(sources: Sequence[Path], out: Path) -> int:
     WorkFailed
         If a run is at work in `out`.
     """
+    sources = a, b
     for source in sources:
         if not (source / "ledger").is_dir():
             raise BadInput(str(source), "", "holds no products", "the output folder of a run is needed")
@@ -134,28 +143,33 @@ def _manifests(ledgers: Sequence[Ledger], out: Path) -> dict[Path, Manifest]:
     return found
 
 
-def merge_records(sources: Sequence[Path], recipe: str, out: Path) -> None:
+def merge_records(
+    files: Annotated[list[Local], Parameter(help="Files of Records, folders of pages, or folders of products.")],
+    *,
+    recipe: OfSeveralPages = "",
+    out: Annotated[Local, Parameter(help="File of Records to write, ending in .json.")],
+) -> None:
     """Join Records, write them to `out`, and print the time of a query of each method on each machine.
 
     Raises
     ------
     BadInput
-        If fewer than two sources are given, one has no Records or no machine or holds several machines, or `out` is
+        If fewer than two files are given, one has no Records or no machine or holds several machines, or `out` is
         one of them, no name of a .json file, or in no folder.
     """
     from reports.machines import join, names_of
     from reports.record import read_machine, read_records, write_records
 
-    if len(sources) < 2:
-        raise BadInput(_RECORDS, "files", [str(path) for path in sources], "two files of Records or more are needed")
-    files = [records_file(path, recipe) for path in sources]
+    if len(files) < 2:
+        raise BadInput(_RECORDS, "files", [str(path) for path in files], "two files of Records or more are needed")
+    sources = [records_file(path, recipe) for path in files]
     if out.suffix != ".json" or not out.parent.is_dir():
         raise BadInput(_RECORDS, "--out", str(out), "must be a file in a folder that exists, ending in .json")
-    if out.resolve() in [file.resolve() for file in files]:
+    if out.resolve() in [file.resolve() for file in sources]:
         raise BadInput(_RECORDS, "--out", str(out), "is one of the files to join; another name is needed")
-    machines = [read_machine(file) for file in files]
+    machines = [read_machine(file) for file in sources]
     names = names_of(machines)
-    joined = join(dict(zip(names, (read_records([file]) for file in files), strict=True)))
+    joined = join(dict(zip(names, (read_records([file]) for file in sources), strict=True)))
     first = machines[0]
     packages = {
         name: version

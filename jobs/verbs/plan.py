@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
+from cyclopts import Parameter
 from rich.table import Table
 
 from jobs.console import duration, table_of
@@ -17,6 +17,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE, reasons
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
@@ -46,8 +47,14 @@ class Facts(NamedTuple):
         return [task for task in tasks if self.why.get(task.id, ELSEWHERE) != ELSEWHERE]
 
 
-def print_plan(recipe: str, out: Path, workers: int = 0, add: Sequence[str] = ()) -> None:
-    """Print the plan of a recipe, with methods from outside in `add`; nothing is computed.
+def print_plan(
+    recipe: RecipeName,
+    *,
+    add: Add = NOTHING,
+    out: Out = OUT,
+    workers: Annotated[int, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
+) -> None:
+    """Print the plan of a recipe; nothing is computed.
 
     Raises
     ------

@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
+from cyclopts import Parameter
 from rich.table import Table
 
 from jobs.console import MOST_SENTENCES, size, table_of
@@ -21,6 +22,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
 
@@ -30,8 +32,14 @@ FOLDERS: Final[dict[Stage, str]] = {"generate": DATASETS, "train": "models", "be
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
 
 
-def prune(recipes: Sequence[str], out: Path, delete: bool, add: Sequence[str] = ()) -> None:
-    """List the files that no recipe needs, with methods from outside in `add`; with `delete` remove them.
+def prune(
+    recipes: Annotated[list[str], Parameter(help="Recipes whose products are kept, by name or path.")],
+    *,
+    delete: Annotated[bool, Parameter(help="Remove what is listed.")] = False,
+    add: Add = NOTHING,
+    out: Out = OUT,
+) -> None:
+    """List the files that no recipe needs, or remove them.
 
     Raises
     ------

@@ -7,15 +7,17 @@ the fabrics and the distribution of queries narrowed to the scene.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.verbs.compare import records_file
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out, SceneName
 from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
@@ -35,42 +37,22 @@ _JUDGED = 100  # queries per fabric for its error
 
 
 def require(
-    scene: str,
-    out: Path,
-    recipe: str,
-    error: float,
-    ms: float,
-    frames: int,
-    margin: float,
-    method: str = "",
-    effort: float = EFFORT,
-    changes: Sequence[str] = (),
-    add: Sequence[str] = (),
+    scene: SceneName,
+    *,
+    error: Annotated[float, Parameter(help="Largest relative RMSE of the colour; .05 is 5 %.")] = float("inf"),
+    time: Annotated[float, Parameter(help="Longest time of a frame on one thread, in milliseconds.")] = float("inf"),
+    recipe: Annotated[str, Parameter(help="General recipe with a finished page.")] = "quick",
+    frames: Annotated[int, Parameter(help="Frames of the camera path that are analysed.")] = 4,
+    margin: Annotated[float, Parameter(help="Factor by which the ranges of queries are widened.")] = 1.25,
+    method: Annotated[str, Parameter(help="Method of the general recipe; default: the cheapest.")] = "",
+    effort: Annotated[float, Parameter(help="Share of its rows per fabric and of its training steps.")] = EFFORT,
+    set_: Annotated[
+        list[str], Parameter(name="--set", help="Changed option of the method, such as hidden=64.")
+    ] = NOTHING,
+    add: Add = NOTHING,
+    out: Out = OUT,
 ) -> None:
     """Print the requirements of a scene and the methods that meet a limit, and write the recipe of the chosen one.
-
-    Parameters
-    ----------
-    scene : str
-        Name of a scene of the package, or path of one.
-    out : Path
-        Folder of products that holds the page of `recipe`; the new recipe goes to its folder `recipes`.
-    recipe : str
-        General recipe, whose models are chosen from.
-    error, ms : float
-        Limits: largest relative RMSE of the colour, longest milliseconds per frame; infinite if there is none.
-    frames : int
-        Frames that are analysed, spread over the camera path.
-    margin : float
-        Factor on the ranges (`Requirement.of`).
-    method : str
-        Method of the general recipe; empty: the cheapest on the front.
-    effort : float
-        Share of the general recipe's rows per fabric and of its training steps.
-    changes : sequence of str
-        Changed options of the model, each as ``key = value`` in TOML.
-    add : sequence of str
-        Methods from outside the package, with which the general recipe was run.
 
     Raises
     ------
@@ -84,9 +66,9 @@ def require(
     from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
     from reports.tables.summary import rows, scene_table
 
-    _refuse_limits(error=error, time=ms, frames=frames, margin=margin, effort=effort)
+    _refuse_limits(error=error, time=time, frames=frames, margin=margin, effort=effort)
     general = load_recipe(recipe, add)
-    options = _options(changes)
+    options = _options(set_)
     names = [model.options.name for model in general.models]
     if method and method not in names:
         raise BadInput(
@@ -110,13 +92,13 @@ def require(
     if method and (table := of_method(table, method)).empty:
         allowed = "it was not measured on footprints of these sizes, or does not cover the fabrics of the scene"
         raise BadInput("require", "--method", method, allowed)
-    chosen = cheapest(table, error, ms)
+    chosen = cheapest(table, error, time)
     if chosen is None:
         near = "; ".join(
             f"{row.method} {row.setting}".strip() + f": {100 * row.error:.2g} % in {row.ms:.3g} ms"
-            for row in rows(nearest(table, error, ms))
+            for row in rows(nearest(table, error, time))
         )
-        limits = f"{100 * error:g} % in {ms:g} ms per frame"
+        limits = f"{100 * error:g} % in {time:g} ms per frame"
         raise BadInput("require", "limits", limits, f"no method meets them; the nearest points of the front are {near}")
     if chosen.method not in names:
         allowed = "the page shows it, the recipe has no such method: run the recipe again, or choose one with --method"
@@ -213,9 +195,9 @@ def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[st
         if not rows.size:
             continue
         fallback_answers(fabrics[name], queries.take(rows[:2]), 0)  # builds the tables
-        start = time.perf_counter()
+        start = perf_counter()
         answers = fallback_answers(fabrics[name], queries.take(rows), 0)
-        seconds, count = seconds + time.perf_counter() - start, count + rows.size
+        seconds, count = seconds + perf_counter() - start, count + rows.size
         truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
         colour = truth @ COLOUR_WEIGHTS
         differences.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)

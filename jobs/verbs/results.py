@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from jobs.recipe.load import load_recipe
 from jobs.terminal import Terminal
 from jobs.verbs.compare import records_file
+from jobs.verbs.parameters import NOTHING, OUT, Add, Local, Out, RecipeName
 from pipeline.atomic import atomic_write
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_text
 
 
-def results(recipe: str, out: Path, file: Path | None, readme: Path | None, add: Sequence[str] = ()) -> None:
+def results(
+    recipe: RecipeName,
+    *,
+    file: Annotated[Local | None, Parameter(help="Markdown file to write; results.md beside the page.")] = None,
+    readme: Annotated[Local | None, Parameter(help="Markdown file whose generated table is written anew.")] = None,
+    add: Add = NOTHING,
+    out: Out = OUT,
+) -> None:
     """Write all tables of a recipe's page to `file`, or six rows of them into the block of `readme`.
 
     Raises

@@ -15,26 +15,42 @@ from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import Recipe
-from jobs.run.cluster import Scheduler
 from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.progress_forms import ProgressForm
 from jobs.run.receipt import Product
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, WorkerFlags
 from weaves.errors import WorkFailed
 
 
-def work(
-    recipe_name: str,
-    stages: Sequence[Stage],
-    out: Path,
-    scheduler: Scheduler,
-    workers: int,
-    progress: ProgressForm = "auto",
-    add: Sequence[str] = (),
-) -> None:
+def generate(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Compute the ground truth: the shards of a recipe's data set."""
+    work(recipe, ["generate"], out, on, add)
+
+
+def train(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Train the models of a recipe on its data set."""
+    work(recipe, ["train"], out, on, add)
+
+
+def bench(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Measure error, aliasing and time of every method."""
+    work(recipe, ["bench"], out, on, add)
+
+
+def report(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Write the page: pictures, tables and plots of all measurements."""
+    work(recipe, ["report"], out, on, add)
+
+
+def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Generate, train, bench and report; finished tasks are skipped."""
+    work(recipe, STAGES, out, on, add)
+
+
+def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
     """Run the unfinished tasks of some stages of a recipe and print a summary; `add`: methods from outside.
 
     Raises
@@ -67,12 +83,12 @@ def work(
             tasks,
             ledger,
             stages=stages,
-            scheduler=scheduler,
-            workers=workers,
+            scheduler=on.connection(),
+            workers=on.workers,
             prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
             recorded=recorded,
             settle=settle,
-            progress=progress,
+            progress=on.progress,
         )
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:

@@ -16,7 +16,9 @@ import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+
+from cyclopts import Parameter
 
 from jobs.plan.measurements.scenes import OnScene, SceneShot
 from jobs.plan.plan import plan
@@ -26,6 +28,7 @@ from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from jobs.verbs.require_recipe import alone
 from pipeline.models.card import read_card
 from weaves.errors import BadInput
@@ -74,19 +77,14 @@ class Saving(NamedTuple):
         return math.nan if not a else a / b if b else math.inf
 
 
-def savings(scenes: Sequence[str], out: Path, recipe: str, add: Sequence[str] = ()) -> None:
+def savings(
+    recipe: RecipeName,
+    scenes: Annotated[list[str], Parameter(help="Scenes whose own recipes, written by `require`, are finished.")],
+    *,
+    add: Add = NOTHING,
+    out: Out = OUT,
+) -> None:
     """Print the savings of scenes' own recipes, and write them to ``report/savings.csv``.
-
-    Parameters
-    ----------
-    scenes : sequence of str
-        Names of scenes of the package, or paths of scenes, for which `twillight require` wrote a recipe that has run.
-    out : Path
-        Folder of products of both recipes.
-    recipe : str
-        The general recipe.
-    add : sequence of str
-        Methods from outside the package, with which both recipes were run.
 
     Raises
     ------

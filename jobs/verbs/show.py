@@ -6,14 +6,16 @@ Pictures are a lit swatch, the drawdown (also in colours), height and normals as
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
+from cyclopts import Parameter
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from jobs.console import table_of
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import FabricName, Local
 from pipeline.atomic import atomic_write
 from pipeline.scenes.catalogue import load_scene
 from reports.images import tiles
@@ -38,13 +40,19 @@ _RUNS = 16  # shown of a sequence of colours
 _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"}
 
 
-def show(name: str, out: Path | None) -> None:
+def show(
+    fabric: FabricName,
+    *,
+    out: Annotated[
+        Local | None, Parameter(help="Folder for pictures, a lit swatch among them, as PNG and EXR.")
+    ] = None,
+) -> None:
     """Print a fabric, and write its pictures if a folder is given."""
-    fabric, console = load_fabric(name), Terminal()
-    console.print(fabric_page(fabric))
+    cloth, console = load_fabric(fabric), Terminal()
+    console.print(fabric_page(cloth))
     if out is not None:
-        console.print(*write_pictures(fabric, out), sep="\n", soft_wrap=True)
-        console.print(write_swatch(name, fabric, out), soft_wrap=True)
+        console.print(*write_pictures(cloth, out), sep="\n", soft_wrap=True)
+        console.print(write_swatch(fabric, cloth, out), soft_wrap=True)
 
 
 def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from rich.table import Table
 
@@ -13,10 +12,11 @@ from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 
 
-def print_status(recipe: str, out: Path, add: Sequence[str] = ()) -> None:
-    """Print the states of a recipe's tasks, with methods from outside in `add`."""
+def print_status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> None:
+    """Print the states of a recipe's tasks."""
     Terminal().print(status_table(plan(load_recipe(recipe, add)), Ledger(out)))
 
 

@@ -99,7 +99,7 @@ def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
         (["check", "denim", "--repair"], ["--repair", "'denim'", "name a recipe"]),
         (["check", "smoke", "--repair"], ["holds no products", "`twillight run smoke`"]),
         (["check", "."], ["manifest.json", "does not exist"]),
-        (["check", "denin"], ["'denin'", "did you mean 'denim'", "quick"]),
+        (["check", "denin"], ["'denin'", "did you mean 'denim'", "ablations"]),
         (["check", "quik"], ["'quik'", "did you mean 'quick'", "denim"]),
         (["check", "missing.toml"], ["missing.toml", "no such file"]),
         (["check", "satin.toml"], ["satin.toml", "draft.move = 3"]),

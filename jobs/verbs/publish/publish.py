@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
+from cyclopts import Parameter
 from filelock import FileLock, Timeout
 from rich.progress import track
 
 from jobs.console import size
 from jobs.terminal import Terminal
+from jobs.verbs.parameters import NOTHING
 from jobs.verbs.publish.about import About
 from jobs.verbs.publish.card import LOADER, card
 from jobs.verbs.publish.citation import citation
@@ -37,19 +39,14 @@ AUTHORS: Final = ("The Twillight authors",)
 _LOCK: Final = ".lock"
 
 
-def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequence[str]) -> None:
+def publish(
+    dataset: Annotated[Path, Parameter(help="Folder of a data set, out/datasets/NAME-FINGERPRINT.")],
+    *,
+    to: Annotated[Path | None, Parameter(help="Folder to write; empty or not there.")] = None,
+    licence: Annotated[str | None, Parameter(help="SPDX identifier of the data's licence, such as CC-BY-4.0.")] = None,
+    author: Annotated[list[str], Parameter(help="Author for the citation; may be given several times.")] = NOTHING,
+) -> None:
     """Write a data set as a folder for others.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the data set.
-    to : Path or None
-        Folder to write; it may exist if it is empty.
-    licence : str or None
-        SPDX identifier of the licence of the data.
-    authors : sequence of str
-        Names for the citation; `AUTHORS` if empty.
 
     Raises
     ------
@@ -58,13 +55,14 @@ def publish(folder: Path, to: Path | None, licence: str | None, authors: Sequenc
     WorkFailed
         If another process writes the same folder.
     """
+    folder = dataset
     identifier = licence_id(licence)
     target = _free(to, folder)
     manifest = Manifest.load(folder)
     _refuse_unfinished(folder, manifest)
     recipe, first = recipe_files(manifest, folder), own_shards(manifest)[0]
     truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
-    about = About(manifest, parts_of(manifest), identifier, tuple(authors) or AUTHORS, truth)
+    about = About(manifest, parts_of(manifest), identifier, tuple(author) or AUTHORS, truth)
     staging = target.with_name(f".tmp-{target.name}")
     if (
         staging.is_dir()

@@ -5,18 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+from cyclopts import Parameter
 
 from jobs.console import duration
 from jobs.terminal import Terminal
-from jobs.verbs.render.film_maker import FilmMaker
-from jobs.verbs.render.look import WHERE, Look
+from jobs.verbs.parameters import NOTHING, Local, SceneName
+from jobs.verbs.render.look import WHERE, Look, look
 from pipeline.atomic import refuse_unwritable
-from pipeline.models.fallback import Fallback
-from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import load
-from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.sources import worn
 from reports.images.video import refuse_missing
@@ -24,29 +23,29 @@ from reports.options import ShotOptions
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 
+if TYPE_CHECKING:
+    from jobs.verbs.render.film_maker import FilmMaker
+
 MOST_FRAMES: Final = 100_000
 """Most frames of a film."""
 
 _SUFFIXES: Final = (".png", ".exr", ".mp4", "")
 
 
-def render(scene: str, fabrics: Sequence[str], method: str, frames: int | None, how: Look, out: Path) -> None:
+def render(
+    scene: SceneName,
+    *,
+    out: Annotated[Local, Parameter(help="File ending in .png, .exr or .mp4, or a folder for numbered pictures.")],
+    fabric: Annotated[list[str], Parameter(help="Fabric in place of the next cloth's own; several.")] = NOTHING,
+    method: Annotated[str, Parameter(help="truth, selvage, soft_nodes, point_sampled:16, … or a folder.")] = "selvage",
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT in pixels; default: the film of the scene.")] = "",
+    frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
+    samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
+    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 8,
+    tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
+    exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,
+) -> None:
     """Render a scene and print where the picture is.
-
-    Parameters
-    ----------
-    scene : str
-        Name of a scene of the package, or path of an .xml or .toml file.
-    fabrics : sequence of str
-        Fabrics that replace those of the scene's cloths, in their order.
-    method : str
-        Name or folder of a method, or ``truth``.
-    frames : int, optional
-        Frames of a film or folder; those of the scene if left out.
-    how : Look
-        How it is made and shown.
-    out : Path
-        A file ending in .png, .exr or .mp4, or a folder for numbered PNG files.
 
     Raises
     ------
@@ -55,16 +54,23 @@ def render(scene: str, fabrics: Sequence[str], method: str, frames: int | None, 
     WorkFailed
         If the memory does not suffice.
     """
-    found = dressed(load_scene(scene), fabrics)
+    how = look(size, samples, directions, tone, exposure)
+    found = dressed(load_scene(scene), fabric)
     start = time.monotonic()
     maker = make(found, method, _frames(frames, found, out), how, out)
     width, height = maker.size
-    share = "" if method == TRUTH else f"; {maker.share:.0%} of the queries by the fallback"
+    share = "" if method == "truth" else f"; {maker.share:.0%} of the queries by the fallback"
     Terminal().print(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}", soft_wrap=True)
 
 
 def make(scene: Scene, method: str, frames: int, how: Look, out: Path) -> FilmMaker:
-    """Make a picture, a film or a folder, and return what made it; arguments and errors as for `render`."""
+    """Make a picture, a film or a folder, and return what made it; errors as for `render`."""
+    # Torch, which help need not wait for.
+    from jobs.verbs.render.film_maker import FilmMaker
+    from pipeline.models.fallback import Fallback
+    from pipeline.models.named import TRUTH, named_method
+    from pipeline.scenes.picture import TruthAnswers
+
     answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, WHERE, "--method")
     loaded = load(scene, how.options)
     if isinstance(answerer, Fallback):

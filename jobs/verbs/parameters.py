@@ -1,0 +1,79 @@
+"""Parameters that several verbs have on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+from cyclopts import Parameter, Token
+
+from weaves.errors import one_line
+
+if TYPE_CHECKING:
+    from jobs.run.cluster import Scheduler
+
+
+def _place(type_: object, tokens: Sequence[Token]) -> Path:
+    """Return the path of a folder or file of this machine or of object storage."""
+    from pipeline.storage import place
+
+    return place(tokens[0].value, tokens[0].keyword or "")
+
+
+def _local(type_: object, tokens: Sequence[Token]) -> Path:
+    """Return the path of a folder or file of this machine; refuse an address of object storage."""
+    name = tokens[0].value
+    if "://" in name:
+        path = _place(type_, tokens)
+        if not isinstance(path, Path):
+            raise ValueError(f"{one_line(name, 80)} is an address; a path of this machine is needed here")
+        return path
+    return Path(name)
+
+
+FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
+RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
+SceneName = Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")]
+OfSeveralPages = Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")]
+Add = Annotated[
+    list[str],
+    Parameter(help="Method or metric from outside: MODULE:NAME, FILE.py:NAME, or an installed method; runs its code."),
+]
+NOTHING: Final[list[str]] = []
+
+Local = Annotated[Path, Parameter(converter=_local)]
+"""A path of this machine."""
+Place = Annotated[Any, Parameter(converter=_place)]
+"""A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
+Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]
+
+OUT: Final = Path("out")
+
+
+@dataclass(frozen=True)
+class WorkerFlags:
+    """Processes that do the tasks, and how their progress is shown."""
+
+    workers: Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
+    scheduler: Annotated[
+        str, Parameter(help="Address or scheduler file of a running dask scheduler; default: this machine.")
+    ] = ""
+    tls_ca: Annotated[str, Parameter(help="Certificate of the scheduler's authority, a PEM file.")] = ""
+    tls_certificate: Annotated[str, Parameter(help="Own certificate for the scheduler, a PEM file.")] = ""
+    tls_key: Annotated[str, Parameter(help="Its key, a PEM file.")] = ""
+    progress: Annotated[
+        Literal["auto", "rich", "plain", "json"],
+        Parameter(help="Progress as bars, as lines of a log, or as JSON lines; auto: bars on a terminal, else lines."),
+    ] = "auto"
+
+    def connection(self) -> Scheduler:
+        """Return the scheduler to connect to."""
+        from jobs.run.cluster import Scheduler
+
+        return Scheduler(self.scheduler, self.tls_ca, self.tls_certificate, self.tls_key)
+
+
+On = Annotated[WorkerFlags, Parameter(name="*")]
+ON: Final = WorkerFlags()
