@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.presets import PRESETS
 from weaves.draft import Draft, cells
-from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, WARP, WEFT, curvature, surface_at, surface_maps
 from weaves.yarn import Yarn
 
@@ -256,7 +257,7 @@ def test_tiny_negative_positions_stay_in_the_repeat():
     assert np.isfinite(seen.height)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_maps_sample_texel_centres_row_by_row_from_pick_0(name):
     fabric = load_fabric(name)
     maps = surface_maps(fabric, 3)

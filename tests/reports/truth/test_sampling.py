@@ -42,7 +42,7 @@ def test_savings_in_equal_time_are_variance_times_time(found):
         assert one.saved_in_time == pytest.approx(wanted)
 
 
-@pytest.mark.parametrize("name", ["silk_charmeuse", "organza"])
+@pytest.mark.parametrize("name", ["organza", pytest.param("silk_charmeuse", marks=pytest.mark.slow)])
 def test_all_samplers_have_the_same_mean(name):
     """Each against the cosine, over all looks, by a z-test; chance of a false alarm 0.3 %."""
     fabric = load_fabric(name)

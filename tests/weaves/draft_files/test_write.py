@@ -7,13 +7,14 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from tests.presets import PRESETS
 from weaves.colour import encoded
 from weaves.draft import Draft, smallest_repeat
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.to_fabric import fabric_of
 from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
-from weaves.fabric import Fabric, load_fabric, preset_names
+from weaves.fabric import Fabric, load_fabric
 from weaves.validation import validated
 
 denim = load_fabric("denim")
@@ -47,7 +48,7 @@ def same_cloth(fabric, found):
     assert found.yarns_per_cm == (size and pytest.approx(size, rel=rounded))
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.parametrize("size", [None, (24.0, 19.5)])
 def test_a_preset_reads_back(again, name, size):
     fabric = load_fabric(name).model_copy(update={"yarns_per_cm": size})
