@@ -23,6 +23,13 @@ from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
 from weaves.fabric import load_fabric
 
+FORMAT_PAGE = Path(__file__).parents[3] / "docs" / "shader_format.md"
+
+_ROWS = re.findall(r"^\| ([^|]+) \| ([\d.e-]+) \|$", FORMAT_PAGE.read_text(encoding="utf-8"), re.M)
+
+ALLOWED = {form: float(share) for forms, share in _ROWS for form in forms.split(", ")}
+"""Largest difference from golden answers, as a share of the range of a column, as the page promises it to readers."""
+
 
 def missing(*programs):
     """Return the sentence for what a test needs and is not there, or nothing."""

@@ -1,7 +1,5 @@
 """The shader as C++ against the Python that it mirrors, from the exported files alone, on every fabric."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,11 +8,12 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shader.golden import GROUPS, read_sides, rows_of
 from pipeline.shader.tables import QUERY_KINDS, tabulate_sides
 from pipeline.truth.query import Queries
-from weaves.fabric import load_fabric
+from tests.pipeline.shader.conftest import ALLOWED
+from tests.presets import PRESETS
+from weaves.fabric import load_fabric, preset_names
 
 pytestmark = pytest.mark.external  # slangc and g++
 
-FABRICS = sorted(path.stem for path in Path(__file__).parents[3].glob("weaves/presets/*.toml"))
 FEW = ("gingham", "polyester_lining")
 UNSEEN = ("gauze", "silk_charmeuse", "crepe")
 
@@ -53,34 +52,34 @@ def check_golden(cpp, cloth, allowed):
     assert (scattered[:, 12] >= 0.0).all() and (scattered[:, 12] <= 1.0).all()
 
 
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.parametrize("name", PRESETS)
 def test_golden_vectors_are_answered(cpp, exported, read, name):
     cloth = read(exported(name))
     assert list(cloth.groups) == ["front"]
-    check_golden(cpp, cloth, 1e-5)
+    check_golden(cpp, cloth, ALLOWED["C++"])
 
 
-KINDS_OF_FABRICS = [pytest.param(name, id=name, marks=[] if name in FEW else pytest.mark.slow) for name in FABRICS]
+SLOW_BUT_FEW = [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in preset_names()]
 
 
-@pytest.mark.parametrize("name", KINDS_OF_FABRICS)
+@pytest.mark.parametrize("name", SLOW_BUT_FEW)
 def test_golden_vectors_of_every_kind_are_answered(cpp, exported, read, name):
     folder = exported(name, kinds=(EVERY,))
     cloth = read(folder)
     assert list(cloth.groups) == list(GROUPS)
-    check_golden(cpp, cloth, 1e-5)
-    check_golden(cpp, read(folder, "float16"), 1e-2)
+    check_golden(cpp, cloth, ALLOWED["C++"])
+    check_golden(cpp, read(folder, "float16"), ALLOWED["16 bits"])
 
 
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.parametrize("name", PRESETS)
 def test_nodes_of_half_precision_answer_to_a_percent(cpp, exported, read, name):
-    check_golden(cpp, read(exported(name), "float16"), 1e-2)
+    check_golden(cpp, read(exported(name), "float16"), ALLOWED["16 bits"])
 
 
 @pytest.mark.parametrize("level", [1, 4, 8])
 def test_other_levels_are_answered(cpp, exported, read, level):
     cloth = read(exported("gingham", level))
-    check_golden(cpp, cloth, 1e-5)
+    check_golden(cpp, cloth, ALLOWED["C++"])
 
 
 @pytest.mark.parametrize("name", UNSEEN)
@@ -97,7 +96,7 @@ def test_queries_that_are_not_golden_are_answered(cpp, exported, read, name):
     expected = read_queries(table, queries)
     found = cpp(cloth.buffers, rows_of(queries))
     answers = np.concatenate([expected.components, expected.bounds], axis=1)
-    differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > 1e-5
+    differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > ALLOWED["C++"]
     assert differ.mean() < 0.01
 
 
@@ -155,7 +154,7 @@ def test_queries_of_every_kind_that_are_not_golden_are_answered(cpp, exported, r
         rows = rows_of(queries)
         found = np.column_stack([cpp(cloth.buffers, rows), cpp(cloth.buffers, rows, "scatter")[:, [12, 11]]])
         span = np.maximum(np.ptp(expected, axis=0), 1e-12)
-        differ = (np.abs(found - expected) / span).max(axis=1) > 1e-5
+        differ = (np.abs(found - expected) / span).max(axis=1) > ALLOWED["C++"]
         assert differ.mean() < 0.01, (number, differ.mean())
 
 
@@ -193,7 +192,7 @@ def test_extreme_footprints_are_answered(cpp, exported, read, name):
     expected = read_queries(table, queries)
     found = cpp(cloth.buffers, rows_of(queries))
     answers = np.concatenate([expected.components, expected.bounds], axis=1)
-    differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > 1e-5
+    differ = (np.abs(found - answers) / np.ptp(answers, axis=0)).max(axis=1) > ALLOWED["C++"]
     assert differ.mean() < 0.01 and (found >= 0.0).all()
 
 

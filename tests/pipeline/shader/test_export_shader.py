@@ -10,10 +10,11 @@ import pytest
 
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shader import languages
+from pipeline.shader.descriptor import Buffer, Descriptor, Networks, PlacedLayer
 from pipeline.shader.languages import LANGUAGES
 from pipeline.truth.conventions import COMPONENTS
-from tests.pipeline.shader.conftest import missing
-from tests.pipeline.shader.test_evaluate import FABRICS
+from tests.pipeline.shader.conftest import FORMAT_PAGE, missing
+from tests.presets import PRESETS
 from weaves.fabric import load_fabric
 
 
@@ -30,7 +31,8 @@ def largest(exported):
     return max(bytes_of(folder / name) for name in LANGUAGES if name != "cuda")
 
 
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.external
+@pytest.mark.parametrize("name", PRESETS)
 def test_a_folder_has_less_than_a_megabyte_with_a_language(exported, largest, name):
     assert bytes_of(exported(name)) + largest < 1_000_000
 
@@ -63,6 +65,7 @@ def test_slangc_of_the_search_path_is_found(monkeypatch):
     assert str(languages.slangc()) == "/opt/slangc"
 
 
+@pytest.mark.external
 def test_every_language_is_written(exported):
     if lacking := missing("slangc"):
         pytest.skip(lacking)
@@ -80,6 +83,7 @@ def test_no_sine_and_no_cosine_is_called(exported):
         assert not re.search(r"\b(sin|cos|tan|atan2?|asin|acos|exp2?|log2?)\(", path.read_text()), path
 
 
+@pytest.mark.external
 @pytest.mark.parametrize(
     ("name", "file", "options"),
     [
@@ -101,6 +105,7 @@ def test_glslang_accepts_what_is_written(exported, name, file, options):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.external
 def test_nvcc_accepts_the_cuda_form(exported, tmp_path):
     if lacking := missing("slangc"):
         pytest.skip(lacking)
@@ -111,3 +116,10 @@ def test_nvcc_accepts_the_cuda_form(exported, tmp_path):
         ["nvcc", "--ptx", "-w", "-o", tmp_path / "evaluate.ptx", path], capture_output=True, text=True
     )
     assert done.returncode == 0 and "evaluate" in (tmp_path / "evaluate.ptx").read_text(), done.stderr
+
+
+def test_the_page_on_the_format_has_every_key_of_the_descriptor():
+    page = FORMAT_PAGE.read_text(encoding="utf-8")
+    for part in (Descriptor, Buffer, Networks, PlacedLayer):
+        rows = [f"| `{name}` | {field.description.rstrip('.')} |" for name, field in part.model_fields.items()]
+        assert "\n".join(rows) in page, f"docs/shader_format.md needs, of {part.__name__}:\n" + "\n".join(rows)

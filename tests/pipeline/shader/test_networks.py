@@ -18,14 +18,13 @@ from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.registry import load_model, model_folder
 from pipeline.shader.golden import rows_of
 from pipeline.shards.queries import QueryOptions, draw_queries
-from tests.pipeline.shader.conftest import compiled, missing
-from tests.pipeline.shader.test_evaluate import FABRICS, UNSEEN, hemisphere
-from weaves.fabric import load_fabric
+from tests.pipeline.shader.conftest import ALLOWED, compiled, missing
+from tests.pipeline.shader.test_evaluate import UNSEEN, hemisphere
+from tests.presets import PRESETS
+from weaves.fabric import load_fabric, preset_names
 
 SOME = ("crepe", "gauze", "gingham", "silk_charmeuse")
 """Fabrics of the fast tests: the largest repeat, open cloth, the smallest repeat, long floats."""
-
-ALL = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in FABRICS]
 
 CLOTH = "gingham"
 """The fabric of the trained `neumip`."""
@@ -85,14 +84,14 @@ def check_answers(found, expected, allowed):
     assert (found >= 0.0).all() and (found[:, :4] <= found[:, 4:]).all()
 
 
-@pytest.mark.parametrize(("kind", "allowed"), [("float32", 1e-5), ("float16", 1e-2)])
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(("kind", "allowed"), [("float32", ALLOWED["C++"]), ("float16", ALLOWED["16 bits"])])
+@pytest.mark.parametrize("name", PRESETS)
 def test_selvage_answers_its_golden_vectors(selvage_cpp, exported, read, name, kind, allowed):
     cloth = read(exported(name, model="selvage"), kind)
     check_answers(selvage_cpp(cloth.buffers, cloth.queries), cloth.answers[:, :8], allowed)
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", PRESETS)
 def test_golden_vectors_are_those_of_the_method(selvage, exported, read, name):
     """A network that changes nothing would pass all other tests with wrong weights."""
     cloth = read(exported(name, model="selvage"))
@@ -113,7 +112,7 @@ def test_other_queries_of_selvage_are_answered(selvage, selvage_cpp, exported, r
     cloth = read(exported(name, model="selvage"))
     expected = selvage.predict(fabric, queries)
     found = selvage_cpp(cloth.buffers, rows_of(queries))
-    differ = (np.abs(found[:, :4] - expected) / np.ptp(expected, axis=0)).max(axis=1) > 1e-5
+    differ = (np.abs(found[:, :4] - expected) / np.ptp(expected, axis=0)).max(axis=1) > ALLOWED["C++"]
     assert differ.mean() < 0.01
 
 
@@ -141,10 +140,10 @@ def test_light_and_viewer_behind_answer_nothing(selvage_cpp, neumip_cpp, neumip,
         assert (found[:2] == 0.0).all() and (found[2] > 0.0).any()
 
 
-@pytest.mark.parametrize("fabrics", [SOME, pytest.param(FABRICS, marks=pytest.mark.slow)], ids=["some", "all"])
+@pytest.mark.parametrize("fabrics", [SOME, pytest.param(preset_names(), marks=pytest.mark.slow)], ids=["some", "all"])
 @pytest.mark.parametrize(
     ("half", "allowed"),
-    [(False, 1e-4), pytest.param(True, 1e-2, marks=pytest.mark.slow)],
+    [(False, ALLOWED["browser"]), pytest.param(True, ALLOWED["16 bits"], marks=pytest.mark.slow)],
     ids=["float32", "float16"],
 )
 def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allowed, fabrics):
@@ -157,7 +156,7 @@ def test_networks_answer_in_a_browser(webgl, exported, read, neumip, half, allow
     check_answers(found, cloth.answers[:, :8], allowed)
 
 
-@pytest.mark.parametrize(("kind", "allowed"), [("float32", 1e-5), ("float16", 1e-2)])
+@pytest.mark.parametrize(("kind", "allowed"), [("float32", ALLOWED["C++"]), ("float16", ALLOWED["16 bits"])])
 def test_neumip_answers_its_golden_vectors(neumip_cpp, neumip, exported, read, kind, allowed):
     cloth = read(exported(CLOTH, model=neumip), kind)
     check_answers(neumip_cpp(cloth.buffers, cloth.queries), cloth.answers[:, :8], allowed)
@@ -171,7 +170,7 @@ def test_neumip_answers_beyond_its_repeat_and_its_levels(neumip_cpp, neumip, exp
     queries = queries._replace(u=queries.u - np.float32(64.0), v=queries.v + np.float32(32.0))
     expected = method.predict(fabric, queries)
     found = neumip_cpp(cloth.buffers, rows_of(queries))[:, :4]
-    assert (np.abs(found - expected) / np.ptp(expected, axis=0)).max() < 1e-5
+    assert (np.abs(found - expected) / np.ptp(expected, axis=0)).max() < ALLOWED["C++"]
 
 
 def forward(cloth, network, inputs):
@@ -222,4 +221,4 @@ def test_networks_alone_run_by_onnx(exported, selvage, neumip):
         assert said["languages"] == {"onnx": ["onnx/network.onnx"]} and set(said["network"]["onnx"]) == set(inputs)
         (answer,) = session(folder).run(None, inputs)
         expected = method.predict(fabric, queries)
-        assert worst(answer, expected) < 1e-5
+        assert worst(answer, expected) < ALLOWED["ONNX"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.pipeline.shader.conftest import missing
+from tests.pipeline.shader.conftest import ALLOWED, missing
 from tests.pipeline.shader.test_evaluate import worst
 
 pytestmark = pytest.mark.external  # slangc and Chromium
@@ -31,5 +31,5 @@ def test_golden_vectors_are_answered(exported, read, tmp_path, browse, model):
         pytest.skip(f"this browser has no WebGPU: {said.decode()}")
     assert not said.startswith(b"error"), said
     found = np.frombuffer(said, np.float32).reshape(-1, 8)
-    assert worst(found, cloth) < 1e-4
+    assert worst(found, cloth) < ALLOWED["browser"]
     assert (found >= 0.0).all() and (found[:, :4] <= found[:, 4:]).all()

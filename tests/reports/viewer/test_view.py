@@ -12,9 +12,10 @@ from pipeline.shader.languages import slangc
 from reports.viewer import view
 from reports.viewer.generate import SHADERS, mark, shader, shipped, sources
 from reports.viewer.view import BEND_FACTORS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
+from tests.presets import PRESETS
 from tests.reports.viewer.conftest import opened, write
 from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
-from weaves.fabric import load_fabric, preset_names
+from weaves.fabric import load_fabric
 
 ROOT = Path(__file__).parents[3]
 
@@ -48,7 +49,7 @@ def test_the_page_is_one_file_without_addresses(small):
     assert content["fabric"] == "gingham" and len(content["views"]) == 5
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_factors_keep_yarns_within_their_ranges(name):
     fabric = load_fabric(name)
     assert bends(fabric) in ((1.0,), BEND_FACTORS[:2], BEND_FACTORS) and widths(fabric) in (WIDTHS, NARROWER)
