@@ -14,8 +14,7 @@ from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.schema import SCHEMAS
 from pipeline.truth.estimator import ESTIMATORS
-from reports.tables.markdown import block, with_block
-from reports.tables.readme import BLOCK
+from reports.tables.documents import BLOCK, block, with_block
 from weaves.fabric import PRESETS, load_fabric
 
 ROOT = Path(__file__).parents[1]

@@ -20,7 +20,7 @@ from pipeline.models.added.added_method import AddedMethod
 from reports.added_metric import AddedMetric
 from reports.catalogue import enter
 from reports.options import BenchOptions, Role
-from reports.page.model_note import ModelNote
+from reports.page.content import ModelNote
 from weaves.fabric import Fabric
 
 
@@ -96,9 +96,8 @@ class Page(Task):
 
     def run(self, out: Path, progress: Progress) -> None:
         """Write it."""
-        from reports.page.content import PageInput
+        from reports.page.content import PageInput, PictureFile
         from reports.page.page import write_page
-        from reports.page.picture_strips import PictureFile
         from reports.record import read_machine, read_records
 
         # Measurements are the same in every recipe; the page adds the recipe's name.

@@ -40,7 +40,7 @@ def compare(
     from reports.record import read_machine, read_records
     from reports.tables.compare import LEVEL, NO_DIFFERENCE, refuse_other_machine
     from reports.tables.compare import compare as differences
-    from reports.tables.machine_load import busy
+    from reports.tables.sentences import busy
 
     files = [records_file(path, recipe) for path in (a, b)]
     first, second = (read_records([file]) for file in files)

@@ -31,9 +31,7 @@ def results(
         If the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
     from reports.record import read_machine, read_records
-    from reports.tables.markdown import block, with_block
-    from reports.tables.readme import BLOCK, readme_block
-    from reports.tables.results import results_page
+    from reports.tables.documents import BLOCK, block, readme_block, results_page, with_block
 
     name = load_recipe(recipe, add).name
     source = records_file(out, name)
@@ -44,10 +42,10 @@ def results(
         text = read_text(readme, MIB, "a Markdown file")
         old = block(text, BLOCK, str(readme))
         fresh = with_block(text, BLOCK, readme_block(records, machine, old, str(source)), str(readme))
-        said = "unchanged" if fresh == text else "written"
         if fresh != text:
             atomic_write(readme, fresh.encode())
-        Terminal().print(f"{readme}: table of {name} {said}", soft_wrap=True)
+        outcome = "unchanged" if fresh == text else "written"
+        Terminal().print(f"{readme}: table of {name} {outcome}", soft_wrap=True)
     if readme is None or file is not None:
         file = file or source.with_name("results.md")
         atomic_write(file, results_page(records, machine, str(source)).encode())

@@ -1,16 +1,74 @@
-"""Content of a page: fabrics, methods, Records, pictures, and where they come from."""
+"""Content of a page: fabrics, methods, Records, pictures, and where they come from. Nothing heavy is imported here."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from reports.options import BenchOptions, Role
-from reports.page.model_note import ModelNote
-from reports.page.picture_strips import PictureFile
-from reports.record import Machine, Record
-from weaves.fabric import Fabric
+from pipeline.models.added.added_method import ADDED
+from pipeline.models.catalogue import CLASSES
+from pipeline.models.options import Options
+from reports.tables.number_format import display
+
+if TYPE_CHECKING:
+    from reports.options import BenchOptions, Role
+    from reports.record import Machine, Record
+    from weaves.fabric import Fabric
+
+
+@dataclass(frozen=True)
+class ModelNote:
+    """A method in words."""
+
+    name: str
+    """Name in the recipe; it distinguishes several models of one kind."""
+    about: str
+    """In a few words: kind and training."""
+    fingerprint: str = ""
+    """Of the trained model."""
+    per_material: bool = False
+    """True if one model is trained for each fabric."""
+    kind: str = ""
+    """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED`; empty: its name."""
+
+    @property
+    def learns(self) -> bool:
+        """True if there is anything to train."""
+        model = CLASSES.get(self.kind or self.name)
+        return bool(self.fingerprint) if self.kind == ADDED else model is None or model.learns
+
+    @property
+    def published(self) -> bool:
+        """True if it is a published method, from which the package's may depart."""
+        model = CLASSES.get(self.kind or self.name, Options)
+        return model.departures is not Options.departures
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A picture that was rendered."""
+
+    fabric: str
+    """Empty for a scene, which has cloths of its own."""
+    scene: str
+    """View of the fabric, or name of the scene."""
+    method: str
+    """``truth`` for the reference."""
+    setting: str
+    path: Path
+
+    @property
+    def label(self) -> str:
+        """Of the method with its setting."""
+        return display(self.method, self.setting)
+
+    @property
+    def stem(self) -> str:
+        """Of the names of its tiles."""
+        words = [self.fabric or "scene", self.scene, self.method, *self.setting.replace("=", "").split()]
+        return "-".join(words)
 
 
 @dataclass(frozen=True)

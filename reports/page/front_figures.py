@@ -26,8 +26,7 @@ from reports.page.colours import Scheme
 from reports.page.labels import Label, place_labels
 from reports.page.plot_style import NARROWEST, new_figure
 from reports.tables.number_format import display, size
-from reports.tables.pareto_front import front
-from reports.tables.summary import PAPER, of_baseline, rows
+from reports.tables.summary import PAPER, front, of_baseline, rows
 
 _ROLES: Final = ("seen", "unseen")
 _LEGEND_COLUMNS: Final = 5

@@ -7,31 +7,24 @@ the page last: a page that exists is whole.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from pipeline.atomic import atomic_write
-from reports.catalogue import OTHER
 from reports.images import tiles
 from reports.images.exr import film, read_exr
-from reports.measure.extremes import extremes_table
-from reports.measure.silhouette import silhouette_table
 from reports.page import figures, front_figures
 from reports.page.content import PageInput
 from reports.page.files import write_files
-from reports.page.filmstrip import filmstrip, liveliest
-from reports.page.html import page_html, schemes, truth_measurements
-from reports.page.picture_strips import films
+from reports.page.html import page_html, schemes
+from reports.page.pictures import films, filmstrip
 from reports.page.plot_style import render
-from reports.record import OF_A_PAGE, TRUTH, Record, machine_path, to_table, write_records
+from reports.record import OF_A_PAGE, TRUTH, machine_path, write_records
 from reports.tables import summary
-from reports.tables.equal_time import equal_time_table, size_table
-from reports.tables.tradeoff import tradeoff_table
-from reports.truth.finding import RECORDS as FINDINGS
+from reports.tables.page_tables import page_frames, ranged_frames
 
 
 def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] = lambda fraction: None) -> Path:
@@ -51,13 +44,13 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     BadInput
         If a picture is missing, or the folder cannot be written.
     """
-    tables = page_tables(page.records)
+    frames = page_frames(page.records)
     written = [OF_A_PAGE, machine_path(Path(OF_A_PAGE)).name]
-    for name, table in tables.items():
-        write_table(folder / "tables" / name, table)
+    for name, frame in frames.items():
+        write_table(folder / "tables" / name, frame)
         written += [f"tables/{name}.csv", f"tables/{name}.parquet"]
     progress(0.1)
-    images = dict(_plots(tables, page))
+    images = dict(_plots(ranged_frames(frames), page))
     for name, content in images.items():
         atomic_write(folder / "figures" / name, content)
         written.append(f"figures/{name}")
@@ -72,41 +65,8 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
     write_records(folder / OF_A_PAGE, page.records, page.machine)
     write_files(folder, written)
     index = folder / "index.html"
-    atomic_write(index, page_html(page, tables, {name.removesuffix("-light.png") for name in images}).encode())
+    atomic_write(index, page_html(page, frames, {name.removesuffix("-light.png") for name in images}).encode())
     return index
-
-
-def page_tables(records: Sequence[Record]) -> dict[str, pd.DataFrame]:
-    """Return the condensed tables of a page by name; tables without rows only where the page always shows them."""
-    tables = {
-        "records": to_table(records),
-        "errors": summary.error_table(records),
-        "errors_by_fabric": summary.fabric_table(records),
-        "pictures": summary.picture_table(records),
-        "aliasing": summary.aliasing_table(records),
-        "timing": summary.timing_table(records),
-        "energy": summary.energy_table(records),
-        "silhouettes": silhouette_table(records),
-    }
-    tables["tradeoff"] = tradeoff_table(tables["errors"], tables["timing"], tables["aliasing"])
-    tables["scenes"] = summary.scene_table(records)
-    tables["by_size"] = size_table(records)
-    tables["equal_time"] = equal_time_table(tables["by_size"])
-    between = summary.path_table(records)
-    if len(between):
-        tables["between"] = between
-    other = summary.other_table(records)
-    if len(other):
-        tables[OTHER] = other
-    extremes = extremes_table(records)
-    if len(extremes):
-        tables["extremes"] = extremes
-    if findings := FINDINGS.from_records(records):
-        tables["stability"] = pd.DataFrame([asdict(finding) for finding in findings])
-    for name, measured in truth_measurements(records).items():
-        if measured:
-            tables[name] = pd.DataFrame([asdict(one) for one in measured])
-    return tables
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
@@ -117,22 +77,22 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
     atomic_write(path.with_suffix(".parquet"), buffer.getvalue())
 
 
-def _plots(tables: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[str, bytes]]:
+def _plots(frames: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[str, bytes]]:
     """Draw every plot that there are numbers for, in both schemes."""
-    errors, timing, aliasing = tables["errors"], tables["timing"], tables["aliasing"]
+    errors, timing, aliasing = frames["errors"], frames["timing"], frames["aliasing"]
     curves = summary.spectra(page.records)
     plots: dict[str, tuple[Any, ...]] = {}
     if len(errors):
-        plots["errors"] = (figures.errors, errors, tables["errors_by_fabric"])
-    if tables["tradeoff"]["error"].notna().any():
-        plots["error-against-time"] = (front_figures.error_against_time, tables["tradeoff"])
-        plots["error-against-bytes"] = (front_figures.error_against_bytes, tables["tradeoff"])
-    if tables["tradeoff"]["flicker"].notna().any():
-        plots["aliasing-against-time"] = (front_figures.aliasing_against_time, tables["tradeoff"])
-    if len(tables["by_size"]):
-        plots["error-by-size"] = (front_figures.error_by_size, tables["by_size"])
-    if tables["scenes"]["frame_time"].notna().any():
-        plots["scenes"] = (front_figures.scenes, tables["scenes"])
+        plots["errors"] = (figures.errors, errors, frames["errors_by_fabric"])
+    if frames["tradeoff"]["error"].notna().any():
+        plots["error-against-time"] = (front_figures.error_against_time, frames["tradeoff"])
+        plots["error-against-bytes"] = (front_figures.error_against_bytes, frames["tradeoff"])
+    if frames["tradeoff"]["flicker"].notna().any():
+        plots["aliasing-against-time"] = (front_figures.aliasing_against_time, frames["tradeoff"])
+    if len(frames["by_size"]):
+        plots["error-by-size"] = (front_figures.error_by_size, frames["by_size"])
+    if frames["scenes"]["frame_time"].notna().any():
+        plots["scenes"] = (front_figures.scenes, frames["scenes"])
     if len(aliasing):
         plots["aliasing"] = (figures.aliasing, aliasing)
     if curves:
@@ -156,8 +116,7 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
             yield f"{file.stem}-relative.png", tiles.relative_tile(exr)
             yield f"{file.stem}-flip.png", tiles.flip_tile(exr)
     for scene, files in films(page.pictures).items():
-        shown = {file.stem: film(read_exr(file.path)) for file in files}
-        yield f"film-{scene}.png", filmstrip(shown, liveliest(shown))
+        yield f"film-{scene}.png", filmstrip({file.stem: film(read_exr(file.path)) for file in files})
     for fabric, _ in page.fabrics:
         drawdown = tiles.drawdown if fabric.colours is None else tiles.colours
         for kind, draw in (("drawdown", drawdown), ("height", tiles.height), ("normals", tiles.normals)):

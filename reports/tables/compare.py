@@ -4,7 +4,7 @@ Times are compared by their raw samples with the test of Mann and Whitney [Mann1
 and a few slow calls do not matter. It takes readings to be independent; what was different on the machine while the two
 benchmarks ran, its clock or other work, is a difference too: under changing load the same code was marked 1.4 times
 slower than itself, so that two runs of A belong before one of B (how busy the machine was stands beside the times:
-`reports.tables.machine_load`). Mean squared errors are compared by
+`reports.tables.sentences`). Mean squared errors are compared by
 z = (b - a) / sqrt(s_a^2 + s_b^2) with their standard errors; where both were measured on the same queries these are not
 independent, and the test is the stricter for it. All p-values of a comparison are corrected together
 [Holm1979Simple]: the chance that the readings' own scatter marks any difference is at most `LEVEL`.

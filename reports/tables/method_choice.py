@@ -21,8 +21,7 @@ from typing import Any
 import pandas as pd
 
 from reports.measure.by_size import WHOLE
-from reports.tables.pareto_front import front
-from reports.tables.summary import rows
+from reports.tables.summary import front, rows
 
 COLUMNS = ("method", "setting", "error", "ms", "fallback", "known")
 

@@ -51,13 +51,6 @@ def beyond_noise(value: float, worded: Callable[[float], str]) -> str:
     return IN_THE_NOISE if value <= 0 else worded(value)
 
 
-def scientific_interval(low: float, high: float) -> str:
-    """Return both ends in the power of ten of the larger: ``(1.97 … 2.73)e-2``."""
-    exponent = int(f"{max(low, high, key=abs):e}".partition("e")[2])
-    ends = (f"{end / 10.0**exponent:.2f}" for end in (low, high))
-    return f"({' … '.join(ends)})e{exponent}".replace("-", "−")
-
-
 def signed(value: float) -> str:
     """Return a number with its sign; 0 has none."""
     return NONE if missing(value) else ("+" if value > 0 else "") + scientific(value)
@@ -78,7 +71,7 @@ def significant(value: float) -> str:
 
 def percent(value: float, digits: int = 1) -> str:
     """Return ``1.5 %``."""
-    return NONE if missing(value) else f"{100 * value:.{digits}f} %"
+    return NONE if missing(value) else f"{100 * value:.{digits}f} %".replace("-", "−")
 
 
 def grouped(value: float) -> str:
@@ -103,30 +96,24 @@ def size(value: float) -> str:
     return f"{value:,.0f} B" if value < 1e3 else f"{value / 1e3:,.1f} kB" if value < 1e6 else f"{value / 1e6:,.2f} MB"
 
 
-def interval(low: float, high: float) -> str:
-    """Return both ends with two digits: ``1.2 … 3.4``."""
-    return NONE if missing(low) else " … ".join(f"{v:.2g}" if v < 100 else f"{v:,.0f}" for v in (low, high))
+def seconds(value: float) -> str:
+    """Return a time in the unit that suits it: ``20.0 µs``."""
+    if missing(value):
+        return NONE
+    factor, unit = (1e6, "µs") if value < 1e-3 else (1e3, "ms") if value < 1 else (1.0, "s")
+    return f"{significant(factor * value)} {unit}"
 
 
 def span(worded: Callable[[float], str], low: float, high: float) -> str:
-    """Return the range over trainings: ``[1.2 … 3.4 %]``; empty where there is none."""
+    """Return both ends of a range in words: ``[1.2 … 3.4 %]``, ``[1.97 … 2.73]e−2``; empty where there is none."""
     if missing(low) or missing(high):
         return ""
-    if worded in (scientific, signed):
-        return scientific_interval(low, high).replace("(", "[").replace(")", "]")
-    first, last = (worded(end).replace(IN_THE_NOISE, "0") for end in (low, high))
-    unit = re.search(r"[^\d.,e−+]*$", last)
-    return f"[{first.removesuffix(unit[0] if unit else '')} … {last}]"
-
-
-def interval_of(metric: str, low: float, high: float) -> str:
-    """Return an interval of a metric: ``(1.2 … 3.4 %)``; empty where there is none."""
-    return span_of(metric, low, high).replace("[", "(").replace("]", ")")
-
-
-def span_of(metric: str, low: float, high: float) -> str:
-    """Return the range of a metric over trainings, in its format (`reports.catalogue`)."""
-    return span(_FORMATS[metric_row(metric).format], low, high)
+    ends = [worded(end).replace(IN_THE_NOISE, "0") for end in (low, high)]
+    if "e" in ends[1]:
+        exponent = int(f"{max(low, high, key=abs):e}".partition("e")[2])
+        return f"[{' … '.join(f'{end / 10.0**exponent:.2f}' for end in (low, high))}]e{exponent}".replace("-", "−")
+    unit = re.search(r"[^\d.,−+]*$", ends[1])
+    return f"[{ends[0].removesuffix(unit[0] if unit else '')} … {ends[1]}]"
 
 
 def listed(words: Sequence[str]) -> str:
@@ -140,10 +127,11 @@ def missing(value: float | None) -> bool:
     return value is None or not math.isfinite(value)
 
 
-_FORMATS: Final[dict[Format, Callable[[float], str]]] = {
+FORMATS: Final[dict[Format, Callable[[float], str]]] = {
     "scientific": scientific,
     "signed": signed,
     "percent": percent,
+    "fine percent": lambda value: percent(value, 2),
     "whole percent": lambda value: percent(value, 0),
     "three decimals": fixed,
     "two decimals": lambda value: fixed_to(value, 2),
@@ -151,9 +139,10 @@ _FORMATS: Final[dict[Format, Callable[[float], str]]] = {
     "significant": significant,
     "grouped": grouped,
     "bytes": size,
+    "seconds": seconds,
 }
 
 
 def shown(metric: str, value: float) -> str:
     """Return the value of a metric in its format (`reports.catalogue`)."""
-    return _FORMATS[metric_row(metric).format](value)
+    return FORMATS[metric_row(metric).format](value)

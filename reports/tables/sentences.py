@@ -1,15 +1,128 @@
-"""Sentences that sum up a table: the cheapest method within a limit, rivals at equal time, methods off the front."""
+"""Sentences of a page: the trade, its methods, what sums up a table, limits of the numbers, what was not measured."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 
 from reports.measure.by_size import SIZES, WHOLE
-from reports.tables.number_format import NO_BREAK, display, listed, significant
-from reports.tables.summary import rows
+from reports.over_seeds import LEAST, MOST, trainings
+from reports.record import TRUTH, Record
+from reports.tables.number_format import NO_BREAK, NONE, display, listed, percent, plain, shown, significant, times
+from reports.tables.summary import BASELINE, PAPER, of_baseline, over_unseen, rows, unranged
 from reports.tables.tradeoff import FLICKER_LIMITS, LIMITS, cheapest
+
+BOUNDED: Final = "bounded"
+"""Setting of a network under the energy bound (`pipeline.models.bounded`)."""
+
+QUIET: Final = 0.02
+"""Share of the time that methods wait for others on a machine that counts as quiet."""
+
+
+def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
+    """Return the headline of the trade and its four figures.
+
+    They are the cheapest methods within the first three `LIMITS` on the fabrics of the first role, and what a pixel of
+    two points gets. Both are empty where two points were not measured.
+    """
+    part = tradeoff[tradeoff["role"] == tradeoff["role"].iloc[0]] if len(tradeoff) else tradeoff
+    base = next(iter(rows(part[of_baseline(part)])), None) if len(part) else None
+    if base is None:
+        return "", []
+    figures: list[dict[str, str]] = []
+    reached: dict[str, list[str]] = {}
+    for limit in LIMITS[:3]:
+        best = cheapest(part, limit)
+        name = display(best.method, best.setting) if best else "no method"
+        ratio = times(best.ns / base.ns) if best else NONE
+        note = f"{name}: {'the cheapest ' if best else ''}within {100 * limit:g} % error, in times of two points"
+        figures.append({"value": ratio, "note": note})
+        reached.setdefault(f"{name} at {ratio} the time of two points" if best else name, []).append(
+            f"{100 * limit:g} %"
+        )
+    worst = percent(base.error, 0)
+    figures.append({"value": worst, "note": f"error of a pixel of two points, in {base.ns:,.0f} ns"})
+    within = "; ".join(f"within {listed(limits)} error {name}" for name, limits in reached.items())
+    where = _fabrics(base.fabrics, base.role)
+    return f"A pixel of two random points has an error of {worst} on {where}. Cheapest {within}.", figures
+
+
+def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
+    """Return the paper's sentence with our numbers, and with the paper's; empty if there is no ratio to print.
+
+    A mean over trainings has its range; a single training is called one. On several unseen fabrics the ratio is the
+    geometric mean, with its 95 % interval over fabrics.
+    """
+    own = errors[(errors["method"] == method) & (errors["setting"] == setting) & errors["ratio"].notna()]
+    parts = [_part(row) for row in rows(own)]
+    if not parts:
+        return ""
+    (first, where), *others = parts
+    more = "".join(f" and {ratio} on {fabrics}" for ratio, fabrics in others)
+    ratios = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
+    cost = f", at {ratios.iloc[0]:.2g}× its time" if len(ratios) and math.isfinite(ratios.iloc[0]) else ""
+    lower, faster = PAPER
+    name = display(method, setting)
+    text = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
+    text += " (one training)" if own["seeds"].iloc[0] == 1 else ""
+    return f"{text}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{text}."
+
+
+def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:
+    """Return the setting of each method that the headline names.
+
+    It is the form under the energy bound where that was measured: its error on validation cloths is lower. Otherwise
+    it is the first. The truth, and methods that nothing is trained for, are left out.
+    """
+    settings: dict[str, list[str]] = {}
+    for method, setting in zip(errors["method"], errors["setting"], strict=True):
+        settings.setdefault(method, []).append(setting)
+    return [
+        (method, BOUNDED if BOUNDED in known else known[0])
+        for method, known in settings.items()
+        if method not in untrained and method != TRUTH
+    ]
+
+
+def _comparison(ratio: float) -> str:
+    return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+
+
+def _part(row: Any) -> tuple[str, str]:
+    """Return the comparison of a ratio, and the fabrics it is of."""
+    where = _fabrics(row.fabrics, row.role)
+    if not over_unseen(row):
+        return _comparison(row.ratio) + _range(row, "ratio"), where
+    low, high = _ends(row.ratio_fabrics, row.ratio_fabrics_low, row.ratio_fabrics_high)
+    where += f" (geometric mean, 95 % interval over fabrics {low}× to {high}×)"
+    return _comparison(row.ratio_fabrics) + _range(row, "ratio_fabrics"), where
+
+
+def _range(row: Any, column: str) -> str:
+    """Return the range of a ratio over trainings; empty where there are not several."""
+    least, most = getattr(row, column + LEAST), getattr(row, column + MOST)
+    if not math.isfinite(least):
+        return ""
+    low, high = _ends(getattr(row, column), least, most)
+    return f" ({low}× to {high}× over {row.seeds} trainings)"
+
+
+def _ends(ratio: float, low: float, high: float) -> tuple[str, str]:
+    """Return the ends of a ratio's interval; of a ratio below 1 those of its inverse, in rising order."""
+    ends = (low, high) if ratio >= 1 else (1 / high, 1 / low)
+    return _number(ends[0]), _number(ends[1])
+
+
+def _number(value: float) -> str:
+    return f"{value:.2g}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:,.0f}"
+
+
+def _fabrics(count: int, role: str) -> str:
+    return f"one {role} fabric" if count == 1 else f"the {count} {role} fabrics"
 
 
 def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) -> list[str]:
@@ -46,16 +159,16 @@ def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
     error = table["colour_rrmse"].where(~lost, table["colour_rrmse_high"])
     table = table.assign(flicker=table["flicker"].abs(), error=error, lost=lost)
     for scene, group in table.groupby("scene", sort=False) if len(table) else ():
-        timed, found = group[group["frame_time"].notna()], []
+        timed, sentences = group[group["frame_time"].notna()], []
         if len(timed):
             within = _for_errors(timed, LIMITS[:3], "frame_time")
-            found.append(f"Error of the colour: {within}.")
+            sentences.append(f"Error of the colour: {within}.")
         if timed["flicker"].notna().any():
-            found.append(f"Flicker: {_for_flicker(timed, 'frame_time')}.")
+            sentences.append(f"Flicker: {_for_flicker(timed, 'frame_time')}.")
         names = [display(row.method, row.setting) for row in rows(group[group["lost"]])]
         if names:
-            found.append(f"In the noise of the truth: the error of {listed(names)}.")
-        result[str(scene)] = found
+            sentences.append(f"In the noise of the truth: the error of {listed(names)}.")
+        result[str(scene)] = sentences
     return result
 
 
@@ -72,13 +185,13 @@ def _for_flicker(table: pd.DataFrame, cost: str) -> str:
 
 def _cheapest(table: pd.DataFrame, limits: Mapping[float, str], cost: str, fault: str, where: str) -> str:
     """Return the cheapest method within each limit; limits with the same method are named together."""
-    said: dict[str, list[str]] = {}
+    reached: dict[str, list[str]] = {}
     for limit, name in limits.items():
         best = cheapest(table, limit, cost, fault)
         text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
-        said.setdefault(text, []).append(name)
-    parts = [f"cheapest within {where.format(listed(found))}: {text}" for text, found in said.items() if text]
-    if missed := said.get(""):
+        reached.setdefault(text, []).append(name)
+    parts = [f"cheapest within {where.format(listed(names))}: {text}" for text, names in reached.items() if text]
+    if missed := reached.get(""):
         parts.append(f"no method reaches {where.format(' or '.join(missed))}")
     return "; ".join(parts)
 
@@ -91,8 +204,8 @@ def _cost(value: float, cost: str) -> str:
 def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:
     """Return for each method the rivals with a lower error in the same time, and where, from `equal_time_table`."""
     result = []
-    found = table[(table["measure"] == measure) & table["ratio"].notna()]
-    for (method, setting), group in found.groupby(["method", "setting"], sort=False):
+    compared = table[(table["measure"] == measure) & table["ratio"].notna()]
+    for (method, setting), group in compared.groupby(["method", "setting"], sort=False):
         name, lost = display(str(method), str(setting)), group[group["ratio"] < 1.0]
         if len(lost):
             parts = [_where(str(rival), part) for rival, part in lost.groupby("rival", sort=False)]
@@ -121,10 +234,85 @@ def _size(name: str) -> str:
     return "over all sizes" if name == WHOLE else f"at footprints {name}"
 
 
-def beaten(table: pd.DataFrame) -> dict[str, list[str]]:
-    """Return for each role the methods without a setting on the front."""
-    result = {}
-    for role, group in table.groupby("role", sort=False):
-        best = set(group.loc[group["front"], "method"])
-        result[str(role)] = [display(name) for name in dict.fromkeys(group["method"]) if name not in best]
-    return result
+def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]]:
+    """Return the sentences of each section, from `page_tables.page_frames` or `ranged_frames`; of scenes by scene."""
+    scenes = scene_sentences(frames["scenes"])
+    return {
+        "trade": cheapest_sentences(frames["tradeoff"]),
+        "equal-time": equal_time_sentences(frames["equal_time"]),
+        "aliasing": least_flicker_sentences(frames["tradeoff"]),
+        "scenes": [f"{plain(scene).capitalize()}: {text}" for scene, texts in scenes.items() for text in texts],
+    }
+
+
+def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Sequence[str] = ()) -> dict[str, object]:
+    """Return the values of words (`tables.toml`) that Records tell; what was not measured is not among them.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        From `summary.error_table`.
+    per_material : sequence of str
+        Methods that are trained on every fabric by itself.
+    """
+    metrics = {record.metric for record in records}
+    counts: dict[str, int] = {}
+    for row in rows(errors) if len(errors) else ():
+        counts[display(row.method)] = max(row.seeds, counts.get(display(row.method), 0))
+    once, several = ([name for name, n in counts.items() if (n == 1, n > 1)[part]] for part in (0, 1))
+    unseen = errors[errors["role"] == "unseen"]["fabrics"].max() if len(errors) else 0
+    black = errors[of_baseline(errors) & (errors["zero_answers"] > 0)] if len(errors) else errors
+    motion = [record.value for record in records if record.metric == "motion"]
+    share = waited(records)
+    known = {
+        "trainings": max(trainings(records).values(), default=0) > 1 and max(trainings(records).values()),
+        "once": once and listed(once),
+        "several": several and listed(several),
+        "training_counts": several and listed(sorted({str(counts[name]) for name in several})),
+        "one_unseen": "One" if unseen == 1 else "",
+        "unseen_fabrics": int(unseen) if unseen > 1 else 0,
+        "unranged": ", ".join(display(method, setting) for _, method, setting in sorted(unranged(errors))),
+        "bounded": "Bounded" if len(errors) and BOUNDED in set(errors["setting"]) else "",
+        "black": f"{float(black['zero_answers'].mean()):.0%}" if len(black) else "",
+        "per_material": per_material and listed(list(map(display, per_material))),
+        "waited": "" if math.isnan(share) else f"{100 * share:.1f} %",
+        "busy": f"{100 * share:.1f} %" if share >= QUIET else "",
+        "not_by_eye": "not scored" if "frame_time" in metrics and "fovvideovdp" not in metrics else "",
+        "motion": shown("motion", float(np.mean(motion))) if motion else "",
+    }
+    return {name: value for name, value in known.items() if value}
+
+
+def lacking(records: Sequence[Record]) -> list[str]:
+    """Return a sentence for each way of running methods that was not measured or timed, with the reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for record in records:
+        if record.metric == "not_run":
+            scene = f" in the scene {record.scene}" if record.scene else ""
+            how = f" by {record.setting} {{}} not measured" if record.setting else f" {{}} not timed{scene}"
+            reasons.setdefault((how, record.note), []).append(display(record.method))
+    return [
+        f"{listed(list(dict.fromkeys(methods)))}{how.format('was' if len(set(methods)) == 1 else 'were')} "
+        f"({reason.rstrip('.')})."
+        for (how, reason), methods in reasons.items()
+    ]
+
+
+def waited(records: Iterable[Record]) -> float:
+    """Return the share of the time that methods on one thread waited, the median over methods; NaN if unknown.
+
+    A method on one thread that has nothing to wait for runs all the time it takes. What it does not run
+    (`reports.measure.timing.Timing.waited`), other work had the processor. Work on other cores that slows memory or the
+    clock is not seen by this.
+    """
+    shares = [record.value for record in records if record.metric == "waited"]
+    return float(np.median(shares)) if shares else math.nan
+
+
+def busy(a: Iterable[Record], b: Iterable[Record]) -> list[str]:
+    """Return a sentence for a comparison if methods of A or B had to wait."""
+    shares = {name: waited(records) for name, records in (("A", a), ("B", b))}
+    parts = [f"{name} waited {100 * share:.0f} % of the time" for name, share in shares.items() if share >= QUIET]
+    if not parts:
+        return []
+    return [f"Other work ran on the machine while methods were timed, {' and '.join(parts)}: times may differ by that"]

@@ -1,26 +1,32 @@
-"""Records condensed: one row a method, over all fabrics of a role.
+"""Records condensed to frames: one row a method, over all fabrics of a role.
 
 Means over fabrics weigh every fabric alike, as one picture of all of them would. A ratio compares a method with point
-sampling at 2 points on the very fabrics that the method covers; its interval is that of
-`reports.error.ratio`. Numbers of networks are means over trainings, with their range (`reports.over_seeds`).
+sampling at 2 points on the very fabrics that the method covers; its interval is that of `reports.error.ratio`. Numbers
+of networks are means over trainings, with their range (`reports.over_seeds`). The metrics of a frame are those of the
+table of its name in the catalogue.
+
+Unseen fabrics are a sample: others give other errors. The errors of a method on two fabrics differ by a factor, so that
+the mean over fabrics is that of their logarithms, with an interval. Named unseen fabrics count like random ones. Of
+several trainings the geometric mean is taken too, of the means and of the ends of their intervals: an interval that is
+never too narrow.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 from scipy import stats
 
-from reports.catalogue import METRICS, OTHER, metric_row
+from pipeline.truth.conventions import COMPONENTS
+from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
-from reports.over_fabrics import ERRORS, OVER_FABRICS, columns_over_fabrics, over_unseen
 from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
-from reports.tables.pareto_front import front
 
 BASELINE: Final = ("point_sampled", "k = 2")
 """Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
@@ -31,7 +37,12 @@ PAPER: Final = (4.1, 0.83)
 FRAME: Final = 1920 * 1080
 """Queries of a frame, one a pixel."""
 
+ERRORS: Final[tuple[Metric, ...]] = ("mse", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS))
+"""Metrics on held-out queries that have a mean over fabrics with an interval."""
+
+_OVER_FABRICS: Final = tuple(f"{name}_fabrics" for name in ("ratio", *ERRORS))
 _KEYS: Final = ["method", "setting"]
+_MEANS: Final = [name for name in (*columns_of("errors"), "zero_answers") if name != "mse"]  # of `error_table`
 
 _ALBEDOS: Final = ["diffuse", "specular", "colour"]  # columns of `energy_table`
 
@@ -43,17 +54,16 @@ def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
 
 @over_seeds(
     [*_KEYS, "role"],
-    ["ratio", *ERRORS, "colour_rrmse_99", "zero_answers", *OVER_FABRICS],
-    {f"{name}{end}": stats.gmean for name in OVER_FABRICS for end in ("", "_low", "_high")},
+    ["ratio", "mse", *_MEANS, *_OVER_FABRICS],
+    {f"{name}{end}": stats.gmean for name in _OVER_FABRICS for end in ("", "_low", "_high")},
 )
 def error_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return errors on held-out queries, one row a method and role.
 
     Columns: method, setting, role, fabrics, queries; mse, standard_error, low, high (of the mean over fabrics);
     mse_measured, truth_noise, noise_share = truth_noise / mse_measured; ratio, ratio_low, ratio_high (MSE of 2
-    points over the method's); zero_answers, colour_rrmse, colour_rrmse_99 and the four rrmse_<component> (means
-    over fabrics); geometric means over fabrics, and over trainings, with their intervals
-    (`reports.over_fabrics.columns_over_fabrics`).
+    points over the method's); zero_answers and the other columns of `errors` in the catalogue (means over fabrics);
+    geometric means over fabrics, and over trainings, with their intervals (`columns_over_fabrics`).
     """
     wide = _wide(records, "queries")
     result = []
@@ -69,8 +79,7 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
         row |= {"mse_measured": measured, "truth_noise": noise}
         row["noise_share"] = noise / measured if measured > 0 else math.nan
         row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
-        relative = ["zero_answers", "colour_rrmse_99", *ERRORS[1:]]
-        row |= {name: group[name].mean() if name in group else math.nan for name in relative}
+        row |= {name: group[name].mean() if name in group else math.nan for name in _MEANS}
         row |= columns_over_fabrics(group, baseline)
         result.append(row)
     return pd.DataFrame(result)
@@ -109,80 +118,40 @@ def picture_table(records: Sequence[Record]) -> pd.DataFrame:
     return pd.concat([part[part["mse"].notna()] for part in found], ignore_index=True).reindex(columns=columns)
 
 
-@over_seeds([*_KEYS, "role"], ["flicker", "excess_energy"])
+@over_seeds([*_KEYS, "role"], columns_of("aliasing"))
 def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return flicker and excess energy: one row a method and role, means over fabrics, and over how many."""
-    wide = _wide(records, "plane")
+    """Return the metrics of aliasing: one row a method and role, means over fabrics, and over how many."""
+    wide, names = _wide(records, "plane"), columns_of("aliasing")
     if "flicker" not in wide:
-        return pd.DataFrame(columns=[*_KEYS, "role", "fabrics", "flicker", "excess_energy"])
-    wide = wide[wide["flicker"].notna()]
-    groups = wide.groupby([*_KEYS, "role"], sort=False)
-    table = groups.agg(fabrics=("fabric", "size"), flicker=("flicker", "mean"), excess_energy=("excess_energy", "mean"))
-    return table.reset_index()
+        return pd.DataFrame(columns=[*_KEYS, "role", "fabrics", *names])
+    groups = wide[wide["flicker"].notna()].reindex(columns=[*wide.columns, *{*names} - {*wide.columns}])
+    means = {name: (name, "mean") for name in names}
+    return groups.groupby([*_KEYS, "role"], sort=False).agg(fabrics=("fabric", "size"), **means).reset_index()
 
 
-SCENE_METRICS: Final[tuple[Metric, ...]] = (
-    "mse",
-    "mse_relative",
-    "psnr",
-    "ssim",
-    "flip_ldr",
-    "flip_hdr",
-    "delta_e",
-    "flicker",
-    "excess_energy",
-    "fallback_share",
-    "frame_time",
-    "colour_rrmse",
-    "fovvideovdp",
-)
-"""Metrics of every method on a scene."""
-
-SCENE_FLOORS: Final[tuple[Metric, ...]] = (
-    "truth_noise",
-    "mse_relative_floor",
-    "psnr_floor",
-    "ssim_floor",
-    "flip_ldr_floor",
-    "flip_hdr_floor",
-    "delta_e_floor",
-)
-"""Scores of the truth's noise alone on a scene (`reports.measure.scene.image_error`); common to all methods."""
-
-SCENE_CONSTANTS: Final[tuple[Metric, ...]] = ("fallback_share", "frame_time")
-"""Which of `SCENE_METRICS` do not depend on the weights of a network."""
-
-SCENE_INTERVALS: Final[tuple[Metric, ...]] = (
-    "mse",
-    "mse_relative",
-    "psnr",
-    "ssim",
-    "flip_ldr",
-    "flip_hdr",
-    "delta_e",
-    "flicker",
-    "colour_rrmse",
-)
-"""Which of `SCENE_METRICS` have a 95 % interval."""
+_SCENE: Final = [*columns_of("scenes"), "mse", "mse_relative", "colour_rrmse", "flicker", "excess_energy"]
+_FLOORS: Final = ["truth_noise", *(name for name in METRICS if name.endswith("_floor"))]
+_FIXED: Final = ("fallback_share", "frame_time")  # not of the weights of a network
 
 
-@over_seeds(["scene", *_KEYS], [*(name for name in SCENE_METRICS if name not in SCENE_CONSTANTS), "ratio"])
+@over_seeds(["scene", *_KEYS], [*(name for name in _SCENE if name not in _FIXED), "ratio"])
 def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the benchmark's scenes, one row a scene, method and setting.
 
-    Columns: scene, method, setting; `SCENE_METRICS` (frame_time in ms, its quartiles in the Records) and
-    `SCENE_FLOORS`; of each of `SCENE_INTERVALS` the ends of its 95 % interval, <metric>_low and <metric>_high; ratio
-    (MSE of 2 points over the method's); front (nothing beats it on both MSE and time in its scene). An MSE that is not
-    above 0, lost in the noise of the truth, has no ratio and is on no front.
+    Columns: scene, method, setting; the columns of `scenes` in the catalogue, mse, mse_relative, colour_rrmse, flicker
+    and excess_energy, and the scores of the truth's noise alone; of those that depend on the weights of a network the
+    ends of the 95 % interval, <metric>_low and <metric>_high; ratio (MSE of 2 points over the method's); front (nothing
+    beats it on both MSE and time in its scene). An MSE that is not above 0, lost in the noise of the truth, has no
+    ratio and is on no front.
     """
     table = to_table(records)
-    metrics = [*SCENE_METRICS, *SCENE_FLOORS]
+    metrics, intervals = [*_SCENE, *_FLOORS], [name for name in _SCENE if name not in _FIXED]
     table = table[(table["fabric"] == "") & (table["scene"] != "") & table["metric"].isin(metrics)]
-    keys, ends = ["scene", *_KEYS], [f"{name}_{end}" for name in SCENE_INTERVALS for end in ("low", "high")]
+    keys, ends = ["scene", *_KEYS], [f"{name}_{end}" for name in intervals for end in ("low", "high")]
     if table.empty:
         return pd.DataFrame(columns=[*keys, *metrics, *ends, "ratio", "front"])
     wide = table[keys].drop_duplicates()
-    for column, names in (("value", metrics), ("low", SCENE_INTERVALS), ("high", SCENE_INTERVALS)):
+    for column, names in (("value", metrics), ("low", intervals), ("high", intervals)):
         part = table.pivot(index=keys, columns="metric", values=column).reindex(columns=list(names))
         part = part if column == "value" else part.add_suffix(f"_{column}")
         wide = wide.merge(part.reset_index(), on=keys)
@@ -278,12 +247,15 @@ def summary_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the whole benchmark as one row a method, for the terminal.
 
     Index: method and setting. Columns, where measured: MSE and ratio to 2 points on seen and unseen fabrics (on several
-    unseen fabrics the geometric mean of the ratio), flicker, nanoseconds a query and their ratio to 2 points, bytes
-    stored.
+    unseen fabrics the geometric mean of the ratio; none of `unranged`), flicker, nanoseconds a query and their ratio to
+    2 points, bytes stored.
     """
     parts = []
     errors = error_table(records)
     if len(errors):
+        keys = zip(errors["role"], errors["method"], errors["setting"], strict=True)
+        left_out = unranged(errors)
+        errors.loc[[key in left_out for key in keys], ["mse", "ratio", "ratio_fabrics"]] = math.nan
         errors["ratio"] = [row.ratio_fabrics if over_unseen(row) else row.ratio for row in rows(errors)]
     for role in ("seen", "unseen"):
         part = errors[errors["role"] == role].set_index(_KEYS)[["mse", "ratio"]] if len(errors) else pd.DataFrame()
@@ -332,3 +304,110 @@ def _baseline(wide: pd.DataFrame, role: object, fabrics: set[str]) -> pd.DataFra
     """Return the baseline's rows; empty unless it was measured on every one of the fabrics."""
     rows = wide[of_baseline(wide) & (wide["role"] == role) & wide["fabric"].isin(fabrics)]
     return rows if set(rows["fabric"]) == fabrics else rows.iloc[:0]
+
+
+def unranged(errors: pd.DataFrame) -> set[tuple[str, str, str]]:
+    """Return role, method and setting of what another training would change, and whose range is not known.
+
+    It is what was trained once, on unseen fabrics of which there is one: over several fabrics there is an interval.
+    """
+    if errors.empty:
+        return set()
+    alone = errors[(errors["role"] == "unseen") & (errors["fabrics"] == 1) & (errors["seeds"] == 1)]
+    return set(zip(alone["role"], alone["method"], alone["setting"], strict=True))
+
+
+class OverFabrics(NamedTuple):
+    """Geometric mean over fabrics, and the ends of its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+
+
+def over_fabrics(values: npt.ArrayLike) -> OverFabrics:
+    """Return the geometric mean of errors or ratios, one a fabric, and its 95 % interval over fabrics.
+
+    Parameters
+    ----------
+    values : array_like (fabrics,)
+        Figures of one method.
+
+    Returns
+    -------
+    OverFabrics
+        NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth. The
+        interval of a single fabric is NaN.
+
+    Notes
+    -----
+    Student's t interval of the mean of the logarithms: exp(m ± t_{.975, n-1} s / sqrt(n)), with n fabrics, and mean m
+    and standard deviation s of the logarithms. It holds if the fabrics are drawn at random and the logarithms are
+    normal.
+    """
+    figures = np.asarray(values, np.float64)
+    if not len(figures) or not ((figures > 0) & np.isfinite(figures)).all():
+        return OverFabrics(np.nan, np.nan, np.nan)
+    logarithms = np.log(figures)
+    mean = float(np.exp(logarithms.mean()))
+    if len(figures) < 2:
+        return OverFabrics(mean, np.nan, np.nan)
+    reach = float(stats.t.ppf(0.975, len(figures) - 1) * stats.sem(logarithms))
+    return OverFabrics(mean, mean * np.exp(-reach), mean * np.exp(reach))
+
+
+def over_unseen(row: Any) -> bool:
+    """Return whether a row of `error_table` is of several unseen fabrics and has an interval over them."""
+    return row.role == "unseen" and math.isfinite(row.ratio_fabrics_low)
+
+
+def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, float]:
+    """Return the columns of a method that are means over fabrics.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        One row a fabric, with the columns `fabric` and `ERRORS`.
+    base : DataFrame
+        The same of point sampling at 2 points, or no rows.
+
+    Returns
+    -------
+    dict
+        For `ratio` (MSE of 2 points over the method's on the same fabric) and each of `ERRORS` the geometric mean
+        <name>_fabrics and the ends of its 95 % interval, <name>_fabrics_low and <name>_fabrics_high.
+    """
+    other = base.set_index("fabric")["mse"].reindex(errors["fabric"])
+    figures = {"ratio": other.to_numpy() / errors["mse"].to_numpy()}
+    # A component that is nowhere seen on a fabric has no error there.
+    figures |= {name: errors[name].dropna().to_numpy() for name in ERRORS if name in errors}
+    found = {name: over_fabrics(figures.get(name, ())) for name in ("ratio", *ERRORS)}
+    return {
+        f"{name}_fabrics{end}": number
+        for name, three in found.items()
+        for end, number in zip(("", "_low", "_high"), three, strict=True)
+    }
+
+
+def front(points: Sequence[tuple[float, float]]) -> list[bool]:
+    """Return which points are on the front of two costs: those that nothing beats on both.
+
+    A point is beaten by another that is nowhere worse and somewhere better. Equal points do not beat each other.
+
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        Time and error; less is better. Points with NaN or infinity are not on the front and beat nothing.
+
+    Returns
+    -------
+    list of bool
+    """
+    on = [False] * len(points)
+    measured = sorted((point, index) for index, point in enumerate(points) if all(map(math.isfinite, point)))
+    last, lowest = (math.nan, math.nan), math.inf
+    # From the fastest on: whatever is not better than all faster ones is beaten by one of them, or equals it.
+    for point, index in measured:
+        if point[1] < lowest or point == last:
+            on[index], last, lowest = True, point, point[1]
+    return on

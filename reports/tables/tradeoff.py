@@ -8,7 +8,7 @@ import pandas as pd
 
 from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
-from reports.tables.pareto_front import front
+from reports.tables.summary import front
 
 LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 """Errors that the page names the cheapest method for."""

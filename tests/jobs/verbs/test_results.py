@@ -4,7 +4,7 @@ import pytest
 
 from jobs.cli import main
 from reports.record import Machine, Provenance, Record, write_records
-from reports.tables.markdown import markers
+from reports.tables.documents import markers
 
 MACHINE = Machine(cpu="Test CPU", cores=2, threads=2, system="", python="", packages={}, date="2026-01-01")
 

@@ -1,0 +1,155 @@
+"""Pictures of a page: views of fabrics and scenes by every method in their order, and strips of consecutive frames.
+
+A strip of frames has one row a method, the truth's on top: flicker and moiré to look at. All are shown alike: times an
+exposure, cut at 1, sRGB encoding, the same crop of every frame. A last column, wider apart, is the slice over time: the
+crop's middle row of pixels in every frame, the first frame on top. What moves steadily makes slanted lines there, what
+flickers breaks them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from reports.images.tiles import EXPOSURE, encoded, png
+from reports.page.content import PictureFile
+from reports.record import TRUTH
+from reports.tables.number_format import beyond_noise, display, scientific
+from reports.tables.summary import BASELINE, rows
+from weaves.colour import LUMINANCE
+
+GAP: Final = 2
+"""Clear pixels between frames."""
+SHOWN: Final = 6
+"""Frames of a strip, if there are as many."""
+
+LARGEST: Final = (40, 96)
+"""Height and width of the largest crop that `liveliest` chooses, in pixels."""
+
+Bytes8 = npt.NDArray[np.uint8]
+
+MOST_FILMS: Final = 12
+"""Rows of a strip of frames."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One view of one fabric, or one scene, by every method; the truth first."""
+
+    fabric: str
+    scene: str
+    role: str = ""
+    cells: list[dict[str, str]] = field(default_factory=list)
+    """Each with `stem`, `method`, `label` and `mse`."""
+
+
+def strips(
+    pictures: Sequence[PictureFile],
+    order: Mapping[str, str],
+    scenes: Sequence[str],
+    errors: Sequence[pd.DataFrame],
+) -> list[Strip]:
+    """Return the views of the fabrics, then the scenes.
+
+    Parameters
+    ----------
+    pictures : sequence of PictureFile
+        What there is to show.
+    order : mapping
+        The fabrics in their order, each with its role.
+    scenes : sequence of str
+        Views and scenes in their order.
+    errors : sequence of DataFrame
+        From `summary.picture_table` and `summary.scene_table`: the MSE that stands beside a picture.
+    """
+    mse = {
+        (getattr(row, "fabric", ""), row.scene, row.method, row.setting): row.mse
+        for table in errors
+        for row in rows(table)
+    }
+    views: dict[tuple[str, str], Strip] = {}
+    for file in sorted(pictures, key=lambda file: file.method != TRUTH):
+        strip = views.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene, order.get(file.fabric, "")))
+        value = mse.get((file.fabric, file.scene, file.method, file.setting), math.nan)
+        cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
+        strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
+    fabrics, places = ({name: index for index, name in enumerate(names)} for names in (order, dict.fromkeys(scenes)))
+    return sorted(views.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
+
+
+def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
+    """Return for each scene the rows of its strip of frames: the truth, then every method once.
+
+    Of a method with several settings the first picture counts: there it aliases most. Of more than `MOST_FILMS` the
+    first ones stay, and the baseline.
+    """
+    result: dict[str, list[PictureFile]] = {}
+    for scene in dict.fromkeys(file.scene for file in pictures if not file.fabric):
+        own = sorted((f for f in pictures if not f.fabric and f.scene == scene), key=lambda f: f.method != TRUTH)
+        once = list({file.method: file for file in reversed(own)}.values())[::-1]
+        once.sort(key=own.index)
+        rank = {file: index for index, file in enumerate(sorted(once, key=_least_wanted))}
+        result[scene] = [file for file in once if rank[file] < MOST_FILMS]
+    return result
+
+
+def _least_wanted(file: PictureFile) -> bool:
+    return file.method != TRUTH and (file.method, file.setting) != BASELINE
+
+
+class Crop(NamedTuple):
+    """A rectangle of pixels, the first row on top."""
+
+    top: int
+    left: int
+    height: int
+    width: int
+
+
+def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
+    """Return frames side by side as PNG bytes, without words.
+
+    Parameters
+    ----------
+    films : mapping of array (F, H, W, 3)
+        Linear RGB of the truth and of methods, all of one size, in the order of the strip's rows. Of every frame the
+        rectangle is shown in which most changes (`liveliest`); of more than `SHOWN` frames the first.
+    """
+    crop = liveliest(films)
+    strips = [_strip(frames[:SHOWN], crop) for frames in films.values()]
+    width = max(strip.shape[1] for strip in strips)
+    lines = [np.pad(strip, ((0, GAP), (0, width - strip.shape[1]), (0, 0))) for strip in strips]
+    return png(np.concatenate(lines)[:-GAP])
+
+
+def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int, int] = LARGEST) -> Crop:
+    """Return the rectangle of at most `largest` (height, width) pixels in which most changes from frame to frame.
+
+    The rectangle, of all that lie an eighth of it apart, with the largest sum of the luminance's variance over frames,
+    summed over all films. Of equal ones the topmost, then the leftmost.
+    """
+    change = np.sum([np.var(frames @ np.array(LUMINANCE), axis=0) for frames in films.values()], axis=0)
+    height, width = (min(sides) for sides in zip(change.shape, largest, strict=True))
+    tops, lefts = (
+        range(0, whole - side + 1, max(1, side // 8)) for whole, side in zip(change.shape, (height, width), strict=True)
+    )
+    sums = {(top, left): change[top : top + height, left : left + width].sum() for top in tops for left in lefts}
+    top, left = max(sums, key=lambda place: sums[place])
+    return Crop(top, left, height, width)
+
+
+def _strip(frames: npt.NDArray[np.floating], crop: Crop) -> Bytes8:
+    """Return the crops of frames side by side and the slice over time, RGBA."""
+    top, left, height, width = crop
+    codes = encoded(EXPOSURE * frames[:, top : top + height, left : left + width])
+    opaque = np.concatenate([codes, np.full((*codes.shape[:3], 1), 255, np.uint8)], axis=-1)
+    over_time = opaque[np.arange(height) * len(opaque) // height, height // 2]
+    clear = np.zeros((height, GAP, 4), np.uint8)
+    parts = [part for frame in opaque for part in (frame, clear)]
+    return np.concatenate([*parts, clear, clear, over_time], axis=1)

@@ -1,0 +1,235 @@
+"""Documents from the Records of one page: the table of README.md, and all tables as reports/RESULTS.md.
+
+Errors and flicker are the same in every run on one machine. Times are not: in README.md a time that is printed already
+is kept while the new one lies within `TOLERANCE` of it, so that a fresh run of the same recipe changes no byte.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any, Final
+
+import pandas as pd
+
+from reports.record import Machine, Record
+from reports.tables.number_format import NONE, fixed_to, listed, missing, span, times
+from reports.tables.page_tables import page_frames, ranged_frames, result_tables
+from reports.tables.sentences import BOUNDED, facts, section_sentences
+from reports.tables.summary import (
+    BASELINE,
+    PAPER,
+    error_table,
+    of_baseline,
+    over_unseen,
+    rows,
+    summary_table,
+    unranged,
+)
+from reports.tables.table import WORDS, markdown_table, paragraphs
+from weaves.errors import BadInput
+
+BLOCK: Final = "quick"
+"""Name of the block in README.md."""
+
+TOLERANCE: Final = 1.25
+"""Factor by which a time may differ from the one that is printed."""
+
+README_METHODS: Final[Mapping[tuple[str, str], str]] = {
+    BASELINE: "two random points, exact shadows",
+    ("point_sampled", "k = 16"): "sixteen random points",
+    ("neumip", ""): "`neumip`: one neural texture for each fabric \\*",
+    ("woven", ""): "`woven`: one network for all fabrics",
+    ("woven", BOUNDED): "`woven` under the energy bound",
+    ("soft_nodes", "k = 2"): "`soft_nodes`: a sum over few nodes, nothing is trained",
+    ("selvage", ""): "`selvage`: soft nodes corrected by a small network",
+}
+"""Methods and settings that README.md shows, each in words."""
+
+_README_COLUMNS: Final = ("method", "MSE", "× lower", "× lower, unseen", "flicker", "× time")
+
+
+def readme_block(records: Sequence[Record], machine: Machine, old: str, where: str) -> str:
+    """Return the block: table, headline of `woven`, and where it was measured.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Of one page.
+    machine : Machine
+        Where its times were taken.
+    old : str
+        The block as it is now; its times are kept where they still hold.
+    where : str
+        File of the Records, for the error.
+
+    Raises
+    ------
+    BadInput
+        If the Records hold no errors and times of two random points.
+    """
+    condensed, errors = summary_table(records), error_table(records)
+    needed = {"MSE seen", "× lower, seen", "MSE unseen", "× lower, unseen", "flicker", "× time"}
+    if BASELINE not in condensed.index or not needed <= set(condensed.columns):
+        raise BadInput(
+            where, "", "lacks errors, flicker or times of two random points", "Records of a whole page are needed"
+        )
+    left_out = unranged(errors)
+    ratios = {(row.method, row.setting, row.role): _ratio(row) for row in rows(errors)}
+    ratios |= {(method, setting, role): NONE for role, method, setting in left_out}
+    printed, lines = _printed_times(old), []
+    numbers: dict[Any, dict[Any, float]] = {key: dict(row) for key, row in condensed.to_dict("index").items()}
+    for key, words in README_METHODS.items():
+        if row := numbers.get(key):
+            own = (ratios.get((*key, role), NONE) for role in ("seen", "unseen"))
+            time = kept_time(printed.get(words, NONE), row["× time"])
+            lines.append((words, two_digits(row["MSE seen"]), *own, two_decimals(row["flicker"]), time))
+    held_out = errors[of_baseline(errors)]
+    fabrics = " and ".join(f"{row.fabrics} {row.role}" for row in rows(held_out))
+    provenance = next(record.provenance for record in records if record.provenance.recipe)
+    several = any(over_unseen(row) for row in rows(errors))
+    return "\n\n".join(
+        [
+            markdown_table(_README_COLUMNS, lines),
+            *_woven(lines),
+            f"Recipe `{provenance.recipe}`, benchmark version {provenance.version}, {machine.cores} cores of "
+            f"{machine.cpu}; {held_out['queries'].sum():,} held-out queries of {fabrics} fabrics. "
+            "MSE: mean squared error of the colour on seen fabrics. × lower: the MSE of two points over that of the "
+            "method, on seen and on unseen fabrics. Flicker: variance over time beyond that of the truth, over its "
+            "squared mean, on all fabrics. × time: of one query on one thread, over that of two points; times within "
+            "a quarter, because no two runs take equally long. \\* Trained on each fabric that it is measured on. "
+            + "On several unseen fabrics: geometric mean, in parentheses its 95 % interval over fabrics. " * several
+            + "–: one training and one unseen fabric give no range. " * bool(left_out)
+            + _trainings(errors),
+        ]
+    )
+
+
+def _ratio(row: Any) -> str:
+    """Return × lower with its interval over several unseen fabrics, and its range over several trainings."""
+    name = "ratio_fabrics" if over_unseen(row) and (row.method, row.setting) != BASELINE else "ratio"
+    ends = [span(times, getattr(row, f"{name}{low}"), getattr(row, f"{name}{high}")) for low, high in _ENDS]
+    over = ends[0].replace("[", "(").replace("]", ")") if name == "ratio_fabrics" else ""
+    return " ".join(filter(None, (times(getattr(row, name)), over, ends[1])))
+
+
+_ENDS: Final = (("_low", "_high"), ("_least", "_most"))
+
+
+def _trainings(errors: pd.DataFrame) -> str:
+    """Return a sentence on how often networks were trained."""
+    counts = sorted({int(count) for count in errors["seeds"] if count})
+    if not counts or counts[-1] == 1:
+        return "Each network was trained once."
+    numbers = listed([str(count) for count in counts])
+    return f"Networks: means over {numbers} trainings, in brackets the least and the most of them."
+
+
+def _woven(lines: Sequence[Sequence[str]]) -> list[str]:
+    """Return the comparison that the paper of `woven` makes, with our numbers and its own; none without `woven`."""
+    shown = {words: numbers for words, *numbers in lines}
+    names = {README_METHODS["woven", BOUNDED]: "`woven` under the energy bound", README_METHODS["woven", ""]: "`woven`"}
+    for words, name in names.items():
+        if words in shown:
+            _, seen, unseen, _, time = shown[words]
+            lower, faster = PAPER
+            others = f", {unseen} on unseen ones," if unseen != NONE else ""
+            ours = f"{name} has {seen} lower MSE than two points on seen fabrics{others} at {time}"
+            return [f"{ours} their time; its paper reports {lower}× at {faster}× on its own scene and GPU."]
+    return []
+
+
+def two_digits(value: float) -> str:
+    """Return ``2.6e-3``."""
+    if missing(value):
+        return NONE
+    mantissa, _, exponent = f"{value:.1e}".partition("e")
+    return f"{mantissa}e{int(exponent)}".replace("-", "−")
+
+
+def two_decimals(value: float) -> str:
+    """Return ``0.01``; what rounds to 0 has no sign."""
+    return fixed_to(round(value, 2) + 0.0, 2).replace("-", "−")
+
+
+def kept_time(printed: str, fresh: float) -> str:
+    """Return a ratio of times with two digits; the one that is printed if the new one is within `TOLERANCE` of it."""
+    try:
+        old = float(printed.removesuffix("×").replace(",", ""))
+    except ValueError:
+        return times(fresh)
+    near = math.isfinite(fresh) and fresh > 0 and old > 0 and 1 / TOLERANCE <= fresh / old <= TOLERANCE
+    return printed if near else times(fresh)
+
+
+def _printed_times(old: str) -> dict[str, str]:
+    """Return the last cell of every row of a table, by the first."""
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in old.splitlines() if line.startswith("|")]
+    return {first: last for first, *_, last in lines}
+
+
+def results_page(records: Sequence[Record], machine: Machine, where: str) -> str:
+    """Return all tables of a page as one Markdown file; arguments as in `readme_block`.
+
+    Raises
+    ------
+    BadInput
+        If no Record names its recipe.
+    """
+    named = [record.provenance for record in records if record.provenance.recipe]
+    if not named:
+        raise BadInput(where, "", "names no recipe", "Records of a whole page are needed")
+    packages = ", ".join(f"{name} {number}" for name, number in machine.packages.items())
+    head = [
+        f"Recipe `{named[0].recipe}`, fingerprint `{named[0].recipe_fingerprint[:16]}`",
+        f"Twillight {version('twillight')}, benchmark version {named[0].version}",
+        f"Machine: {machine.cpu}, {machine.cores} cores, {machine.system}",
+        f"Python {machine.python}, {packages}",
+        f"Measured on {machine.date[:10]}",
+    ]
+    about = (
+        f"Written by `make results RECIPE={named[0].recipe}` from the Records of the page; do not edit. The page "
+        "defines every column and shows the pictures. What was tried and not kept is in [LOG.md](LOG.md)."
+    )
+    parts = [f"# Results of the recipe `{named[0].recipe}`", about, "\n".join(f"- {line}" for line in head)]
+    frames = ranged_frames(page_frames(records))
+    values = facts(records, frames["errors"])
+    sentences = section_sentences(frames)
+    tables = result_tables(records, frames, values)
+    for section, words in WORDS["sections"].items():
+        if section in tables:
+            parts += [f"## {words['title']}", *paragraphs(words.get("intro", []), values)]
+            parts += ["\n".join(f"- {text}" for text in sentences[section])] if sentences.get(section) else []
+            for part in tables[section]:
+                parts += [f"### {part.title}", *part.intro, part.markdown(), *part.note]
+            parts += paragraphs(words.get("note", []), values)
+    return "\n\n".join(parts) + "\n"
+
+
+def markers(name: str) -> tuple[str, str]:
+    """Return the lines before and after a generated block."""
+    return f"<!-- {name}: written by `make readme`, do not edit -->", f"<!-- end of {name} -->"
+
+
+def block(text: str, name: str, where: str) -> str:
+    """Return the generated block of a text, without its markers.
+
+    Raises
+    ------
+    BadInput
+        If the text does not hold both markers, the first one first; `where` names the file.
+    """
+    first, last = markers(name)
+    _, opened, after = text.partition(f"{first}\n")
+    inside, closed, _ = after.partition(f"{last}\n")
+    if not opened or not closed:
+        raise BadInput(where, "", f"has no block {name!r}", f"the lines {first!r} and {last!r} are needed")
+    return inside
+
+
+def with_block(text: str, name: str, content: str, where: str) -> str:
+    """Return a text with another generated block; BadInput as `block`."""
+    old = block(text, name, where)
+    first, last = markers(name)
+    return text.replace(f"{first}\n{old}{last}\n", f"{first}\n{content.rstrip()}\n{last}\n", 1)
