@@ -26,6 +26,7 @@ Format = Literal[
     "grouped",
     "bytes",
     "seconds",
+    "times",
 ]
 """How tables print a value (`reports.tables.number_format.shown`)."""
 

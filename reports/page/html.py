@@ -22,7 +22,7 @@ from reports.page.content import PageInput
 from reports.page.pictures import SHOWN, films, strips
 from reports.record import TRUTH
 from reports.tables.number_format import display, plain
-from reports.tables.page_tables import ranged_frames, result_tables
+from reports.tables.page_tables import ranged_frames, result_tables, truth_facts
 from reports.tables.sentences import facts, headline, lacking, learnt, scene_sentences, section_sentences, trade
 from reports.tables.summary import scene_table
 from reports.tables.table import WORDS, paragraphs
@@ -50,7 +50,7 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         Names of the plots that were drawn.
     """
     per_material = [note.name for note in page.models if note.per_material]
-    values = {**facts(page.records, frames["errors"], per_material), **_options(page)}
+    values = {**facts(page.records, frames["errors"], per_material), **truth_facts(page.records), **_options(page)}
     ranged = ranged_frames(frames)
     tables = result_tables(page.records, ranged, values, per_material)
     lead, figures = trade(ranged["tradeoff"])
@@ -113,6 +113,7 @@ def _options(page: PageInput) -> dict[str, object]:
         "geometric_mean": "the geometric mean of its axes: the truth is sharper, and shows moiré of its own",
     }
     return {
+        "plot": "plot",
         "frames": options.frames,
         "step": view.step,
         "width": scenes.size[0],

@@ -15,7 +15,7 @@ import pandas as pd
 
 from reports.record import Machine, Record
 from reports.tables.number_format import NONE, fixed_to, listed, missing, span, times
-from reports.tables.page_tables import page_frames, ranged_frames, result_tables
+from reports.tables.page_tables import page_frames, ranged_frames, result_tables, truth_facts
 from reports.tables.sentences import BOUNDED, facts, section_sentences
 from reports.tables.summary import (
     BASELINE,
@@ -193,8 +193,8 @@ def results_page(records: Sequence[Record], machine: Machine, where: str) -> str
         "defines every column and shows the pictures. What was tried and not kept is in [LOG.md](LOG.md)."
     )
     parts = [f"# Results of the recipe `{named[0].recipe}`", about, "\n".join(f"- {line}" for line in head)]
-    frames = ranged_frames(page_frames(records))
-    values = facts(records, frames["errors"])
+    whole = page_frames(records)
+    frames, values = ranged_frames(whole), {**facts(records, whole["errors"]), **truth_facts(records)}
     sentences = section_sentences(frames)
     tables = result_tables(records, frames, values)
     for section, words in WORDS["sections"].items():

@@ -140,6 +140,7 @@ FORMATS: Final[dict[Format, Callable[[float], str]]] = {
     "grouped": grouped,
     "bytes": size,
     "seconds": seconds,
+    "times": times,
 }
 
 

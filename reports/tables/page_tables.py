@@ -154,17 +154,13 @@ def result_tables(
 def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
     """Return the tables that have rows; of equal words of neighbours the first intro and the last note stay."""
     full = [part for part in tables if part.rows]
-    pairs = list(zip(full, full[1:], strict=False))
-    intros = [(), *(before.intro for before, _ in pairs)]
-    notes = [*(after.note for _, after in pairs), ()]
-    return [
-        replace(
-            part,
-            intro=tuple(text for text in part.intro if text not in intro),
-            note=tuple(text for text in part.note if text not in note),
-        )
-        for part, intro, note in zip(full, intros, notes, strict=True)
-    ]
+    kept = []
+    for index, part in enumerate(full):
+        before = full[index - 1].intro if index else ()
+        after = full[index + 1].note if index + 1 < len(full) else ()
+        intro = tuple(text for text in part.intro if text not in before)
+        kept.append(replace(part, intro=intro, note=tuple(text for text in part.note if text not in after)))
+    return kept
 
 
 def _by(frame: pd.DataFrame, column: str) -> list[tuple[str, pd.DataFrame]]:
@@ -424,10 +420,9 @@ def truth_tables(records: Sequence[Record], values: _Values) -> dict[str, list[R
     rates = [record for record in records if record.metric == "rate"]
     more = {
         "stability": Column("result", lambda row: row.fault or "ok"),
-        "truth_bias": Column("standard error", lambda row: percent(row.standard_error, 2)),
+        "truth_bias": Column("standard error", lambda row: percent(row.standard_error, 2) + _MARKS[row.result]),
         "truth_effort": of_time,
     }
-    values = {**values, **_counts(records)}
     tables = {"rates": [of_rows("rates", rates, _RATES, values)]}
     for name, kept in _KEPT.items():
         section = "accuracy" if name.startswith("truth_") else name
@@ -436,11 +431,11 @@ def truth_tables(records: Sequence[Record], values: _Values) -> dict[str, list[R
 
 
 def _text_of(name: str) -> Callable[[Any], str]:
-    return lambda row: plain(getattr(row, name))
+    return lambda row: str(getattr(row, name)) if name == "expression" else plain(getattr(row, name))
 
 
-def _counts(records: Sequence[Record]) -> dict[str, object]:
-    """Return values of the words about the truth's accuracy: limits, and how much was measured."""
+def truth_facts(records: Sequence[Record]) -> dict[str, object]:
+    """Return the values of words (`tables.toml`) about the truth: limits, and how much was measured."""
     accuracies, calibrations = (part.RECORDS.from_records(records) for part in (accuracy, calibration))
     values: dict[str, object] = {"exceeded": percent(calibration.EXCEEDED), "limit": percent(bias.LIMIT)}
     values["target"] = percent(effort.RELATIVE_ERROR)
@@ -466,6 +461,8 @@ def measured(
         columns.append(number(field, about.title, FORMATS[about.format], ends))
     return of_rows(name, found, [*columns, *([last] if last else [])], values)
 
+
+_MARKS: Final = {"below": " ✓", "above": " ✗", "open": ""}
 
 _KEPT: Final[Mapping[str, RowRecords[Any]]] = {
     "stability": finding.RECORDS,

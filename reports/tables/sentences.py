@@ -263,6 +263,7 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Sequenc
     unseen = errors[errors["role"] == "unseen"]["fabrics"].max() if len(errors) else 0
     black = errors[of_baseline(errors) & (errors["zero_answers"] > 0)] if len(errors) else errors
     motion = [record.value for record in records if record.metric == "motion"]
+    truth = [record.value for record in records if record.metric == "truth_relative_error"]
     share = waited(records)
     known = {
         "trainings": max(trainings(records).values(), default=0) > 1 and max(trainings(records).values()),
@@ -278,6 +279,7 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Sequenc
         "waited": "" if math.isnan(share) else f"{100 * share:.1f} %",
         "busy": f"{100 * share:.1f} %" if share >= QUIET else "",
         "not_by_eye": "not scored" if "frame_time" in metrics and "fovvideovdp" not in metrics else "",
+        "truth_error": percent(float(np.mean(truth)), 2) if truth else "",
         "motion": shown("motion", float(np.mean(motion))) if motion else "",
     }
     return {name: value for name, value in known.items() if value}

@@ -1,12 +1,12 @@
 import pytest
 
 from reports.page.alt_texts import PLOT_TITLES, alt_texts
-from reports.page.page import page_tables
+from reports.tables.page_tables import page_frames
 
 
 @pytest.fixture(scope="module")
 def texts(made_up):
-    return {name: text.replace("\u00a0", " ") for name, text in alt_texts(page_tables(made_up)).items()}
+    return {name: text.replace("\u00a0", " ") for name, text in alt_texts(page_frames(made_up)).items()}
 
 
 def test_every_plot_has_a_text_of_sentences(texts):
@@ -26,4 +26,4 @@ def test_the_lowest_and_the_highest_are_named(texts):
 
 
 def test_nothing_measured_names_nothing():
-    assert not any("owest" in text or "front" in text for text in alt_texts(page_tables([])).values())
+    assert not any("owest" in text or "front" in text for text in alt_texts(page_frames([])).values())

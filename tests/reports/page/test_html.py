@@ -8,14 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from reports.images.tiles import EXPOSURE, hex_colour
 from reports.options import BenchOptions
 from reports.page.alt_texts import PLOT_TITLES
 from reports.page.colours import DARK, LIGHT
-from reports.page.content import ModelNote, PageInput
-from reports.page.html import SECTIONS, page_html
-from reports.page.page import page_tables
-from reports.page.picture_strips import PictureFile
+from reports.page.content import ModelNote, PageInput, PictureFile
+from reports.page.html import OPEN_ROWS, fabric_card, page_html, prose
 from reports.record import Record, this_machine
+from reports.tables.page_tables import page_frames
+from reports.tables.table import WORDS
 from reports.truth import accuracy, bias, effort, path_traced
 from reports.truth.finding import RECORDS as FINDINGS
 from reports.truth.finding import judge
@@ -95,7 +96,7 @@ def page_of(measured):
     fabrics = [(load_fabric(name), "seen") for name in ("denim", "basket")]
     page = PageInput("tiny", "", "0123", "tiny-0", fabrics, models, BenchOptions(), records, this_machine(1), pictures)
     page = replace(page, live={"denim": Path("denim.html")})
-    return page_html(page, page_tables(records), set(PLOT_TITLES))
+    return page_html(page, page_frames(records), set(PLOT_TITLES))
 
 
 def test_several_trainings_have_a_mean_and_a_range(text, three_trainings):
@@ -104,8 +105,8 @@ def test_several_trainings_have_a_mean_and_a_range(text, three_trainings):
     said = " ".join(re.sub("<[^>]+>", " ", found).split())
     assert "Woven reaches 2.2× lower MSE (1.5× to 4.5× over 3 trainings) than point sampling at 2 points" in said
     assert "NeuMIP reaches 4.5× lower MSE" in said and "(one training)" in said
-    assert "3.33e−4 [1.67 … 5.00]e−4" in said and "2.2× [1.5 … 4.5×]" in said
-    assert "Networks were trained up to 3 times" in said and "Networks show their first training." in said
+    assert "3.33e−4 (3.09 … 3.58)e−4 [1.67 … 5.00]e−4" in said and "2.2× (2 … 2.5×) [1.5 … 4.5×]" in said
+    assert "Networks were trained up to 3 times" in said and "Of 3 trainings, pictures show the first." in said
     assert "Numbers of woven are means over 3 trainings" in said and "One training of NeuMIP" in said
     once = " ".join(re.sub("<[^>]+>", " ", text).split())
     assert "trainings" not in once.partition("Definitions of the columns")[0]
@@ -131,12 +132,12 @@ def page(text):
 def test_nearly_all_sections_are_there(page):
     """Else the tests below look at little."""
     ids = {one.get("id") for one in page.all("section")}
-    assert set(SECTIONS) - ids <= {"equal-time", "energy", "rates", "sampler", "other"}
+    assert set(WORDS["sections"]) - ids <= {"equal-time", "energy", "rates", "sampler", "other"}
 
 
 def test_path_traced_frames_have_a_table(page):
     (table,) = [one for one in page.all("table") if "path-traced" in one["text"]]
-    assert "drapesoft_nodes:242.5e-031.503.2×" in table["text"]
+    assert "drape\nsoft nodes:242.50e−31.50 s3.2×" in table["text"]
 
 
 def test_headings_have_no_gaps(page):
@@ -165,7 +166,7 @@ def test_ids_are_unique_and_links_within_the_page_arrive(page):
     ids = [one["id"] for one in page.elements if "id" in one]
     assert len(set(ids)) == len(ids)
     targets = {one["href"][1:] for one in page.all("a") if one["href"].startswith("#")}
-    assert targets <= set(ids) and set(SECTIONS) & set(ids) <= targets
+    assert targets <= set(ids) and set(WORDS["sections"]) & set(ids) <= targets
 
 
 def test_every_picture_says_in_words_what_is_seen(page):
@@ -231,3 +232,38 @@ def test_words_of_earlier_versions_are_gone(page):
     for word in ("stand in", "stands in", "asked", "errs", "left to quadrature", "not its own", "knob", "leftover"):
         assert not re.search(rf"\b{word}\b", words), word
     assert not [one["text"] for one in page.all("h1", "h2", "h3", "caption") if one["text"].startswith("What")]
+
+
+def test_words_are_escaped_and_code_is_marked():
+    assert prose("a < b in `c`") == "a &lt; b in <code>c</code>"
+
+
+def test_long_tables_open_on_demand(made_up):
+    """A table of more rows than `OPEN_ROWS` is closed, a shorter one is not."""
+    many = [
+        one.model_copy(update={"setting": f"k = {100 + index}"})
+        for one in made_up
+        if (one.method, one.setting) == ("point_sampled", "k = 64")
+        for index in range(OPEN_ROWS)
+    ]
+    page = Reader(page_of([*made_up, *many]))
+    inside = [one["text"].strip() for one in page.all("caption") if "details" in one["within"]]
+    assert any(text.startswith("Errors, seen fabrics") for text in inside)
+    assert not any(text.startswith("Errors at silhouettes") for text in inside)
+
+
+def shown(rgb):
+    return hex_colour([EXPOSURE * value for value in rgb])
+
+
+def test_a_yarn_has_its_diffuse_and_its_specular_colour():
+    denim = load_fabric("denim")
+    warp, weft = fabric_card(denim, "seen")["yarns"]
+    assert warp["colours"] == [("diffuse", shown(denim.warp.diffuse_rgb)), ("specular", shown(denim.warp.specular_rgb))]
+    assert weft["family"] == "weft" and weft["colours"] != warp["colours"]
+
+
+def test_threads_of_several_colours_have_them_all():
+    colours = fabric_card(load_fabric("tartan"), "seen")["yarns"][0]["colours"]
+    assert [kind for kind, _ in colours] == ["diffuse"] * 4 + ["specular"] * 2
+    assert len(set(colours)) == 6

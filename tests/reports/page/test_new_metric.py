@@ -6,8 +6,7 @@ import pytest
 from reports import catalogue
 from reports.catalogue import MetricRow
 from reports.options import BenchOptions
-from reports.page.content import PageInput
-from reports.page.model_note import ModelNote
+from reports.page.content import ModelNote, PageInput
 from reports.page.page import write_page
 from reports.record import Record, read_records, this_machine
 

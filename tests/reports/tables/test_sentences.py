@@ -1,8 +1,29 @@
+"""Sentences of a page: what is the cheapest, the paper's comparison, other work on the machine, facts of the limits."""
+
 import math
+import time
 
 import pandas as pd
+import pytest
 
-from reports.tables.sentences import beaten, cheapest_sentences, least_flicker_sentences, scene_sentences
+from pipeline.models.bounded import Bounded
+from pipeline.models.soft_nodes.model import SoftNodes
+from reports.measure.timing import Contender, time_side_by_side
+from reports.record import Record
+from reports.tables.sentences import (
+    BOUNDED,
+    QUIET,
+    busy,
+    cheapest_sentences,
+    facts,
+    headline,
+    learnt,
+    least_flicker_sentences,
+    scene_sentences,
+    trade,
+    waited,
+)
+from tests.reports.measure.test_timing import many_queries
 
 
 def test_the_cheapest_is_said_of_what_was_measured():
@@ -22,7 +43,6 @@ def test_the_cheapest_is_said_of_what_was_measured():
         "%: soft nodes, k = 4 (1,500 ns); no method reaches 2 % or 1 %."
     )
     assert unseen.endswith("cheapest within 50 %, 10 %, 5 % and 2 %: woven (4,000 ns); no method reaches 1 %.")
-    assert beaten(table) == {"seen": ["woven"], "unseen": []}
     assert cheapest_sentences(table[:0]) == []
 
 
@@ -67,3 +87,164 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
     ]
     assert found["cellar"] == []  # nobody was timed there
     assert scene_sentences(SCENES[:0]) == {}
+
+
+def test_the_trade_names_the_cheapest_methods_and_what_two_points_get():
+    table = pd.DataFrame(
+        {
+            "role": "seen",
+            "method": ["point_sampled", "soft_nodes", "woven"],
+            "setting": ["k = 2", "k = 1", ""],
+            "fabrics": 8,
+            "ns": [500.0, 1000.0, 4000.0],
+            "error": [0.4, 0.045, 0.03],
+        }
+    )
+    lead, figures = trade(table)
+    assert lead.replace("\u00a0", " ") == (
+        "A pixel of two random points has an error of 40 % on the 8 seen fabrics. Cheapest within 10 % and 5 % error "
+        "soft nodes, k = 1 at 2× the time of two points; within 2 % error no method."
+    )
+    assert [figure["value"] for figure in figures] == ["2×", "2×", "–", "40 %"]
+    assert trade(table[1:]) == trade(table[:0]) == ("", [])
+
+
+def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=math.nan, most=math.nan):
+    errors = {"method": "woven", "setting": "", "role": role, "fabrics": fabrics, "ratio": ratio}
+    errors |= {"seeds": seeds, "ratio_least": least, "ratio_most": most}
+    errors |= dict.fromkeys(("ratio_fabrics", "ratio_fabrics_low", "ratio_fabrics_high"), math.nan)
+    timing = {"method": "woven", "setting": "", "time_ratio": time_ratio}
+    return pd.DataFrame([errors]), pd.DataFrame([timing])
+
+
+def test_headline_admits_a_defeat():
+    text = headline("woven", "", *tables(0.5, 1.66), paper=False)
+    assert text == (
+        "Woven reaches 2.0× higher MSE than point sampling at 2 points on the 8 seen fabrics, at 1.7× its time."
+    )
+
+
+def test_one_training_is_called_one():
+    text = headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
+    assert text == (
+        "Woven reaches 9.1× lower MSE than point sampling at 2 points on the 8 seen fabrics, at 0.8× its time "
+        "(one training)."
+    )
+    text = headline("woven", "", *tables(9.13, seeds=1))
+    assert "8 seen fabrics (one training); the paper" in text
+
+
+def test_several_trainings_have_a_range():
+    text = headline("woven", "", *tables(9.13, seeds=3, least=5.7, most=13.21), paper=False)
+    assert "reaches 9.1× lower MSE (5.7× to 13.2× over 3 trainings) than" in text and "one training" not in text
+    worse = headline("woven", "", *tables(0.5, seeds=3, least=0.25, most=0.8), paper=False)
+    assert "2.0× higher MSE (1.2× to 4.0× over 3 trainings)" in worse
+    # All but one are lost in the noise of the truth.
+    assert "trainings" not in headline("woven", "", *tables(0.5, seeds=3))
+
+
+@pytest.mark.parametrize(
+    ("mean", "low", "high", "words"),
+    [
+        (6.2, 3.1, 12.4, "reaches 6.2× lower MSE (5.5× to 7.0× over 3 trainings) than"),
+        (0.5, 0.25, 1.0, "reaches 2.0× higher MSE (0.14× to 0.18× over 3 trainings) than"),
+    ],
+)
+def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low, high, words):
+    errors, timing = tables(100.0, role="unseen", fabrics=9, seeds=3, least=1.0, most=2.0)
+    errors = errors.assign(ratio_fabrics=mean, ratio_fabrics_low=low, ratio_fabrics_high=high)
+    text = headline("woven", "", errors.assign(ratio_fabrics_least=5.5, ratio_fabrics_most=7.0), timing, paper=False)
+    assert words in text
+    ends = "3.1× to 12.4×" if mean > 1 else "1.0× to 4.0×"
+    assert text.endswith(f"on the 9 unseen fabrics (geometric mean, 95 % interval over fabrics {ends}).")
+
+
+def test_headline_says_only_what_was_measured():
+    assert headline("woven", "", *tables(math.nan, 1.0)) == ""
+    assert "its time" not in headline("woven", "", *tables(3.0), paper=False)
+    assert "on one unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
+
+
+def test_learnt_leaves_points_out():
+    errors = pd.DataFrame(
+        {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
+    )
+    assert learnt(errors) == [("woven", "")]
+    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1")]
+
+
+def test_the_headline_names_the_bounded_form_where_it_was_measured():
+    errors = pd.DataFrame(
+        {
+            "method": ["woven", "neumip", "woven", "selvage", "selvage"],
+            "setting": ["", "", "bounded", "", "unbounded"],
+            "role": "seen",
+        }
+    )
+    assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
+    assert Bounded(SoftNodes()).setting == f"k = 2 {BOUNDED}"
+
+
+def spinning(seconds, share):
+    """Return a method that runs for a share of a time and sleeps for the rest, as if others had the processor."""
+
+    def predict(fabric, queries):
+        end = time.thread_time() + seconds * share
+        while time.thread_time() < end:
+            pass
+        time.sleep(seconds * (1.0 - share))
+
+    return predict
+
+
+def test_time_that_a_method_did_not_run_is_waiting():
+    """Asleep for nine tenths: other work can only add to it, and its own running is a tenth at most."""
+    idle, many = time_side_by_side(
+        [
+            Contender(spinning(0.01, 0.1), many_queries(10)),
+            Contender(spinning(0.01, 0.1), many_queries(10), threads=2),
+        ],
+        repeats=5,
+        warm_up=1,
+    )
+    assert 0.85 < idle.waited < 1.0
+    assert math.isnan(many.waited)
+
+
+def of(*shares):
+    return [Record(method=f"m{k}").of("waited", share, 20) for k, share in enumerate(shares)]
+
+
+def test_the_median_over_methods_is_said():
+    assert waited(of(0.0, 0.25, 0.9)) == 0.25
+    none = pd.DataFrame()
+    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= facts(of(0.0, 0.25, 0.9), none).items()
+    quiet = facts(of(0.001), none)
+    assert quiet["waited"] == "0.1 %" and "busy" not in quiet
+    assert facts([], none) == {} and math.isnan(waited([]))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "words"), [(0.0, 0.0, ""), (0.0, 0.3, "B waited 30 %"), (0.4, 0.3, "A waited 40 %")]
+)
+def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
+    sentences = busy(of(a), of(b))
+    assert len(sentences) == bool(words)
+    assert all(words in sentence for sentence in sentences)
+    assert busy(of(QUIET), []) and busy([], []) == []
+
+
+def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
+    errors = pd.DataFrame({"method": ["woven", "selvage", "soft_nodes"], "setting": "", "zero_answers": 0.0})
+    errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
+    values = facts([], errors.assign(seeds=[1, 3, 0]))
+    assert (values["once"], values["several"], values["training_counts"]) == ("woven", "selvage", "3")
+    assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
+    values = facts([], errors.assign(seeds=0, fabrics=1, setting=BOUNDED))
+    assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values
+
+
+def test_a_measure_that_was_not_installed_is_known_where_scenes_were_measured():
+    frame = Record(method="woven", scene="attic", metric="frame_time", value=20.0)
+    assert "not_by_eye" in facts([frame], pd.DataFrame())
+    assert "not_by_eye" not in facts([frame, frame.of("fovvideovdp", 9.0, 4)], pd.DataFrame())

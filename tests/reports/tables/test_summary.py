@@ -1,20 +1,29 @@
+"""Frames of a benchmark: means over fabrics and trainings, means over unseen fabrics, the front of two costs."""
+
 import math
 
+import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from reports.record import Provenance, Record
-from reports.tables.method_rows import over_fabrics_rows, timing_columns, timing_rows
 from reports.tables.summary import (
     aliasing_table,
+    columns_over_fabrics,
     energy_table,
     error_table,
     fabric_ranges,
     fabric_table,
+    front,
+    over_fabrics,
     picture_table,
     rows,
     spectra,
     summary_table,
     timing_table,
+    unranged,
 )
 
 
@@ -67,10 +76,6 @@ def test_unseen_fabrics_have_geometric_means():
     assert woven.colour_rrmse_fabrics == pytest.approx(1.6**0.25)
     assert woven.ratio_fabrics_low < 2.5 and woven.ratio_fabrics_high > 10.0
     assert summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
-    groups = over_fabrics_rows(table)
-    assert [group["method"] for group in groups] == ["woven", "point_sampled"]
-    assert groups[0]["rows"][0]["cells"][0]["text"] == "5×"
-    assert groups[1]["rows"][0]["cells"][0] == "1"
 
 
 def test_errors_are_means_over_fabrics():
@@ -143,11 +148,6 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
     (found,) = rows(table)
     assert (found.threads, found.median_ns, found.most_threads, found.most_threads_ns) == (1, 400, 4, 120)
     assert found.most_threads_frame_ms == pytest.approx(0.3 * found.frame_ms)
-    (group,) = timing_rows(table)
-    shown = dict(zip(timing_columns(table), group["rows"][0]["cells"], strict=True))
-    assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
-    assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
-    assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
 
 
 def test_spectra_are_averaged():
@@ -240,3 +240,104 @@ def test_one_training_changes_no_number_of_the_tables():
     before = error_table(RECORDS)
     assert table.drop(columns="seeds").equals(before.drop(columns="seeds"))
     assert row(table, method="woven", role="seen").seeds == 1
+
+
+def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
+    once = seeded(RECORDS, "woven", (3,), (1.0,))
+    assert unranged(error_table(once)) == {("unseen", "woven", "")}
+    assert math.isnan(summary_table(once).loc[("woven", ""), "× lower, unseen"])
+    assert (
+        unranged(error_table(RECORDS)) == unranged(error_table(seeded(RECORDS, "woven", (4, 5), (1.0, 2.0)))) == set()
+    )
+
+
+def test_interval_of_three_fabrics():
+    """Logarithms -1, 0 and 1: s = 1, and t_{.975, 2} = 4.302653 (tables of Student's distribution)."""
+    found = over_fabrics([math.exp(-1), 1.0, math.e])
+    reach = 4.302653 / math.sqrt(3)
+    assert found.mean == pytest.approx(1.0)
+    assert (found.low, found.high) == pytest.approx((math.exp(-reach), math.exp(reach)), rel=1e-6)
+
+
+def test_alike_fabrics_leave_no_doubt():
+    assert over_fabrics([0.25] * 4) == pytest.approx((0.25, 0.25, 0.25))
+
+
+@pytest.mark.parametrize("values", [[], [0.1, 0.0], [0.1, -0.2], [0.1, math.nan], [0.1, math.inf]])
+def test_errors_lost_in_the_noise_have_no_mean(values):
+    assert all(math.isnan(number) for number in over_fabrics(values))
+
+
+def test_a_single_fabric_has_no_interval():
+    mean, low, high = over_fabrics([0.3])
+    assert mean == pytest.approx(0.3) and math.isnan(low) and math.isnan(high)
+
+
+def test_intervals_hold_the_true_mean_in_95_of_100_draws():
+    """4000 draws of 9 fabrics: a share of .95 has a standard error of .0034; four of them are allowed."""
+    draws = np.random.default_rng(0).lognormal(-3.0, 0.8, (4000, 9))
+    held = [low <= math.exp(-3.0) <= high for _, low, high in map(over_fabrics, draws)]
+    assert abs(np.mean(held) - 0.95) < 0.014
+
+
+def test_ratios_are_those_of_the_same_fabric():
+    """The baseline errs 100 and 1; the method a thousandth and a tenth of it: geometric mean 100."""
+    base = pd.DataFrame({"fabric": ["b", "a"], "mse": [100.0, 1.0]})
+    errors = pd.DataFrame(
+        {"fabric": ["a", "b"], "mse": [0.1, 0.1], "colour_rrmse": [0.04, 0.01], "rrmse_specular_warp": [0.3, math.nan]}
+    )
+    found = columns_over_fabrics(errors, base)
+    assert found["ratio_fabrics"] == pytest.approx(100.0)
+    assert found["ratio_fabrics_low"] < 10.0 and found["ratio_fabrics_high"] > 1000.0
+    assert found["colour_rrmse_fabrics"] == pytest.approx(0.02)
+    # On fabric b the component is nowhere seen, another one was not measured.
+    assert found["rrmse_specular_warp_fabrics"] == pytest.approx(0.3)
+    assert math.isnan(found["rrmse_specular_warp_fabrics_low"]) and math.isnan(found["rrmse_diffuse_warp_fabrics"])
+
+
+def test_without_the_baseline_there_is_no_ratio_over_fabrics():
+    errors = pd.DataFrame({"fabric": ["a", "b"], "mse": [0.1, 0.1]})
+    found = columns_over_fabrics(errors, errors.iloc[:0])
+    assert math.isnan(found["ratio_fabrics"]) and found["mse_fabrics"] == pytest.approx(0.1)
+
+
+# Few values, so that ties are frequent; and some that were not measured.
+NUMBERS = st.sampled_from([0.0, 1.0, 2.0, 3.0, 5.0, 8.0]) | st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf])
+POINTS = st.lists(st.tuples(NUMBERS, NUMBERS), max_size=30)
+
+
+def measured(point):
+    return math.isfinite(point[0]) and math.isfinite(point[1])
+
+
+def beats(one, other):
+    return measured(one) and one[0] <= other[0] and one[1] <= other[1] and one != other
+
+
+@given(POINTS)
+def test_nothing_beats_the_front_and_something_beats_all_others(points):
+    for point, on in zip(points, front(points), strict=True):
+        if measured(point):
+            assert on == (not any(beats(other, point) for other in points))
+        else:
+            assert not on
+
+
+@given(POINTS, st.randoms(use_true_random=False))
+def test_the_order_of_the_points_does_not_matter(points, random):
+    order = list(range(len(points)))
+    random.shuffle(order)
+    on = front(points)
+    assert front([points[index] for index in order]) == [on[index] for index in order]
+
+
+@given(POINTS)
+def test_every_measured_point_has_one_of_the_front_that_is_as_good(points):
+    best = [point for point, on in zip(points, front(points), strict=True) if on]
+    for point in filter(measured, points):
+        assert any(one[0] <= point[0] and one[1] <= point[1] for one in best)
+
+
+def test_ties():
+    assert front([(1, 2), (1, 2), (1, 3), (2, 2), (2, 1)]) == [True, True, False, False, True]
+    assert front([]) == []

@@ -1,9 +1,16 @@
+"""Pictures of a page: their order, and strips of frames."""
+
+import io
 from pathlib import Path
 
+import matplotlib.image
+import numpy as np
 import pandas as pd
 import pytest
 
-from reports.page.picture_strips import MOST_FILMS, PictureFile, films, strips
+from reports.images import tiles
+from reports.page.content import PictureFile
+from reports.page.pictures import GAP, MOST_FILMS, SHOWN, Crop, films, filmstrip, liveliest, strips
 
 
 def file(method, setting="", scene="attic", fabric=""):
@@ -67,3 +74,29 @@ def test_strips_are_in_order_and_say_their_errors():
 )
 def test_stems_hold_no_spaces(picture, stem):
     assert picture.stem == stem
+
+
+def test_every_row_shows_its_frames_and_a_slice_over_time():
+    frames = np.linspace(0.0, 0.6, 8 * 12 * 20 * 3).reshape(8, 12, 20, 3)
+    picture = matplotlib.image.imread(io.BytesIO(filmstrip({"truth": frames, "points": frames[::-1]})), format="png")
+    shown = np.rint(255 * picture).astype(int)[:: tiles.SCALE, :: tiles.SCALE]
+    assert shown.shape == (2 * 12 + GAP, (SHOWN + 1) * 20 + (SHOWN + 2) * GAP, 4)
+    codes = tiles.encoded(tiles.EXPOSURE * frames)
+    for row, order in enumerate((range(SHOWN), range(7, 7 - SHOWN, -1))):
+        line = shown[row * (12 + GAP) :][:12]
+        for place, frame in enumerate(order):
+            assert (line[:, place * (20 + GAP) :][:, :20, :3] == codes[frame]).all()
+        assert (line[:, -20:, :3] == codes[list(order)][np.arange(12) // 2, 6]).all()
+    assert (shown[12 : 12 + GAP, :, 3] == 0).all()
+
+
+def test_the_liveliest_crop_holds_what_moves():
+    """Films stand still but for one patch: the crop contains it, whichever film it is in; small films are whole."""
+    still = np.zeros((3, 64, 120, 3))
+    moving = still.copy()
+    moving[1, 40:52, 70:90] = 0.5
+    crop = liveliest({"truth": still, "points": moving}, (16, 32))
+    assert crop.height == 16 and crop.width == 32
+    assert crop.top <= 40 and crop.top + 16 >= 52 and crop.left <= 70 and crop.left + 32 >= 90
+    assert liveliest({"truth": still}, (16, 32)) == Crop(0, 0, 16, 32)
+    assert liveliest({"truth": moving}, (100, 200)) == Crop(0, 0, 64, 120)

@@ -1,0 +1,201 @@
+"""Tables of a page: cells with intervals and ranges, words, what is marked and what is left out."""
+
+import math
+
+import pytest
+
+from reports.measure.latents import SHARES
+from reports.record import Provenance, Record
+from reports.tables.page_tables import page_frames, ranged_frames, result_tables
+from reports.tables.sentences import facts
+from reports.tables.summary import scene_table
+from reports.tables.table import WORDS, ResultTable, TableCell, TableRow, markdown_table, paragraphs
+from reports.truth.calibration import RECORDS as CALIBRATIONS
+from reports.truth.calibration import Calibration
+
+
+def tables_of(records, section):
+    """Return the tables of a section, from Records."""
+    frames = ranged_frames(page_frames(records))
+    return result_tables(records, frames, facts(records, frames["errors"])).get(section, [])
+
+
+def cells_of(table, label):
+    """Return the cells of a row by the titles of their columns."""
+    (row,) = [row for row in table.rows if row.label.replace("\u00a0", " ") == label]
+    titles = [title.replace("\u00a0", " ") for title in table.columns[1:]]
+    return dict(zip(titles, row.cells, strict=True))
+
+
+def test_a_table_has_numbers_on_the_right():
+    table = markdown_table(("method", "ns"), [("points", "12"), ("woven", "3")])
+    assert table.splitlines() == ["| method | ns |", "| :-- | --: |", "| points | 12 |", "| woven | 3 |"]
+
+
+def test_settings_of_a_method_are_a_group():
+    rows = [
+        TableRow(f"{name}", (TableCell("1"),), name, setting) for name, setting in (("a", "1"), ("a", "2"), ("b", ""))
+    ]
+    groups = ResultTable("t", ("method", "x"), tuple(rows)).groups
+    assert [(head, len(part)) for head, part in groups] == [("a", 2), ("", 1)]
+
+
+def test_a_paragraph_without_its_value_is_left_out():
+    assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"]
+    assert paragraphs(["a {b}", "c"], {}) == ["c"]
+
+
+def test_every_table_has_words_and_every_word_a_table():
+    """Titles are made of values that the tables give; a table without words raises KeyError where it is made."""
+    assert all(words["title"] for words in WORDS["tables"].values())
+    assert {"in the noise", "noise of the truth", "front", "× lower"} <= set(WORDS["definitions"])
+
+
+def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
+    """Neumip was trained once: its errors on the unseen fabric have no range; woven's have."""
+    assert [table.title.partition(",")[0] for table in tables_of(made_up, "aliasing")]
+    labels = {table.key: [row.label for row in table.rows] for table in tables_of(three_trainings, "aliasing")}
+    assert "NeuMIP" in labels["seen"] and "NeuMIP" not in labels["unseen"] and "woven" in labels["unseen"]
+    for section in ("trade", "error"):
+        unseen = [table for table in tables_of(three_trainings, section) if table.key == "unseen"]
+        assert unseen and not any(row.label.startswith("NeuMIP") for table in unseen for row in table.rows)
+    errors = page_frames(three_trainings)["errors"]
+    assert len(errors[(errors["method"] == "neumip") & (errors["role"] == "unseen")]) == 1
+
+
+def test_several_unseen_fabrics_have_geometric_means(two_unseen):
+    (over,) = [table for table in tables_of(two_unseen, "error") if table.title.startswith("Means over unseen")]
+    assert [row.label for row in over.rows][:1] == ["woven"] and "NeuMIP" not in [row.label for row in over.rows]
+    ratio = cells_of(over, "woven")["× lower"]
+    assert ratio.text == "2.2×" and ratio.interval.startswith("(")
+    assert cells_of(over, "points, k = 2")["× lower"].text == "1"
+
+
+def test_times_on_one_thread_and_on_most_stand_in_one_row():
+    subject = Record(method="woven")
+    records = [
+        subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
+        for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
+    ]
+    records += [subject.of("prepare_time", 12.5, 9), subject.of("peak_memory", 3e7, 3)]
+    (timing,) = tables_of(records, "time")
+    shown = {title: cell.text for title, cell in cells_of(timing, "woven").items()}
+    assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
+    assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
+    assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
+
+
+def test_a_path_has_a_row_for_each_way_to_encode_and_edits_have_a_row_each():
+    subject = Record(method="woven", fabric="denim", note="yarns of satin_8")
+    curves = [tuple((share, factor * (0.1 + share)) for share in SHARES) for factor in (2.0, 1.0)]
+    names = ("path_error", "reencode_error")
+    records = [subject.of(name, curve[1][1], 64, curve=curve) for name, curve in zip(names, curves, strict=True)]
+    records += [
+        subject.of("encode_time", ms, 3, low=ms, high=ms).model_copy(update={"note": note})
+        for note, ms in (("a yarn", 3.0), ("a colour", 0.1))
+    ]
+    paths, edits = tables_of(records, "latents")
+    assert [[cell.text for cell in row.cells[:2]] for row in paths.rows] == [
+        ["denim → yarns of satin 8", "latents blended"],
+        ["denim → yarns of satin 8", "encoded anew"],
+    ]
+    assert [cell.text for cell in paths.rows[1].cells[2:]] == [f"{100 * error:.1f} %" for _, error in curves[1]]
+    assert [row.cells[0].text for row in edits.rows] == ["a yarn", "a colour"]
+
+
+def test_answers_that_are_not_finite_are_counted():
+    subject = Record(method="m", setting="s", fabric="a")
+    records = [subject.of("extreme_error", 0.5, 9, curve=((1.0, 0.1),))]
+    records += [subject.of("extreme_not_finite", value, 90) for value in (3.0, 1.0)]
+    (extremes,) = tables_of(records, "stability")
+    assert cells_of(extremes, "m, s")["NaN, ∞"].text == "4 of 180 ✗"
+
+
+def test_records_of_before_intervals_are_shown_without_one():
+    records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
+    old = [record.model_copy(update={"low": None, "high": None}) for record in records]
+    shown = [str(tables_of(found, "accuracy")[0].rows[0].cells[1]) for found in (old, records)]
+    assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
+
+
+def test_nothing_measured_gives_no_tables():
+    frames = ranged_frames(page_frames([]))
+    assert result_tables([], frames, {}) == {}
+
+
+def measured(method, setting="", **numbers):
+    """Records of a method in the attic: numbers, or (number, low, high)."""
+    subject = Record(method=method, setting=setting, scene="attic")
+    found = []
+    for metric, value in numbers.items():
+        value, low, high = value if isinstance(value, tuple) else (value, None, None)
+        found.append(subject.of(metric, value, 100, low=low, high=high))
+    return found
+
+
+RECORDS = [
+    *measured("woven", mse=(2e-3, 1.8e-3, 2.3e-3), psnr=(31.25, 30.1, 32.9), colour_rrmse=(0.0, 0.0, 0.031)),
+    *measured("woven", flicker=(-0.002, -0.0021, 0.00035), frame_time=12.5, truth_noise=1e-5, psnr_floor=40.0),
+    *measured("point_sampled", "k = 2", mse=(8e-3, 7e-3, 1.2e-2), frame_time=5.0, truth_noise=1e-5, psnr_floor=40.0),
+]
+
+
+def attic(records):
+    """Return the table of the attic."""
+    (table,) = tables_of(records, "scenes")
+    return table
+
+
+def test_a_scene_has_the_range_over_trainings_beside_its_interval():
+    several = [
+        one.model_copy(update={"value": factor * one.value, "provenance": Provenance(model="net", seed=factor)})
+        for one in RECORDS[:4]
+        for factor in (1, 2, 3)
+        if one.metric in ("mse", "psnr", "colour_rrmse", "flicker")
+    ]
+    records = [*several, *RECORDS[4:]]
+    woven, _ = scene_table(records).to_dict("records")
+    assert (woven["seeds"], woven["mse"], woven["ratio"], woven["frame_time"]) == pytest.approx((3, 4e-3, 2.0, 12.5))
+    ranges = {title: cell.range for title, cell in cells_of(attic(records), "woven").items()}
+    assert ranges["MSE"] == "[2.00 … 6.00]e−3" and ranges["PSNR, dB"] == "[31.2 … 93.8]"
+    assert ranges["colour"] == "[0 … 0]" and ranges["ms a frame"] == "" and ranges["flicker"] == "[−6.00 … −2.00]e−3"
+    assert not any(cell.range for cell in cells_of(attic(records), "points, k = 2").values())
+
+
+def test_the_table_keeps_intervals_and_floors():
+    table = scene_table(RECORDS)
+    woven, points = table.to_dict("records")
+    assert (woven["mse_low"], woven["mse"], woven["mse_high"]) == (1.8e-3, 2e-3, 2.3e-3)
+    assert (woven["psnr_floor"], woven["truth_noise"], woven["ratio"]) == pytest.approx((40.0, 1e-5, 4.0))
+    assert math.isnan(points["psnr_low"]) and math.isnan(points["fovvideovdp"])
+    assert scene_table([]).columns.tolist() == table.columns.tolist()
+
+
+def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():
+    table = attic(RECORDS)
+    shown = {title: (cell.text, cell.interval) for title, cell in cells_of(table, "woven").items()}
+    assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3")
+    assert shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
+    assert shown["colour"] == ("in the noise", "(0 … 3.1 %)")
+    assert shown["flicker"] == ("−2.00e−3", "(−2.10 … 0.35)e−3")
+    assert shown["ms a frame"] == ("12.5", "") and shown["SSIM"] == ("–", "")
+    # Both are on the front: points cost less and err more.
+    assert [cells_of(table, name)["ms a frame"].strong for name in ("woven", "points, k = 2")] == [True, True]
+    noise = {title: cell.text for title, cell in cells_of(table, "noise of the truth").items()}
+    assert noise["MSE"] == "1.00e−5" and noise["PSNR, dB"] == "40.0" and table.rows[-1].kind == "noise"
+    assert noise["flicker"] == noise["ms a frame"] == noise["SSIM"] == "–"
+
+
+def test_what_an_eye_sees_of_the_frames_has_a_column_where_it_was_measured():
+    assert "FovVideoVDP, JOD" not in cells_of(attic(RECORDS), "woven")
+    more = attic([*RECORDS, *measured("woven", fovvideovdp=9.12)])
+    assert [cells_of(more, name)["FovVideoVDP, JOD"].text for name in ("woven", "points, k = 2")] == ["9.12", "–"]
+
+
+def test_an_error_in_the_noise_has_no_ratio_and_is_on_no_front():
+    records = [*RECORDS, *measured("sums", mse=(-3e-6, -7e-6, 1e-6), frame_time=1.0)]
+    frame = scene_table(records)
+    assert math.isnan(frame["ratio"].iloc[-1]) and frame["front"].tolist() == [True, True, False]
+    sums = cells_of(attic(records), "sums")
+    assert (sums["MSE"].text, sums["× lower"].text) == ("in the noise", "–")
+    assert sums["MSE"].interval == "(−7.00 … 1.00)e−6"
