@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rich.table import Table
 
 from jobs.terminal import Terminal
+
+if TYPE_CHECKING:
+    from reports.tables.table import ResultTable
 
 MOST_SENTENCES: Final = 20
 """Most sentences of one kind that a verb prints; it counts the others."""
@@ -19,6 +22,16 @@ def table_of(*columns: str, right: Sequence[str] = ()) -> Table:
     for column in columns:
         table.add_column(column, justify="right" if column in right else "left")
     return table
+
+
+def print_result(result: ResultTable) -> None:
+    """Print a table of results after an empty line; rows of what failed are bold."""
+    columns = enumerate(result.columns)
+    table = table_of(*result.columns, right=[name for index, name in columns if result.numeric(index)])
+    table.title, table.title_justify = result.title, "left"
+    for row in result.rows:
+        table.add_row(row.label, *map(str, row.cells), style="bold" if row.kind == "failed" else "")
+    Terminal().print("", table)
 
 
 def print_line(sentence: str) -> None:

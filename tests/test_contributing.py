@@ -62,6 +62,7 @@ from pipeline.truth.query import Answers, Queries
 from reports.measure import held_out
 from reports.options import BenchOptions
 from reports.record import to_table
+from reports.tables.page_tables import page_frames, result_tables
 from weaves.fabric import load_fabric
 u = np.zeros(3, np.float32)
 up = np.tile(np.float32([0, 0, 1]), (3, 1))
@@ -78,6 +79,11 @@ records = held_out.measure_errors(Method(), manifest, Path(), "denim", "seen", B
 (found,) = [record for record in records if record.metric == "largest_error"]
 assert abs(found.value - 0.25) < 1e-6 and found.unit == "1/sr"
 assert "largest_error" in set(to_table(records)["metric"])
+frames = page_frames(records)
+assert abs(frames["errors"]["largest_error"][0] - 0.25) < 1e-6
+table = result_tables(records, frames, {})["error"][0]
+titles = [title.replace("\\xa0", " ") for title in table.columns[1:]]
+assert table.rows[0].cells[titles.index("largest error")].text == "25.0 %"
 """,
     "A scene": """
 from pipeline.scenes.catalogue import load_scene

@@ -1,6 +1,6 @@
-"""Records condensed into tables and sentences.
+"""Records condensed to frames, tables and sentences.
 
-summary (a row a method), tradeoff and pareto_front, equal_time, compare, method_choice; rows of the page's tables
-(method_rows, scene_rows, truth_rows, number_format); its sentences (headline, sentences, caveats, machine_load).
-As Markdown: readme (the table of README.md) and results (reports/RESULTS.md), with markdown for tables and blocks.
+Frames: summary (a row a method), tradeoff, equal_time, method_choice, compare. table: a table as one object;
+page_tables specifies all of them, with words from tables.toml and numbers by number_format. sentences: what sums them
+up. documents: README.md's table and reports/RESULTS.md.
 """

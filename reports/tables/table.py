@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
@@ -20,9 +20,6 @@ from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.number_format import FORMATS, NO_BREAK, display, span
 from reports.tables.summary import BASELINE, rows
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 WORDS: Final = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
 """Words of sections and tables, and definitions of what is no metric."""
@@ -73,7 +70,7 @@ class ResultTable:
     intro: tuple[str, ...] = ()
     note: tuple[str, ...] = ()
     key: str = ""
-    """What it is of, where there are several of a kind: a role, a scene, a fabric."""
+    """Role, scene or fabric that it is of, where there are several of a kind."""
 
     @property
     def groups(self) -> list[tuple[str, list[TableRow]]]:
@@ -85,19 +82,10 @@ class ResultTable:
         """Return the table in Markdown, without words."""
         return markdown_table(self.columns, [(row.label, *map(str, row.cells)) for row in self.rows])
 
-    def terminal(self) -> Table:
-        """Return the table for a terminal."""
-        from rich.table import Table
-
-        shown = Table(title=self.title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
-        for index, name in enumerate(self.columns):
-            shown.add_column(name, justify="right" if index and self._numbers(index - 1) else "left")
-        for row in self.rows:
-            shown.add_row(row.label, *map(str, row.cells), style="bold" if row.kind == "failed" else "")
-        return shown
-
-    def _numbers(self, index: int) -> bool:
-        return any(row.cells[index].text[:1] in "+−-.0123456789" for row in self.rows if row.cells[index].text)
+    def numeric(self, index: int) -> bool:
+        """Return whether a column holds numbers; the first, 0, does not."""
+        texts = [row.cells[index - 1].text for row in self.rows] if index else []
+        return any(text[:1] in "+−-.0123456789" for text in texts if text)
 
 
 def number(
