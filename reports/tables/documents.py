@@ -100,7 +100,7 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             "squared mean, on all fabrics. × time: of one query on one thread, over that of two points; times within "
             "a quarter, because no two runs take equally long. \\* Trained on each fabric that it is measured on. "
             + "On several unseen fabrics: geometric mean, in parentheses its 95 % interval over fabrics. " * several
-            + "–: one training and one unseen fabric give no range. " * bool(left_out)
+            + "–: one training, one fabric: no range. " * bool(left_out)
             + _trainings(errors),
         ]
     )

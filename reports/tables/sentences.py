@@ -304,8 +304,8 @@ def waited(records: Iterable[Record]) -> float:
     """Return the share of the time that methods on one thread waited, the median over methods; NaN if unknown.
 
     A method on one thread that has nothing to wait for runs all the time it takes. What it does not run
-    (`reports.measure.timing.Timing.waited`), other work had the processor. Work on other cores that slows memory or the
-    clock is not seen by this.
+    (`reports.measure.timing.CallTiming.waited`), other work had the processor. Work on other cores that slows memory or
+    the clock is not seen by this.
     """
     shares = [record.value for record in records if record.metric == "waited"]
     return float(np.median(shares)) if shares else math.nan

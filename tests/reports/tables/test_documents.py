@@ -79,7 +79,7 @@ def test_several_trainings_have_their_mean_and_range(three_trainings):
     assert f"| {README_METHODS['woven', '']} | 3.3e−4 | 2.2× [1.5 … 4.5×] | 2.2× [1.5 … 4.5×] | 0.00 | 4.3× |" in block
     # Trained once, on a single unseen fabric: no range, so no number.
     assert f"| {README_METHODS['neumip', '']} | 1.7e−4 | 4.5× | – | 0.03 |" in block
-    assert "–: one training and one unseen fabric give no range." in block
+    assert "–: one training, one fabric: no range." in block
     assert "Networks: means over 1 and 3 trainings, in brackets the least and the most of them." in block
 
 
