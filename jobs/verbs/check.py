@@ -132,7 +132,7 @@ def check_fabric(fabric: Fabric) -> None:
 
 
 def invariants_table(name: str, found: Sequence[Any]) -> Table:
-    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.check_result.CheckResult`)."""
+    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.invariants.CheckResult`)."""
     table = table_of("invariant", "value", "should be", "holds", "", right=("value",))
     for item in found:
         style = "bold red" if item.status == "broken" else ""

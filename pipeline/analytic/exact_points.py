@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel
-from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, independent_pair, r2_pair
 from pipeline.truth.monte_carlo import add_point, place_point, query_directions
 from pipeline.truth.options import TruthOptions
@@ -48,12 +48,12 @@ class PointSampler:
 
 @allocating_kernel
 def _sample(
-    model: ClothSide, columns: Columns, count: int, seed: np.uint64, r2: bool, first_sum: int, end: int
+    model: ClothSide, columns: WideQueries, count: int, seed: np.uint64, r2: bool, first_sum: int, end: int
 ) -> Float32:
     """Return the ratios of the sums from `first_sum` to `end` of N queries."""
     rows = len(columns.u)
     mean = np.zeros((rows, end - first_sum), np.float32)
-    sums = np.zeros((1, SUMS))
+    sums = np.zeros((1, POINT_SUMS))
     for row in range(rows):
         key = derive(seed, row)
         query = query_directions(columns, row)
@@ -62,7 +62,7 @@ def _sample(
             first, second = r2_pair(key, k) if r2 else independent_pair(key, k)
             x, y, weight = place_point(columns, row, model, first, second)
             add_point(model, x, y, weight, query, sums, 0)
-        if sums[0, AREA] > 0.0:
+        if sums[0, AREA_SUM] > 0.0:
             for c in range(first_sum, end):
-                mean[row, c - first_sum] = sums[0, c] / sums[0, AREA]
+                mean[row, c - first_sum] = sums[0, c] / sums[0, AREA_SUM]
     return mean

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.soft_nodes.answer import SMALLEST, query_sums
-from pipeline.analytic.soft_nodes.nodes import Table, tabulate
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
 from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
@@ -103,7 +103,7 @@ def _from_above(fabric: Fabric, queries: Queries) -> Float64:
 
 
 @lru_cache(maxsize=16)
-def _table(fabric: Fabric) -> Table:
+def _table(fabric: Fabric) -> SoftNodeTable:
     return tabulate(fabric, by_thread=True)
 
 

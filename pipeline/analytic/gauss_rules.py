@@ -1,4 +1,4 @@
-"""Gauss rules of a piece along one axis, the boxes of their nodes, and the grids of horizons."""
+"""Rules of a piece along one axis: Gauss's with the boxes of its nodes, grids of horizons, quantiles of a Gaussian."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
 from pipeline.compiled.arrays import Float64
 
@@ -62,3 +63,15 @@ def overlap(borders: Float64, edges: Float64) -> Float64:
     share = np.minimum(borders[1:, None], edges[None, 1:]) - np.maximum(borders[:-1, None], edges[None, :-1])
     share = np.maximum(share, 0.0)
     return np.asarray(share / np.maximum(share.sum(axis=1, keepdims=True), 1e-300))
+
+
+def taps(most: int) -> Float64:
+    """Return in row n, up to `most`, the places of n readings of one weight: of mean 0 and variance 1.
+
+    They are quantiles of the normal distribution, scaled; one reading is in the middle.
+    """
+    table = np.zeros((most + 1, most))
+    for count in range(2, most + 1):
+        places = ndtri((np.arange(count) + 0.5) / count)
+        table[count, :count] = places / np.sqrt((places**2).mean())
+    return table

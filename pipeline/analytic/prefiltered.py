@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.flakes_float32 import sigma, spread
+from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.query import Queries

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.taps import taps
+from pipeline.analytic.gauss_rules import taps
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, even_sky

@@ -28,7 +28,7 @@ from pipeline.scenes.shade import colours_of
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import COARSE_LINE
-from pipeline.truth.node_table.tables import UNBOUNDED, NodeTable
+from pipeline.truth.node_table.tables import NOT_REFINED, NodeTable
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -68,7 +68,7 @@ def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
         known = TABLE.knows(cloth, columns)
         if known.any():
             rows = rows[known]
-            answers = TABLE.answer(cloth, columns.take(known), rows, *UNBOUNDED, seed)
+            answers = TABLE.answer(cloth, columns.take(known), rows, *NOT_REFINED, seed)
             result[rows], left[rows] = np.maximum(answers.mean, 0.0), False
     if left.any():
         estimated = estimate(fabric, flat.take(left), QUADRATURE, seed)

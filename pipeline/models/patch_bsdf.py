@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.importance.lobes import POINT_ROWS, ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
+from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
 from pipeline.analytic.importance.mixture import density_rows, draw_rows
-from pipeline.analytic.importance.surface import Surface, tabulate_surface
+from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
@@ -110,13 +110,14 @@ class PatchBSDF:
         self._widening = np.float32(widening)
         self._places = point_places(points)
         self._front = tabulate_surface(fabric)
-        self._back: Surface | None = None
+        self._back: LobeSurface | None = None
 
     def lobes(self, looks: Queries) -> Lobes:
         """Return the mixtures of N looks, whose wi does not matter, for several calls about them."""
         count = len(looks.u)
         result = Lobes(
-            np.empty((count, ROWS, len(self._places) + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32)
+            np.empty((count, FLAKE_ROWS, len(self._places) + 2), np.float32),
+            np.empty((count, STRAIGHT + 1), np.float32),
         )
         behind = looks.wo[:, 2] < 0.0
         if not behind.any():
@@ -203,7 +204,7 @@ class PatchBSDF:
             )
         return lobes
 
-    def _find(self, cloth: Surface, looks: Queries, result: Lobes) -> None:
+    def _find(self, cloth: LobeSurface, looks: Queries, result: Lobes) -> None:
         """Write the mixtures of looks from one side."""
         columns = (looks.u, looks.v, *deviations(looks, _LEAST_DEVIATION))
         footprints = tuple(np.ascontiguousarray(column, np.float32) for column in columns)

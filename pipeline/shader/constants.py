@@ -9,12 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic import axis_densities, curved_horizons, soft_horizons
+from pipeline.analytic import soft_horizons
 from pipeline.analytic.importance import lobes
 from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
     answer,
-    diamond,
     ellipse_nodes,
     footprint_nodes,
     groups,
@@ -22,7 +21,6 @@ from pipeline.analytic.soft_nodes import (
     nodes,
     shade,
     waves,
-    weights,
     wide,
 )
 from pipeline.compiled import float32
@@ -39,7 +37,7 @@ ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "PIECE": (nodes, ("FAMILY", "BLOCK")),
     "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
 }
-"""Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.Table`, by the name of the array."""
+"""Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
 
 CELLS_OF_GROUP: Final = ("FIRST_CELL", "CELLS")
 """Two more columns of a group: the shader sums over the cells of a node, so that they are listed by group."""
@@ -47,10 +45,10 @@ CELLS_OF_GROUP: Final = ("FIRST_CELL", "CELLS")
 TEXTURE_WIDTH: Final = 1024
 """Texels of a row of every texture."""
 
-WAVE_ROW: Final = 4 + diamond.AZIMUTHS // 2
+WAVE_ROW: Final = 4 + soft_horizons.AZIMUTHS // 2
 """Row of a node from which on it has its waves."""
 
-FALL_ROWS: Final = diamond.AZIMUTHS // 4
+FALL_ROWS: Final = soft_horizons.AZIMUTHS // 4
 """Rows of a node for the falls of one curvature."""
 
 LEVEL_TINY: Final = 1e-18
@@ -62,38 +60,37 @@ POINTS: Final[int] = _SAMPLER["points"].default
 WIDENING: Final[float] = _SAMPLER["widening"].default
 """Factor on the widening of lobes by the spread of the tangents."""
 
-_SAME: Final[dict[ModuleType, tuple[str, ...]]] = {
-    heightfield: ("WARP", "WEFT", "GAP"),
-    diamond: ("AZIMUTHS",),
-    groups: ("COLUMNS",),
-    nodes: ("LEVELS", "UPPER"),
-    shade: ("LEAST_SEEN", "FADED", "TINY"),
-    answer: ("STRETCHED", "SMALLEST"),
-    axis_densities: ("NARROW",),
-    narrow: ("LONG",),
-    footprint_nodes: ("REACH", "MOST_ACROSS", "HERMITE"),
-    ellipse_nodes: ("MOST",),
-    waves: ("MOST_WAVES",),
-    wide: ("RESOLVED",),
-    query: ("HIDDEN_SHARE",),
-    curved_horizons: ("FALL",),
-    lobes: ("SCATTERED", "BROAD"),
-    importance_mixture: ("LEAST_COSINE",),
-}
+_SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
+    (heightfield, ("WARP", "WEFT", "GAP")),
+    (soft_horizons, ("AZIMUTHS",)),
+    (groups, ("COLUMNS",)),
+    (nodes, ("LEVELS", "UPPER")),
+    (shade, ("LEAST_SEEN", "FADED", "TINY")),
+    (answer, ("STRETCHED", "SMALLEST")),
+    (wide, ("NARROW",)),
+    (narrow, ("LONG",)),
+    (footprint_nodes, ("REACH", "MOST_ACROSS", "HERMITE")),
+    (ellipse_nodes, ("MOST",)),
+    (waves, ("MOST_WAVES",)),
+    (wide, ("RESOLVED",)),
+    (query, ("HIDDEN_SHARE",)),
+    (soft_horizons, ("FALL",)),
+    (lobes, ("SCATTERED", "BROAD")),
+    (importance_mixture, ("LEAST_COSINE",)),
+)
 # What a file keeps to itself is read by name: a shader has it from there, and a new name there is an error here.
 _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     float32: {
         "DEEPEST": "_DEEPEST", "HALVINGS": "_HALVINGS", "LN2": "_LN2", "LN2_REST": "_LN2_REST",
         **{f"EXP_{n}": f"_C{n}" for n in range(2, 8)}, **{f"ASIN_{n}": f"_AS{n}" for n in range(4)},
     },
-    soft_horizons: {"RAMP": "_RAMP", "RAMP_SLOPE": "_RAMP_SLOPE", "APART_TINY": "_TINY"},
-    diamond: {"DIAMOND_TINY": "_TINY"},
+    soft_horizons: {"RAMP": "_RAMP", "RAMP_SLOPE": "_RAMP_SLOPE", "APART_TINY": "_TINY", "DIAMOND_TINY": "_SHORTEST"},
     slab_float32: {"SLAB_TINY": "_TINY", "ALIKE": "_ALIKE", "GRAZING": "_GRAZING"},
     lobes: {
         "ASTRAY": "_ASTRAY", "CLEAR": "_CLEAR", "LEAST_SHARE": "_LEAST", "LOBE_SHARPNESS": "_SHARPNESS",
         "LOBE_STEEPEST": "_STEEPEST", "ALONE": "_ALONE", "LOBE_TINY": "_TINY",
     },
-    importance_mixture: {"LEFT_THROUGH": "THROUGH", "LOBE_SHORTEST": "_SHORTEST"},
+    importance_mixture: {"LEFT_THROUGH": "STRAIGHT_ON", "LOBE_SHORTEST": "_SHORTEST"},
     shade: {"SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "TAIL": "_TAIL"},
     footprint_nodes: {
         "HERMITE_BOX": "_HERMITE_BOX", "WHOLE": "_WHOLE", "VERTICAL": "_VERTICAL", "INVERSE_ROOT": "_INVERSE_ROOT",
@@ -107,8 +104,8 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
         )
     },
     narrow: {"HIDDEN": "_HIDDEN", "PARTS": "_PARTS", "FAR": "_FAR", "LEAST": "_LEAST"},
-    weights: {"FAINTEST": "_FAINTEST"},
     wide: {
+        "FAINTEST": "_FAINTEST",
         "COST_WAVES": "_WAVES", "COST_WAVE": "_WAVE", "COST_DENSITIES": "_DENSITIES", "COST_DENSITY": "_DENSITY",
         "COST_PRODUCT": "_PRODUCT",
     },
@@ -119,7 +116,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
 def constants() -> dict[str, float | int]:
     """Return the constants of the shader, by name; those of type int are integers there."""
     line = mixture.COARSE_LINE
-    first, second, third = curved_horizons.CURVATURES
+    first, second, third = soft_horizons.CURVATURES
     hidden_cosine, hidden_straight = vars(lobes)["_HIDDEN"]
     red, green, blue = LUMINANCE
     values: dict[str, object] = {
@@ -158,7 +155,7 @@ def constants() -> dict[str, float | int]:
         extra = CELLS_OF_GROUP if name == "GROUP" else ()
         values |= {column: len(columns) + index for index, column in enumerate(extra)}
         values[f"{name}_COLUMNS"] = len(columns) + len(extra)
-    for module, names in _SAME.items():
+    for module, names in _SAME:
         values |= {name: vars(module)[name] for name in names}
     for module, renamed in _RENAMED.items():
         values |= {name: vars(module)[own] for name, own in renamed.items()}

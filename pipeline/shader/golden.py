@@ -13,13 +13,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.importance.lobes import POINT_ROWS, ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
+from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
 from pipeline.analytic.importance.mixture import density_rows
-from pipeline.analytic.importance.surface import Surface
+from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
-from pipeline.analytic.soft_nodes.behind import read_behind
-from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.nodes import Table
+from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.shader.constants import POINTS, WIDENING
 from pipeline.shader.tables import BEHIND, CURVATURE, Sides
@@ -160,7 +159,7 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
     return result
 
 
-def transparency(table: Table, looks: Queries) -> Float32:
+def transparency(table: SoftNodeTable, looks: Queries) -> Float32:
     """Return the transparency of N footprints, (N,), the viewer in front; a table of the front alone suffices."""
     if not len(table.behind_grid):
         # Horizons of the other side hide the light, of which the transparency knows nothing.
@@ -173,13 +172,13 @@ def lobes_of(sides: Sides, looks: Queries) -> Lobes:
     back, count = bool(looks.wo[0, 2] < 0.0), len(looks.u)
     table = sides.back if back else sides.front
     assert table is not None
-    surface = Surface(
+    surface = LobeSurface(
         table.repeat, table.yarn, table.thickness, table.uniform, table.piece_starts, table.pieces, table.bounds,
         table.grid.ravel(), table.grid.shape[-1], (sides.colours @ np.array(LUMINANCE, np.float32)).reshape(3, 2),
     )  # fmt: skip
     seen, places = looks.turned() if back else looks, point_places(POINTS)
     columns = (seen.u, seen.v, *deviations(seen, SMALLEST))
-    result = Lobes(np.empty((count, ROWS, POINTS + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
+    result = Lobes(np.empty((count, FLAKE_ROWS, POINTS + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
     find_rows(
         surface, tuple(np.ascontiguousarray(column, np.float32) for column in columns),  # type: ignore[arg-type]
         np.ascontiguousarray(seen.wo, np.float32), places, np.float32(WIDENING),

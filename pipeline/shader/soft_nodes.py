@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Final
 
-from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
+from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
 from pipeline.shader.descriptor import Shader, descriptor
 from pipeline.shader.golden import golden
 from pipeline.shader.tables import Sides, layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides

@@ -1,6 +1,6 @@
 """The table of a cloth as a shader reads it: four buffers, and the places of its arrays in them.
 
-    integers   int32: scalars of `Table`, of the front and of the back, then arrays
+    integers   int32: scalars of `SoftNodeTable`, of the front and of the back, then arrays
     numbers    float32: scalars, then colours, yarns, extents of pieces, the rules along both axes and those of Gauss
     nodes      float32 (rows, 4), `stride` rows a node: normal and 1 / n_z; tangent and share of the area; change of the
                tangent along; across; mean and sharpness of horizons, two azimuths a row; cosine and sine of waves, two
@@ -22,10 +22,10 @@ import numpy.typing as npt
 from PIL import Image
 
 from pipeline.analytic.importance.lobes import point_places
+from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes import footprint_nodes
-from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
 from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table, tabulate
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.waves import TOGETHER
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
@@ -48,16 +48,16 @@ class Sides(NamedTuple):
 
     Attributes
     ----------
-    front : Table
+    front : SoftNodeTable
         Its front, with what light from behind and curved cloth need if these are wanted.
-    back : Table or None
+    back : SoftNodeTable or None
         Its back, if viewers behind it are wanted.
     colours : float32 (6, 3)
         k_s, k_d and k_dt, each of warp and weft, linear RGB.
     """
 
-    front: Table
-    back: Table | None
+    front: SoftNodeTable
+    back: SoftNodeTable | None
     colours: Float32
 
 
@@ -80,7 +80,7 @@ class ClothTables(NamedTuple):
     grid : uint8
         The four buffers.
     scalars, back_scalars : dict
-        Values of `Table` of type int, then of type float, in the order in which the buffers begin with them: of the
+        Values of the table of type int, then of type float, in the order in which the buffers begin with them: of the
         front, then of the back, if the tables know it.
     places : dict
         Buffer and arrays in it, by name.
@@ -207,7 +207,7 @@ class _Side(NamedTuple):
     grid: npt.NDArray[np.uint8]
 
 
-def _side(table: Table) -> _Side:
+def _side(table: SoftNodeTable) -> _Side:
     """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
@@ -308,7 +308,7 @@ def layout_slang(cloth: ClothTables) -> str:
     return "\n".join(lines)
 
 
-def _node_rows(table: Table) -> Float32:
+def _node_rows(table: SoftNodeTable) -> Float32:
     """Return the rows of all nodes, (nodes, stride, 4)."""
     count, waves = table.evenly.size, len(table.waves)
     surface = table.nodes.transpose(0, 2, 1).reshape(count, -1)
@@ -336,7 +336,7 @@ def _horizon_rows(mean: Float32, sharpness: Float32) -> Float32:
     return pairs.transpose(1, 0, 2).reshape(pairs.shape[1], -1, 4)
 
 
-def _groups(table: Table) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """Return the groups with their lists of cells, (G, 7), and these cells, (cells, 2)."""
     ends = int(table.repeat[0])
     starts = table.group_starts.astype(np.int64)

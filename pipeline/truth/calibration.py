@@ -49,7 +49,7 @@ class Factors(NamedTuple):
     cover: float
 
 
-COMPONENTS: Final = {
+FRONT_FACTORS: Final = {
     COARSE_TABLE: Factors(0.76, 0.03, 0.0019, 5.5),
     FINE_TABLE: Factors(0.67, 0.1, 0.0014, 8.5),
     REFINED: Factors(1.1, 0.1, 0.0005, 5.5),
@@ -59,7 +59,7 @@ COMPONENTS: Final = {
 }
 """Factors of the four components, light and viewer in front of the cloth."""
 
-BEHIND: Final = COMPONENTS | {
+BEHIND_FACTORS: Final = FRONT_FACTORS | {
     COARSE_TABLE: Factors(0.8, 0.03, 0.002, 6.0),
     FINE_TABLE: Factors(0.8, 0.1, 0.0015, 10.0),
     REFINED: Factors(1.4, 0.1, 0.0005, 5.0),
@@ -68,7 +68,7 @@ BEHIND: Final = COMPONENTS | {
 }
 """Factors of the four components, light or viewer behind the cloth: yarns are lit through gaps."""
 
-THROUGH: Final = {
+TRANSPARENCY_FACTORS: Final = {
     COARSE_TABLE: Factors(0.8, math.inf, 0.0008, 7.0),
     FINE_TABLE: Factors(0.8, math.inf, 0.0003, 10.0),
     REFINED: Factors(0.5, math.inf, 0.0007, 8.0),
@@ -84,13 +84,13 @@ def calibrate(raw: Raw, behind: Mask) -> tuple[Float64, Float64]:
     error, bound = np.zeros_like(raw.error), np.zeros_like(raw.error)
     size = np.linalg.norm(raw.mean[:, :4], axis=1)
     for table, chosen, columns in (
-        (COMPONENTS, ~behind, slice(4)),
-        (BEHIND, behind, slice(4)),
-        (THROUGH, np.ones_like(behind), slice(4, 5)),
+        (FRONT_FACTORS, ~behind, slice(4)),
+        (BEHIND_FACTORS, behind, slice(4)),
+        (TRANSPARENCY_FACTORS, np.ones_like(behind), slice(4, 5)),
     ):
         for stage, factors in table.items():
             here = np.flatnonzero(chosen & (raw.stage == stage))
-            scale = size[here] if table is not THROUGH else (size[here] > 0.0).astype(np.float64)
+            scale = size[here] if table is not TRANSPARENCY_FACTORS else (size[here] > 0.0).astype(np.float64)
             found = raw.error[here, columns]
             _calibrate_all(found, scale, factors)
             error[here, columns] = found

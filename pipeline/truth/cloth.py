@@ -16,13 +16,13 @@ from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices
 from weaves.fabric import Fabric
 
-AREA: Final = 5
+AREA_SUM: Final = 5
 """Column of the denominator in every array of sums, after the four components and the transparency."""
 
-SUMS: Final = 6
-"""Columns of every array of sums."""
+POINT_SUMS: Final = 6
+"""WideQueries of every array of sums."""
 
-FOOTPRINTS: Final = {"gaussian": GAUSSIAN, "box": BOX}
+SHAPES: Final = {"gaussian": GAUSSIAN, "box": BOX}
 
 
 class ClothSide(NamedTuple):
@@ -47,7 +47,7 @@ class ClothSide(NamedTuple):
     projected: bool
 
 
-class Columns(NamedTuple):
+class WideQueries(NamedTuple):
     """N queries in float64 with unit directions, the viewer in front; the fields of `Queries`."""
 
     u: Float64
@@ -59,9 +59,9 @@ class Columns(NamedTuple):
     angle: Float64
     curvature: Float64
 
-    def take(self, index: npt.NDArray[np.integer] | Mask) -> Columns:
+    def take(self, index: npt.NDArray[np.integer] | Mask) -> WideQueries:
         """Return the queries at `index`."""
-        return Columns(*(np.ascontiguousarray(column[index]) for column in self))
+        return WideQueries(*(np.ascontiguousarray(column[index]) for column in self))
 
 
 class Raw(NamedTuple):
@@ -97,9 +97,9 @@ class Raw(NamedTuple):
         self.count[index] += count
 
 
-def columns_of(queries: Queries, behind: bool = False) -> Columns:
+def columns_of(queries: Queries, behind: bool = False) -> WideQueries:
     """Return queries for kernels, reflected in the fabric plane if the viewer is `behind` the cloth."""
-    wide = Columns(*(np.ascontiguousarray(column, np.float64) for column in queries))
+    wide = WideQueries(*(np.ascontiguousarray(column, np.float64) for column in queries))
     flip = (1.0, 1.0, -1.0 if behind else 1.0)
     wi, wo = (w / np.linalg.norm(w, axis=-1, keepdims=True) * flip for w in (wide.wi, wide.wo))
     return wide._replace(wi=wi, wo=wo)
@@ -112,7 +112,7 @@ def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> C
         back if behind else front,
         front if behind else back,
         Choices(options.frame == "macro", options.shadows),
-        FOOTPRINTS[options.footprint],
+        SHAPES[options.footprint],
         options.normaliser == "projected",
     )
 

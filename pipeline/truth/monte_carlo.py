@@ -16,12 +16,40 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
-from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns
-from pipeline.truth.footprint.hidden import conceal
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, independent_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.scattering.point import Directions, directions_of, point_share
+
+_CERTAIN: Final = 0.001
+"""Probability of a wrong decision that is not worth more points."""
+
+
+@kernel
+def conceal(share: float, doubt: float, mean: Float64, error: Float64) -> bool:
+    """Write the answer 0 for a patch that counts as hidden; where this is not certain, raise the error.
+
+    Returns whether the decision may be wrong: such a patch is worth more points.
+
+    Parameters
+    ----------
+    share, doubt : float
+        Visible share of the patch's projected area, and its standard error.
+    mean, error : float64 (5,)
+        The answer of a patch that is not hidden.
+    """
+    concealed = share < HIDDEN_SHARE
+    # Probability that the true share is on the other side of the limit, its error taken to be normal.
+    distance = abs(share - HIDDEN_SHARE)
+    wrong = 0.5 * math.erfc(distance / (math.sqrt(2.0) * doubt)) if doubt > 0.0 else 0.0
+    for c in range(len(mean)):
+        error[c] = math.hypot(0.0 if concealed else error[c], math.sqrt(wrong) * mean[c])
+        if concealed:
+            mean[c] = 0.0
+    return wrong > _CERTAIN
+
 
 RANDOMISATIONS: Final = 16
 
@@ -33,7 +61,7 @@ INDEPENDENT, R2, OWEN = range(3)
 
 @inlined_kernel
 def place_point(
-    columns: Columns, row: int, cloth: ClothSide, first: float, second: float
+    columns: WideQueries, row: int, cloth: ClothSide, first: float, second: float
 ) -> tuple[float, float, float]:
     """Return the point that two numbers in (0, 1) name in the footprint of a query, and its weight."""
     picks, ends = cloth.front.top.shape
@@ -55,18 +83,18 @@ def place_point(
 def add_point(
     cloth: ClothSide, x: float, y: float, weight: float, directions: Directions, sums: Float64, r: int
 ) -> bool:
-    """Add the weighted share of a point to row r of the sums, (rows, SUMS); return whether the viewer sees it."""
+    """Add the weighted share of a point to row r of the sums, (rows, POINT_SUMS); return whether the viewer sees it."""
     family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
     if family != GAP:
         sums[r, family] += weight * specular
         sums[r, 2 + family] += weight * diffuse
     sums[r, 4] += weight * through
-    sums[r, AREA] += weight * (directions.viewer.z if cloth.projected else area)
+    sums[r, AREA_SUM] += weight * (directions.viewer.z if cloth.projected else area)
     return area > 0.0
 
 
 @kernel
-def query_directions(columns: Columns, row: int) -> Directions:
+def query_directions(columns: WideQueries, row: int) -> Directions:
     """Prepare the directions of a query."""
     wi, wo = columns.wi[row], columns.wo[row]
     return directions_of(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2], columns.curvature[row])
@@ -74,12 +102,12 @@ def query_directions(columns: Columns, row: int) -> Directions:
 
 @kernel
 def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
-    """Write ratios and standard errors from the sums, (RANDOMISATIONS, SUMS); return how many rows saw a point."""
+    """Write ratios and standard errors from sums (RANDOMISATIONS, POINT_SUMS); return how many rows saw a point."""
     area, seen = 0.0, 0
     for r in range(RANDOMISATIONS):
-        area += sums[r, AREA]
-        seen += sums[r, AREA] > 0.0
-    for c in range(AREA):
+        area += sums[r, AREA_SUM]
+        seen += sums[r, AREA_SUM] > 0.0
+    for c in range(AREA_SUM):
         mean[c], error[c] = 0.0, 0.0
         if area > 0.0:
             total = 0.0
@@ -88,7 +116,7 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
             mean[c] = total / area
             spread = 0.0
             for r in range(RANDOMISATIONS):
-                residual = sums[r, c] - mean[c] * sums[r, AREA]
+                residual = sums[r, c] - mean[c] * sums[r, AREA_SUM]
                 spread += residual * residual
             error[c] = math.sqrt(spread * RANDOMISATIONS / (RANDOMISATIONS - 1)) / area
             if seen < RANDOMISATIONS:
@@ -101,19 +129,19 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
 def visible_share(sums: Float64, whole: float) -> tuple[float, float]:
     """Return the visible share of a patch, and its standard error.
 
-    `sums` is (RANDOMISATIONS, SUMS), `whole` the sum of areas of one randomisation of a patch that is wholly visible.
+    `sums` is (RANDOMISATIONS, POINT_SUMS), `whole` the sum of areas of one randomisation of a patch wholly visible.
     """
-    mean = sums[:, AREA].sum() / RANDOMISATIONS
+    mean = sums[:, AREA_SUM].sum() / RANDOMISATIONS
     square = 0.0
     for r in range(RANDOMISATIONS):
-        square += (sums[r, AREA] - mean) ** 2
+        square += (sums[r, AREA_SUM] - mean) ** 2
     return mean / whole, math.sqrt(square / (RANDOMISATIONS * (RANDOMISATIONS - 1))) / whole
 
 
 @allocating_kernel
 def sample_rows(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     index: Index,
     method: int,
     relative_error: float,
@@ -126,7 +154,7 @@ def sample_rows(
 
     Parameters
     ----------
-    cloth, columns : ClothSide, Columns
+    cloth, columns : ClothSide, WideQueries
         The cloth and the queries.
     index : int (N,)
         Name of each row: its random numbers are a function of (seed, index).
@@ -136,9 +164,9 @@ def sample_rows(
         As in `TruthOptions` and `estimate`.
     """
     rows = len(index)
-    means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
+    means, errors = np.zeros((rows, AREA_SUM)), np.zeros((rows, AREA_SUM))
     counts = np.zeros(rows, np.int64)
-    sums = np.zeros((RANDOMISATIONS, SUMS))
+    sums = np.zeros((RANDOMISATIONS, POINT_SUMS))
     for row in range(rows):
         key = derive(seed, index[row])
         directions = query_directions(columns, row)

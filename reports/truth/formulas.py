@@ -31,7 +31,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def sigma(w: Array, t: Array, alpha: Array) -> Array:
-    """Return the projected area of the flakes, by the cross product: as `microflake.sigma`."""
+    """Return the projected area of the flakes, by the cross product: as `slab.sigma`."""
     across, along = _cross(w, t), dot(w, t)
     return np.asarray(np.sqrt(dot(across, across) + alpha * alpha * (along * along)))
 
@@ -43,7 +43,7 @@ def textbook_sigma(w: Array, t: Array, alpha: Array) -> Array:
 
 
 def density(v: Array, t: Array, alpha: Array) -> Array:
-    """Return D at the half vector of v, by the cross product: as `pipeline.truth.scattering.microflake.density`."""
+    """Return D at the half vector of v, by the cross product: as `pipeline.truth.scattering.slab.density`."""
     across, along = _cross(v, t), dot(v, t)
     q = (alpha * alpha * dot(across, across) + along * along) / dot(v, v)
     return np.asarray(alpha * alpha * alpha / (_pi(alpha) * q * q))

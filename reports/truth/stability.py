@@ -20,11 +20,10 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX, BOX_SIDE, place
 from pipeline.truth.geometry import heightfield
 from pipeline.truth.node_table import kernels
-from pipeline.truth.node_table.directions import Direction
-from pipeline.truth.node_table.kernels import Layer, Normals, Tangents
+from pipeline.truth.node_table.kernels import Direction, FlakeLayer, Normals, Tangents
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering import microflake, slab
+from pipeline.truth.scattering import slab
 from reports.truth.finding import DOUBLE, ILL, Finding, judge
 from reports.truth.formulas import (
     Array,
@@ -281,12 +280,12 @@ def draw(
 
 def sigma_of(w: Array, t: Array, alpha: Array) -> Array:
     """Return sigma as `microflake` computes it."""
-    return _each(microflake.sigma, *w, *t, alpha)
+    return _each(slab.sigma, *w, *t, alpha)
 
 
 def density_of(v: Array, t: Array, alpha: Array) -> Array:
     """Return D as `microflake` computes it."""
-    return _each(microflake.density, *v, *t, alpha)
+    return _each(slab.density, *v, *t, alpha)
 
 
 def slab_of(wi: Array, wo: Array, t: Array, alpha: Array, thickness: Array) -> Array:
@@ -336,9 +335,9 @@ def _towards(w: Array) -> Direction:
     return Direction(w[0], w[1], w[2], slope=np.float32(0), first=0, second=0, turn=np.float32(0))
 
 
-def _layer(alpha: np.float32, thickness: np.float32) -> Layer:
+def _layer(alpha: np.float32, thickness: np.float32) -> FlakeLayer:
     wide = float(alpha)
-    return Layer(np.float32(wide**2), thickness, np.float32(wide**3 / (4 * math.pi)))
+    return FlakeLayer(np.float32(wide**2), thickness, np.float32(wide**3 / (4 * math.pi)))
 
 
 def _torus(bend: float) -> Iterator[Expression]:
@@ -390,7 +389,7 @@ def _sum(label: str, terms: Array, listed: float) -> Expression:
     none, one = np.zeros(_PIECE, np.float32), np.ones(_PIECE, np.float32)
     normal, tangent = Normals(none, none, one, one), Tangents(none, none, none)
     # The viewer is above, and the layer has no thickness: areas are summed.
-    viewer, layer = _towards(np.array([0, 0, 1], np.float32)), Layer(np.float32(1), np.float32(0), np.float32(0))
+    viewer, layer = _towards(np.array([0, 0, 1], np.float32)), FlakeLayer(np.float32(1), np.float32(0), np.float32(0))
     pieces = terms.reshape(-1, _PIECE)
     return Expression(
         "sum",

@@ -18,19 +18,27 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.detail import DETAILS
+from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.models.method import CHUNK, Method
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, Table
-from pipeline.truth.node_table.directions import node_directions
-from pipeline.truth.node_table.kernels import Horizons, Layer, Normals, Tangents, reflected, weigh
-from pipeline.truth.node_table.shares import NodeShares, no_shares
+from pipeline.truth.node_table.build import FIRST_FINE, FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
+from pipeline.truth.node_table.kernels import (
+    FlakeLayer,
+    HorizonSlopes,
+    NodeShares,
+    Normals,
+    Tangents,
+    no_shares,
+    node_directions,
+    reflected,
+    weigh,
+)
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
@@ -139,7 +147,7 @@ def _points() -> Iterator[Rate]:
 
 
 @allocating_kernel
-def _evaluate_points(model: ClothSide, table: Table, columns: Columns, visibility: bool) -> tuple[float, int]:
+def _evaluate_points(model: ClothSide, table: ExactNodes, columns: WideQueries, visibility: bool) -> tuple[float, int]:
     """Evaluate all nodes for every query: specular, and with `visibility` all else; return their sum and count."""
     nodes = table.normal.shape[1]
     shares = no_shares(nodes)
@@ -151,8 +159,8 @@ def _evaluate_points(model: ClothSide, table: Table, columns: Columns, visibilit
         light, viewer = towards.light, towards.viewer
         for p in range(len(table.pieces)):
             piece = table.pieces[p]
-            start, count, family = piece[START], piece[COLUMNS] * piece[ROWS], min(piece[FAMILY], 1)
-            stop, f0 = start + count, piece[FINE_START]
+            start, count, family = piece[FIRST_NODE], piece[NODES_X] * piece[NODES_Y], min(piece[PIECE_FAMILY], 1)
+            stop, f0 = start + count, piece[FIRST_FINE]
             f1 = f0 + count
             yarn = model.front.yarn[family]
             normal = Normals(
@@ -175,15 +183,15 @@ def _evaluate_points(model: ClothSide, table: Table, columns: Columns, visibilit
                 area, diffuse = weigh(
                     normal,
                     light,
-                    Horizons(table.slope[light.first, start:stop], table.slope[light.second, start:stop]),
+                    HorizonSlopes(table.slope[light.first, start:stop], table.slope[light.second, start:stop]),
                     viewer,
-                    Horizons(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
+                    HorizonSlopes(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
                     np.float32(yarn[BLEND]),
                     own,
                 )
                 total += area + diffuse
             tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
-            layer = Layer(np.float32(yarn[ALPHA] ** 2), thickness, one)
+            layer = FlakeLayer(np.float32(yarn[ALPHA] ** 2), thickness, one)
             total += reflected(normal, tangent, light, viewer, one, layer, own.lit, own.speculars)
             points += count
     return total, points
@@ -289,7 +297,7 @@ def _memory(fabric: Fabric, rows: int) -> Rate:
     return Rate("memory for ten times the queries", fabric.name, float(many - few), 0.0, 0.0, "bytes")
 
 
-def _numpy_points(fabric: Fabric, table: Table, queries: Queries, points: int = 20_000) -> int:
+def _numpy_points(fabric: Fabric, table: ExactNodes, queries: Queries, points: int = 20_000) -> int:
     """Evaluate random points of the repeat by array expressions; return how many."""
     random = np.random.default_rng(1)
     ends, picks = fabric.weave.repeat
@@ -319,7 +327,7 @@ def _numpy_points(fabric: Fabric, table: Table, queries: Queries, points: int = 
     return done
 
 
-def _clears(table: Table, nodes: npt.NDArray[np.int64], w: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+def _clears(table: ExactNodes, nodes: npt.NDArray[np.int64], w: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     """Return which nodes see a direction, by linear interpolation between two azimuths."""
     place = np.arctan2(w[1], w[0]) / (2 * np.pi) * len(table.slope)
     row = int(np.floor(place))

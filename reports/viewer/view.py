@@ -19,10 +19,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
 from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, Table, tabulate
+from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, USUAL
+from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.atomic import atomic_write
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
@@ -255,7 +254,7 @@ def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any
     }
 
 
-def _families(table: Table, cloth: ClothTables) -> npt.NDArray[np.uint8]:
+def _families(table: SoftNodeTable, cloth: ClothTables) -> npt.NDArray[np.uint8]:
     """Return the family of every node; those that fill up blocks count as gaps."""
     families = np.full(table.evenly.size, GAP, np.uint8)
     for group in table.groups.astype(np.int64):

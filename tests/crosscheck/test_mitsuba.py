@@ -18,7 +18,7 @@ import pytest
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering.microflake import density, sigma
+from pipeline.truth.scattering.slab import density, sigma
 from weaves.fabric import load_fabric
 from weaves.families import Satin, Twill
 from weaves.mesh import repeat_mesh

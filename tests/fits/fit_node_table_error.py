@@ -21,16 +21,13 @@ import numpy as np
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
-from pipeline.truth.estimator import estimate
+from pipeline.truth.estimator import WIDE, estimate
 from pipeline.truth.footprint.mixture import FINE_LINE
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.node_table.answer import _sum_pieces
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, ROWS, START
-from pipeline.truth.node_table.cascade import WIDE
-from pipeline.truth.node_table.directions import node_directions
-from pipeline.truth.node_table.kernels import SMOOTH
+from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY
+from pipeline.truth.node_table.kernels import SMOOTH, no_shares, node_directions, with_weight
 from pipeline.truth.node_table.refine import UNSEEN
-from pipeline.truth.node_table.shares import no_shares, with_weight
 from pipeline.truth.node_table.tables import COARSE, FINE
 from pipeline.truth.node_table.weights import fill_weights
 from pipeline.truth.options import TruthOptions
@@ -74,12 +71,12 @@ def curvature_terms(fabric: Fabric, queries: Queries) -> np.ndarray:
         below, parts = 0.0, np.zeros(4)
         for piece in table.pieces:
             # The nodes that `borders` visits: all rows but the first and the last two.
-            first = piece[START] + piece[COLUMNS]
-            nodes = slice(first, first + max(piece[COLUMNS] * (piece[ROWS] - 3), 0))
+            first = piece[FIRST_NODE] + piece[NODES_X]
+            nodes = slice(first, first + max(piece[NODES_X] * (piece[NODES_Y] - 3), 0))
             below += float(np.square(own.areas[nodes].astype(np.float64)).sum())
-            if piece[FAMILY] != GAP:
-                parts[piece[FAMILY]] += float(np.square(own.speculars[nodes].astype(np.float64)).sum())
-                parts[2 + piece[FAMILY]] += float(np.square(own.diffuses[nodes] / math.pi).sum())
+            if piece[PIECE_FAMILY] != GAP:
+                parts[piece[PIECE_FAMILY]] += float(np.square(own.speculars[nodes].astype(np.float64)).sum())
+                parts[2 + piece[PIECE_FAMILY]] += float(np.square(own.diffuses[nodes] / math.pi).sum())
         result[row] = (parts + (sums[:4] / area) ** 2 * below) / area**2
     return result
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
-from pipeline.truth.geometry.symmetry import first_cells
+from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.adaptive import _HIGHLIGHT, integrate_rows
 from weaves.fabric import load_fabric

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
-from pipeline.truth.geometry.symmetry import first_cells
+from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.adaptive import SAFETY, integrate_rows, quadrature_rows
 from weaves.fabric import load_fabric

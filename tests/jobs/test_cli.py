@@ -10,7 +10,7 @@ from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import write_shard
 from pipeline.truth.checks import invariants
-from pipeline.truth.checks.check_result import exact, worst
+from pipeline.truth.checks.invariants import exact, worst
 from pipeline.truth.query import Answers
 from reports.images.exr import read_exr
 from weaves.errors import BadInput, WorkFailed

@@ -1,1 +1,1 @@
-"""Point sampling with a horizon map in place of ray marching: horizon_map, shading, sampler, the rows of scratch."""
+"""Point sampling with a horizon map in place of ray marching: horizon_map, shading, sampler."""

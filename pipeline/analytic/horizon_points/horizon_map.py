@@ -15,20 +15,33 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.gauss_rules import grid_middles
-from pipeline.analytic.horizon_points.rows import CURVATURE, DISTANCE, LIMIT, NODE, SINE, WARPNESS, WEFTNESS, X, Y
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import fast_kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines
-from pipeline.truth.geometry.pieces import Piece, cell_pieces
-from pipeline.truth.geometry.symmetry import orbits
+from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, orbits
+
+SCRATCH_ROWS: Final = 26
+"""Rows of numbers."""
+
+# Inputs: position in the repeat and weight; directions of the query, 1 / |wi + wo|^2, where between two azimuths they
+# lie. Then the results of `locate`, and the shares that `shade` writes.
+(X, Y, WEIGHT, IX, IY, IZ, OX, OY, OZ, SIZE, TURN_I, TURN_O, SINE, DISTANCE, CURVATURE, LIMIT, WARPNESS, WEFTNESS,
+ SEEN, BOTH, STEP_V, STEP_Y, STEEPNESS, AREA, DIFFUSE, SPECULAR) = range(SCRATCH_ROWS)  # fmt: skip
+
+INTEGERS: Final = 5
+"""Rows of integers."""
+
+# The azimuths' rows around wi and wo, and the node.
+I0, I1, O0, O1, NODE = range(INTEGERS)
+
 
 SLOTS: Final = 4
 """Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
 
 # Columns of `HorizonMap.pieces`.
-ALONG, CURVE, BOUND, START, SCALE = range(5)
+MAP_ALONG, MAP_CURVE, MAP_BOUND, MAP_START, MAP_SCALE = range(5)
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _INVERSE_PI = np.float32(1.0 / math.pi)
@@ -45,7 +58,7 @@ class HorizonMap(NamedTuple):
     top : int32 (picks * ends,)
         Family on top of each cell, row by row.
     pieces : float32 (picks * ends * SLOTS * 5,)
-        Piece by piece: what is added to the position along the yarn, from the cell's centre, to measure from the
+        CellPiece by piece: what is added to the position along the yarn, from the cell's centre, to measure from the
         float's; curvature of the float, negative beneath; bound of sin u; where the block begins along the cell, and
         how many blocks' lengths a yarn spacing is.
     blocks : int32 (picks * ends * SLOTS,)
@@ -114,7 +127,7 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     )
 
 
-def slot_of(piece: Piece) -> int:
+def slot_of(piece: CellPiece) -> int:
     """Return which of the SLOTS of its cell a piece is."""
     if piece.family == GAP:
         return 3
@@ -123,7 +136,7 @@ def slot_of(piece: Piece) -> int:
     return 1 if piece.along[0] == 0.0 else 2
 
 
-def _row(piece: Piece) -> tuple[float, ...]:
+def _row(piece: CellPiece) -> tuple[float, ...]:
     """Return the row of `HorizonMap.pieces`."""
     if piece.family == GAP:
         return (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -133,7 +146,7 @@ def _row(piece: Piece) -> tuple[float, ...]:
     return (offset, piece.sign * piece.curve, min(piece.steepest, _STEEPEST), low, 1.0 / (high - low))
 
 
-def _nodes(piece: Piece, grid: int) -> tuple[Float64, Float64]:
+def _nodes(piece: CellPiece, grid: int) -> tuple[Float64, Float64]:
     """Return x and y of a block's nodes within the cell, (grid * grid,): across the yarn runs fastest."""
     if piece.family == GAP:
         x = np.full(grid * grid, 0.5 * min(piece.across[1], piece.along[1]))
@@ -173,14 +186,14 @@ def locate(table: HorizonMap, count: int, points: Float32, places: npt.NDArray[n
         row = piece * np.int32(5)
         across = (fx if warp else fy) / (warp_radius if warp else weft_radius)
         across = min(max(across, -_1), _1)
-        place = (along + _HALF - pieces[row + np.int32(START)]) * pieces[row + np.int32(SCALE)] * size
+        place = (along + _HALF - pieces[row + np.int32(MAP_START)]) * pieces[row + np.int32(MAP_SCALE)] * size
         turn = (arcsine(across) * _INVERSE_PI + _HALF) * size
         i = np.int32(min(max(turn, _0), size - _HALF))
         j = np.int32(min(max(place, _0), size - _HALF))
         node[k] = blocks[piece] + j * grid + i
         sine[k] = across
-        distance[k] = (along if warp else -along) + pieces[row + np.int32(ALONG)]
-        curvature[k] = pieces[row + np.int32(CURVE)]
-        limit[k] = pieces[row + np.int32(BOUND)]
+        distance[k] = (along if warp else -along) + pieces[row + np.int32(MAP_ALONG)]
+        curvature[k] = pieces[row + np.int32(MAP_CURVE)]
+        limit[k] = pieces[row + np.int32(MAP_BOUND)]
         warpness[k] = _1 if (warp and not gap) else _0
         weftness[k] = _0 if (warp or gap) else _1

@@ -15,19 +15,21 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.horizon_points.horizon_map import HorizonMap, horizon_map, locate
-from pipeline.analytic.horizon_points.rows import (
+from pipeline.analytic.horizon_points.horizon_map import (
     AREA,
     DIFFUSE,
     INTEGERS,
-    ROWS,
+    SCRATCH_ROWS,
     SPECULAR,
     STEEPNESS,
     WARPNESS,
     WEFTNESS,
     WEIGHT,
+    HorizonMap,
     X,
     Y,
+    horizon_map,
+    locate,
 )
 from pipeline.analytic.horizon_points.shading import BATCH, fill_points, gather, query_rows, shade_all
 from pipeline.compiled.arrays import Float32
@@ -104,7 +106,7 @@ def _sample(
     """Answer every row; `footprints` has the columns u and v, the deviations along x and y, and their correlation."""
     result, at_once = np.zeros((len(wi), 4), np.float32), max(1, BATCH // count)
     batch = _Batch(
-        np.zeros((ROWS, at_once * count), np.float32),
+        np.zeros((SCRATCH_ROWS, at_once * count), np.float32),
         np.zeros((INTEGERS, at_once * count), np.int32),
         np.zeros((9, at_once), np.float32),
         np.zeros((4, at_once), np.int32),

@@ -13,9 +13,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.flakes_float32 import sigma, spread
-from pipeline.analytic.horizon_points.horizon_map import HorizonMap
-from pipeline.analytic.horizon_points.rows import (
+from pipeline.analytic.horizon_points.horizon_map import (
     AREA,
     BOTH,
     CURVATURE,
@@ -45,13 +43,14 @@ from pipeline.analytic.horizon_points.rows import (
     WARPNESS,
     WEFTNESS,
     WEIGHT,
+    HorizonMap,
 )
 from pipeline.analytic.soft_horizons import above, ramp
-from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, spread, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, kernel
-from pipeline.truth.geometry.azimuths import azimuth_rows
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST
+from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection
 
 BATCH: Final = 2048

@@ -5,7 +5,7 @@ How much of a point the viewer sees is read from a coarse grid of horizons. Each
 where tangents differ from point to point by s, its roughness is widened to alpha^2 + (widening s / points)^2; and one
 broad lobe a family, as wide as all its tangents, has `BROAD` of its share, so that nothing between the points is
 without a sample. At a small footprint all points are alike, and the mixture is the sampler of a point
-(pipeline.analytic.importance.point) beside the cosines of the diffuse light.
+(pipeline.analytic.importance.mixture) beside the cosines of the diffuse light.
 
 A lobe's share is its visible area, times k_s, times the light scattered once by the layer and not shadowed, about
 `SCATTERED` of 1 - exp(-T Lambda); a cosine's is visible area times k_d, on the other side k_dt; that of the light
@@ -21,10 +21,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.flakes_float32 import sigma
-from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, Surface
-from pipeline.analytic.soft_horizons import above, ramp
-from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, around
+from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, LobeSurface
+from pipeline.analytic.soft_horizons import AZIMUTHS, above, around, ramp
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
     BOUND,
@@ -37,7 +35,7 @@ from pipeline.analytic.soft_nodes.nodes import (
     Y_HIGH,
     Y_LOW,
 )
-from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent
+from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, tangent
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.compiled.float32 import arcsine
@@ -56,10 +54,10 @@ from pipeline.truth.geometry.heightfield import (
 )
 from pipeline.truth.scattering.slab_float32 import unscattered
 
-ROWS: Final = 6
+FLAKE_ROWS: Final = 6
 """Rows of `Lobes.flakes`."""
 
-TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(ROWS)
+TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(FLAKE_ROWS)
 """Tangent; alpha^2, widened; probability; that times alpha^3 / (4 pi sigma(wo)), the density at q = 1."""
 
 NEAR, FAR, STRAIGHT = range(3)
@@ -93,7 +91,7 @@ class Lobes(NamedTuple):
 
     Attributes
     ----------
-    flakes : float32 (N, ROWS, K)
+    flakes : float32 (N, FLAKE_ROWS, K)
         Lobes of flakes; the last two are the broad ones of warp and weft.
     rest : float32 (N, 3)
         Probabilities of NEAR, FAR and STRAIGHT.
@@ -103,7 +101,7 @@ class Lobes(NamedTuple):
     rest: Float32
 
 
-class Look(NamedTuple):
+class Viewing(NamedTuple):
     """A footprint and its viewer.
 
     Attributes
@@ -148,7 +146,7 @@ def point_places(count: int) -> Float32:
 
 @kernel
 def find_rows(
-    cloth: Surface,
+    cloth: LobeSurface,
     footprints: tuple[Float32, Float32, Float32, Float32, Float32],
     wo: Float32,
     places: Float32,
@@ -160,7 +158,7 @@ def find_rows(
 
     Parameters
     ----------
-    cloth : Surface
+    cloth : LobeSurface
         The cloth.
     footprints : five of float32 (N,)
         Centre and deviations along the axes in yarn spacings, correlation of the axes.
@@ -183,7 +181,7 @@ def find_rows(
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
         low, high, turn = around(wo[n, 0], wo[n, 1])
         even = min(deviation_x[n], deviation_y[n]) >= cloth.uniform
-        look = Look(
+        look = Viewing(
             x, y, deviation_x[n], deviation_y[n], correlation[n], even, wo[n, 0], wo[n, 1], wo[n, 2], low, high, turn
         )
         lobes = result.flakes[n]
@@ -194,7 +192,7 @@ def find_rows(
 
 
 @inlined_kernel
-def _place_points(cloth: Surface, look: Look, places: Float32, points: Float32) -> None:
+def _place_points(cloth: LobeSurface, look: Viewing, places: Float32, points: Float32) -> None:
     """Write what each point has of its piece, and how much of it the viewer sees."""
     size, bounds, width = cloth.size, cloth.bounds, cloth.repeat[0]
     ends, picks, per_azimuth = np.float64(width), np.float64(cloth.repeat[1]), cloth.size * cloth.size
@@ -256,7 +254,7 @@ class _Family(NamedTuple):
 
 
 @inlined_fast_kernel
-def _family(cloth: Surface, family: int) -> _Family:
+def _family(cloth: LobeSurface, family: int) -> _Family:
     """Return the numbers of one family."""
     yarn, light = cloth.yarn, cloth.luminance
     return _Family(
@@ -267,7 +265,7 @@ def _family(cloth: Surface, family: int) -> _Family:
 
 @inlined_fast_kernel
 def _shade_points(
-    cloth: Surface, look: Look, points: Float32, lobes: Float32
+    cloth: LobeSurface, look: Viewing, points: Float32, lobes: Float32
 ) -> tuple[np.float32, np.float32, np.float32]:
     """Write tangent, alpha^2 and share of each point; return the sums of both cosines and of light straight through."""
     near, far, straight = _0, _0, _0
@@ -336,7 +334,7 @@ def _widen(points: Float32, lobes: Float32, widening: np.float32) -> None:
 
 @inlined_fast_kernel
 def _normalise(
-    look: Look, lobes: Float32, near: np.float32, far: np.float32, straight: np.float32, rest: Float32
+    look: Viewing, lobes: Float32, near: np.float32, far: np.float32, straight: np.float32, rest: Float32
 ) -> None:
     """Make probabilities of the shares, and write the heights of the lobes."""
     total = near + far + straight

@@ -10,18 +10,18 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.nodes import EVEN, tabulate_pieces
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.geometry.symmetry import longest_period
+from pipeline.truth.geometry.pieces import longest_period
 from pipeline.truth.options import TruthOptions
 from weaves.colour import luminance
 from weaves.fabric import Fabric
 
 SPECULAR, DIFFUSE, THROUGH = range(3)
-"""Rows of `Surface.luminance`: k_s, k_d and k_dt."""
+"""Rows of `LobeSurface.luminance`: k_s, k_d and k_dt."""
 
 _GRID = 12  # cells along each axis: some tens of kilobytes, which stay in the cache
 
 
-class Surface(NamedTuple):
+class LobeSurface(NamedTuple):
     """One side of a cloth.
 
     Attributes
@@ -35,7 +35,7 @@ class Surface(NamedTuple):
     uniform : float
         Deviation from which on a Gaussian covers the cloth evenly.
     piece_starts, pieces, bounds, grid
-        As in `pipeline.analytic.soft_nodes.nodes.Table`, the grid flat.
+        As in `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, the grid flat.
     size : int
         Cells of a grid along each axis.
     luminance : float32 (3, 2)
@@ -54,14 +54,14 @@ class Surface(NamedTuple):
     luminance: Float32
 
 
-def tabulate_surface(fabric: Fabric) -> Surface:
+def tabulate_surface(fabric: Fabric) -> LobeSurface:
     """Return the front of a fabric, as the default model of the truth sees it."""
     model = cloth_side(fabric, TruthOptions())
     front, found = model.front, tabulate_pieces(model, _GRID)
     picks, ends = front.top.shape
     average = fabric.average()
     colours: Final = ("specular_rgb", "diffuse_rgb", "diffuse_transmission_rgb")
-    return Surface(
+    return LobeSurface(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),

@@ -1,11 +1,11 @@
 """Sums over soft nodes for each query: fixed nodes for a wide footprint, nodes placed in a narrow one.
 
 deviations                           weights
-both >= `Table.uniform`              the cloth evenly
-both >= `Table.waves_from`           waves, where they take less time than densities
+both >= `SoftNodeTable.uniform`              the cloth evenly
+both >= `SoftNodeTable.waves_from`           waves, where they take less time than densities
 the narrower one < `NARROW`,
     `STRETCHED` times the other      nodes placed on lines along the footprint, at most `MOST`
-the narrower one < `Table.narrow`,
+the narrower one < `SoftNodeTable.narrow`,
     the wider one < `LONG`           nodes placed in the footprint, a second time where it is almost hidden
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
 
@@ -21,15 +21,13 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic.axis_densities import NARROW
-from pipeline.analytic.soft_nodes.diamond import around
+from pipeline.analytic.soft_horizons import around
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
-from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round
-from pipeline.analytic.soft_nodes.nodes import Table
-from pipeline.analytic.soft_nodes.scratch import Scratch, scratch_for
-from pipeline.analytic.soft_nodes.shade import SUMS
-from pipeline.analytic.soft_nodes.wide import sum_fixed
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
+from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery, scratch_for
+from pipeline.analytic.soft_nodes.shade import NODE_SUMS
+from pipeline.analytic.soft_nodes.wide import NARROW, sum_fixed
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import deviations, narrow_axis
@@ -47,7 +45,7 @@ _ROUND = Ellipse(1.0, 0.0, 1.0, 1.0, 1.0, 1)
 _0, _1 = np.float32(0.0), np.float32(1.0)
 
 
-def query_sums(table: Table, queries: Queries) -> tuple[Float32, Float32]:
+def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
     """Return what `sum_queries` returns for N queries, the viewer in front."""
     return sum_queries(table, *_columns(queries))
 
@@ -60,7 +58,7 @@ def _columns(queries: Queries) -> tuple[Float32, ...]:
 
 @allocating_kernel
 def sum_queries(
-    table: Table,
+    table: SoftNodeTable,
     u: Float32,
     v: Float32,
     deviation_x: Float32,
@@ -76,7 +74,7 @@ def sum_queries(
 
     Parameters
     ----------
-    table : Table
+    table : SoftNodeTable
         The cloth.
     u, v, deviation_x, deviation_y, correlation : float32 (N,)
         Footprints: centre and deviations along the axes in yarn spacings, correlation of the axes.
@@ -87,11 +85,11 @@ def sum_queries(
 
     Returns
     -------
-    float32 (N, K, SUMS), float32 (N,)
-        The sums of each kind of yarn (`Table.kinds`), five where the light is behind, and the area seen through gaps.
+    float32 (N, K, NODE_SUMS), float32 (N,)
+        The sums of each kind of yarn (`SoftNodeTable.kinds`), five with the light behind; the area seen through gaps.
     """
     kinds = table.kinds[0] + table.kinds[1]
-    result, gaps = np.zeros((len(u), kinds, SUMS), np.float32), np.zeros(len(u), np.float32)
+    result, gaps = np.zeros((len(u), kinds, NODE_SUMS), np.float32), np.zeros(len(u), np.float32)
     footprints = (u, v, deviation_x, deviation_y, correlation)
     _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), footprints, wi, wo, curvature, result, gaps)
     return result, gaps
@@ -100,7 +98,7 @@ def sum_queries(
 # Not in `sum_queries`: what allocates counts references to every slice, a third of the time of a query.
 @kernel
 def _sum_rows(
-    table: Table,
+    table: SoftNodeTable,
     scratch: Scratch,
     footprints: tuple[Float32, Float32, Float32, Float32, Float32],
     wi: Float32,
@@ -135,7 +133,7 @@ def _sum_rows(
                 np.float64(wo[n, 0]), np.float64(wo[n, 1]), np.float64(wo[n, 2]), np.float64(curvature[n]),
             )  # fmt: skip
             bend_i, bend_o = np.float32(towards.light.bend), np.float32(towards.viewer.bend)
-        look = Look(
+        look = SoftQuery(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip

@@ -13,8 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_horizons import above, ramp, sharpness_of_points
-from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
+from pipeline.analytic.soft_horizons import AZIMUTHS, above, ramp, sharpness_of_points
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
     BOUND,
@@ -27,7 +26,7 @@ from pipeline.analytic.soft_nodes.nodes import (
     X_LOW,
     Y_HIGH,
     Y_LOW,
-    Table,
+    SoftNodeTable,
 )
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT, GridHorizons
 from pipeline.compiled.arrays import Float32, Index
@@ -126,7 +125,7 @@ def _next_cut(place: float, forward: bool, radius: float) -> float:
 
 
 @kernel
-def _piece_at(table: Table, cell: int, x: np.float32, y: np.float32) -> int:
+def _piece_at(table: SoftNodeTable, cell: int, x: np.float32, y: np.float32) -> int:
     """Return the piece of a cell at a place within it, -1 if there is none."""
     for p in range(table.piece_starts[cell], table.piece_starts[cell + 1]):
         box = table.bounds[p]
@@ -177,7 +176,7 @@ def _write_node(
 
 @kernel
 def place_ellipse(
-    table: Table,
+    table: SoftNodeTable,
     shape: Ellipse,
     x: float,
     y: float,
@@ -191,7 +190,7 @@ def place_ellipse(
 
     Parameters
     ----------
-    table : Table
+    table : SoftNodeTable
         The cloth.
     shape : Ellipse
         The footprint.

@@ -1,4 +1,4 @@
-"""Features of a query for a network, and the components by the soft nodes alone.
+"""Features of a query for a network, and components by the soft nodes alone, light in front or behind.
 
 Ratios and bounded numbers only. Mirror images of a query, x -> -x and y -> -y, are the same query of a mirrored cloth:
 the half vector is brought to x, y >= 0, and what remains of the cloth is the sense of its twists. Exchanging x and y
@@ -27,7 +27,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.soft_nodes.answer import SMALLEST, query_sums
-from pipeline.analytic.soft_nodes.nodes import Table
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.analytic.soft_nodes.shade import (
     AREA,
     BARE_AREA,
@@ -41,6 +41,7 @@ from pipeline.analytic.soft_nodes.shade import (
     OPEN_SPECULAR,
     SPECULAR,
     SPECULAR_DOUBT,
+    THROUGH,
     TINY,
 )
 from pipeline.compiled.arrays import Float32
@@ -141,7 +142,7 @@ class Reading(NamedTuple):
     bounds: Float32
 
 
-def cloth_features(table: Table) -> Float32:
+def cloth_features(table: SoftNodeTable) -> Float32:
     """Return the features that are the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
     yarn = table.yarn.astype(np.float64)
     by_family = [
@@ -154,12 +155,12 @@ def cloth_features(table: Table) -> Float32:
     return np.ascontiguousarray(np.stack(by_family), np.float32).ravel()
 
 
-def read_queries(table: Table, queries: Queries) -> Reading:
+def read_queries(table: SoftNodeTable, queries: Queries) -> Reading:
     """Read N queries, light and viewer in front; cloth is curved only if the table knows it.
 
     Parameters
     ----------
-    table : Table
+    table : SoftNodeTable
         The cloth.
     queries : Queries
         Footprints of any shape.
@@ -171,3 +172,24 @@ def read_queries(table: Table, queries: Queries) -> Reading:
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
     _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, *reading)
     return reading
+
+
+def read_behind(table: SoftNodeTable, queries: Queries) -> Float32:
+    """Return components and transparency of N queries, float32 (N, 5); cloth is curved only if the table knows it.
+
+    Parameters
+    ----------
+    table : SoftNodeTable
+        A cloth with what light from behind needs.
+    queries : Queries
+        The viewer in front, the light behind, footprints of any shape.
+    """
+    sums, gaps = query_sums(table, queries)
+    bare = sums[:, :, BARE_AREA].sum(axis=1) + gaps
+    area = np.maximum(sums[:, :, AREA].sum(axis=1) + gaps, LEAST_SEEN * bare) + TINY
+    faded = (area / (area + FADED * bare))[:, None]
+    result = np.empty((len(area), 5), np.float32)
+    result[:, :2] = faded * sums[:, :, SPECULAR] / area[:, None]
+    result[:, 2:4] = faded * sums[:, :, DIFFUSE] / (math.pi * area[:, None])
+    result[:, 4] = np.minimum((sums[:, :, THROUGH].sum(axis=1) + gaps) / area, 1.0)
+    return result

@@ -27,16 +27,16 @@ from pipeline.analytic.soft_nodes.nodes import (
     X_LOW,
     Y_HIGH,
     Y_LOW,
-    Table,
+    SoftNodeTable,
 )
 from pipeline.analytic.soft_nodes.scratch import Scratch
 from pipeline.analytic.soft_nodes.shade import (
     ALONG,
+    BLOCK_ROWS,
     COS,
     HALF_ALONG,
     HALF_V,
     LIMIT,
-    ROWS,
     SIN,
     TURN,
     WEIGHT,
@@ -106,7 +106,7 @@ class Footprint(NamedTuple):
     dy: np.float32
 
 
-class Part(NamedTuple):
+class CoveredPart(NamedTuple):
     """The part of a piece that a footprint covers, from the corner of the cell."""
 
     x_low: np.float32
@@ -117,17 +117,17 @@ class Part(NamedTuple):
 
 @inlined_fast_kernel
 def place_nodes(
-    table: Table, scratch: Scratch, p: int, first: int, at: Footprint, part: Part, kind: int
+    table: SoftNodeTable, scratch: Scratch, p: int, first: int, at: Footprint, part: CoveredPart, kind: int
 ) -> None:  # fmt: skip
     """Place nodes of a footprint in a part of a piece of yarn, after those of its kind that are placed.
 
     Parameters
     ----------
-    table, scratch : Table, Scratch
+    table, scratch : SoftNodeTable, Scratch
         The cloth; where nodes are written.
     p, first : int
         The piece, and the first cell of its grid.
-    at, part : Footprint, Part
+    at, part : Footprint, CoveredPart
         The footprint, and what it covers of the piece.
     kind : int
         Kind of the yarn.
@@ -250,7 +250,7 @@ def _shift(row: npt.NDArray[np.uint32], k: int, values: npt.NDArray[np.uint32], 
 def fill_block(nodes: Float32, cells: npt.NDArray[np.uint32], start: int) -> int:
     """Fill the last block with nodes that weigh nothing; return the number of nodes."""
     stop = (start + BLOCK_NODES - 1) // BLOCK_NODES * BLOCK_NODES
-    for row in range(ROWS):
+    for row in range(BLOCK_ROWS):
         own, value = nodes[row], _1 if row == COS else _0
         for k in range(start, stop):
             own[k] = value
@@ -262,7 +262,7 @@ def fill_block(nodes: Float32, cells: npt.NDArray[np.uint32], start: int) -> int
 @fast_kernel
 def gap_area(
     bounds: Float32, first: int, size: int, viewer: GridHorizons, sharpness: np.float32, oz: np.float32,
-    at: Footprint, part: Part, most: int,
+    at: Footprint, part: CoveredPart, most: int,
 ) -> np.float32:  # fmt: skip
     """Return the area that the viewer sees through a part of a gap.
 

@@ -4,6 +4,10 @@ Pieces of one shape that lie alike on floats of one length form a group, of one 
 thread. A yarn may be cut into parts across, each a piece of its own (`Detail.parts`). A draft of many different floats
 has too many groups: then the two most alike are merged, again and again (Ward's distance between their inclinations),
 until the nodes of all groups are few enough.
+
+The surface at the nodes of a group has normal, tangent, and by how much the tangent turns within a node's box. A
+highlight may be narrower than a box: the tangent's change over half a box, along and across the yarn, gives it four
+places there, at the points of the Gauss rule (1 / sqrt 3 of half a box). All of it is in the frame of the yarn.
 """
 
 from __future__ import annotations
@@ -13,9 +17,51 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from pipeline.analytic.soft_nodes.detail import Detail
-from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER
-from pipeline.truth.geometry.pieces import Piece
+import numpy as np
+
+from pipeline.analytic.gauss_rules import Rule
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.compiled.arrays import Float64
+from pipeline.compiled.decorators import fast_kernel
+from pipeline.truth.geometry.heightfield import BETA, COS_TWIST, GAP, SIN_TWIST, TOP, UNDER, WARP
+from pipeline.truth.geometry.pieces import CellPiece
+
+
+class Detail(NamedTuple):
+    """How fine the nodes of a table are.
+
+    Attributes
+    ----------
+    most : int
+        Nodes of all groups of pieces on top above which groups are merged; half as many beneath.
+    along : float
+        Nodes along a yarn, as a multiple of those at level 2.
+    parts : int
+        Parts of a yarn across, each with nodes of its own.
+    legendre : int
+        Most nodes along each axis of a piece that a narrow footprint covers in part.
+    narrow : float
+        Deviation, in yarn spacings, below which a footprint places its nodes; at most `NARROW`.
+    """
+
+    most: int
+    along: float
+    parts: int
+    legendre: int
+    narrow: float
+
+
+DETAILS: Final = {
+    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15),
+    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25),
+    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25),
+    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25),
+}
+"""The details of every level k."""
+
+USUAL: Final = 2
+"""The level unless another one is named."""
+
 
 COLUMNS: Final = 8
 """Nodes across a yarn: half the width of the vector units."""
@@ -32,7 +78,7 @@ class PieceGroup(NamedTuple):
 
     Attributes
     ----------
-    piece : Piece
+    piece : CellPiece
         The mean of them.
     cells : list of (end, pick)
         Cells of the pieces.
@@ -44,7 +90,7 @@ class PieceGroup(NamedTuple):
         Nodes along it, as a multiple of those at level 2.
     """
 
-    piece: Piece
+    piece: CellPiece
     cells: list[Cell]
     blocks: list[int]
     thread: int = 0
@@ -65,7 +111,7 @@ class PieceGroup(NamedTuple):
         return COLUMNS * self.lines
 
 
-def gather(pieces: Sequence[tuple[Cell, Piece, int]], detail: Detail, by_thread: bool = False) -> list[PieceGroup]:
+def gather(pieces: Sequence[tuple[Cell, CellPiece, int]], detail: Detail, by_thread: bool = False) -> list[PieceGroup]:
     """Return the groups of pieces, given with their cell (end, pick) and the name of their horizons.
 
     Warps come first, then wefts and gaps; with `by_thread` those of each thread follow each other.
@@ -89,7 +135,7 @@ def gather(pieces: Sequence[tuple[Cell, Piece, int]], detail: Detail, by_thread:
     return sorted(groups, key=lambda group: (group.piece.family, group.thread))
 
 
-def _parts(piece: Piece, count: int) -> list[Piece]:
+def _parts(piece: CellPiece, count: int) -> list[CellPiece]:
     """Return a piece of yarn cut into parts that are equal in the angle across; a gap is not cut."""
     if piece.family == GAP or count == 1:
         return [piece]
@@ -142,3 +188,84 @@ def _together(first: PieceGroup, second: PieceGroup) -> PieceGroup:
     # The length only tells where the arc of a yarn beneath ends.
     piece = one._replace(offset=middle / curve if curve else 0.0, curve=curve, half=max(one.half, other.half))
     return PieceGroup(piece, cells, first.blocks + second.blocks, first.thread, first.dense)
+
+
+SURFACE_ROWS: Final = 13
+"""Normal (3), 1 / n_z, tangent (3), its change along (3) and across (3)."""
+
+FLAT: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
+"""The rows of a gap, and of the nodes that fill up a block."""
+
+_AXES = np.eye(3)
+_GAUSS = 1.0 / math.sqrt(3.0)
+
+LARGEST_SINE: Final = 0.999
+"""Largest sine of an inclination."""
+
+
+def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Float64:
+    """Return the surface at nodes, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
+
+    Parameters
+    ----------
+    yarn : float64 (families, 8)
+        `HeightField.yarn`.
+    piece : CellPiece
+        The piece, of a yarn or of a gap.
+    across, along : Rule
+        Its nodes.
+    """
+    lines, columns = len(along.places), len(across.places)
+    if piece.family == GAP:
+        return np.tile(FLAT[:, None], lines * columns)
+    own = yarn[piece.family]
+    radius = piece.radius
+    turned = 1.0 if piece.family == WARP else -1.0  # y of the yarn's frame against the cell's axis
+
+    # Sine of the angle across, place along and half box of each node.
+    sines = np.clip((np.tile(across.places, lines) - 0.5) / radius, -1.0, 1.0)
+    places = turned * (np.repeat(along.places, columns) - 0.5 + piece.offset)
+    half_across = 0.5 * np.tile(np.diff(across.borders), lines)
+    half_along = 0.5 * np.repeat(np.diff(along.borders), columns)
+    bound = min(piece.steepest, LARGEST_SINE)
+    fibre = Fibre(float(own[SIN_TWIST]), float(own[COS_TWIST]), float(own[BETA]))
+    found = np.zeros((SURFACE_ROWS, len(sines)))
+    _fill_rows(
+        sines,
+        places,
+        half_across,
+        half_along,
+        float(radius),
+        float(piece.sign * piece.curve),
+        float(bound),
+        fibre,
+        found,
+    )
+    return found
+
+
+@fast_kernel
+def _fill_rows(
+    sines: Float64,
+    places: Float64,
+    half_across: Float64,
+    half_along: Float64,
+    radius: float,
+    curvature: float,
+    limit: float,
+    fibre: Fibre,
+    found: Float64,
+) -> None:
+    """Write the rows of all nodes of a piece of yarn, (SURFACE_ROWS, nodes)."""
+    for k in range(len(sines)):
+        cos_v = math.sqrt((1.0 - sines[k]) * (1.0 + sines[k]))
+        angles, inner = bend(sines[k], cos_v, radius, places[k], curvature, limit)
+        found[0, k], found[1, k], found[2, k] = normal(angles, fibre.beta)
+        found[3, k] = 1.0 / found[2, k]
+        t = tangent(angles, fibre)
+        found[4, k], found[5, k], found[6, k] = t.x, t.y, t.z
+        step_u = _GAUSS * half_along[k] * inner / angles.cos_u
+        step_v = _GAUSS * half_across[k] / (radius * max(cos_v, 1e-9))
+        for axis in range(3):
+            by_u, by_v = turning(_AXES[axis, 0], _AXES[axis, 1], _AXES[axis, 2], t, angles, fibre)
+            found[7 + axis, k], found[10 + axis, k] = step_u * by_u, step_v * by_v

@@ -11,36 +11,33 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic.axis_densities import NARROW
-from pipeline.analytic.curved_horizons import bend_cells, bend_of
-from pipeline.analytic.soft_horizons import sharpness_of_points
-from pipeline.analytic.soft_nodes.diamond import AZIMUTHS
+from pipeline.analytic.soft_horizons import AZIMUTHS, bend_cells, bend_of, sharpness_of_points
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, place_ellipse, sharpness_of
 from pipeline.analytic.soft_nodes.footprint_nodes import (
     MOST_ACROSS,
     REACH,
+    CoveredPart,
     Footprint,
-    Part,
     fill_block,
     gap_area,
     place_nodes,
 )
-from pipeline.analytic.soft_nodes.look import Look
-from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, Table
-from pipeline.analytic.soft_nodes.scratch import Scratch
+from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, SoftNodeTable
+from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.shade import (
     AREA,
     BARE_AREA,
     DIFFUSE,
+    NODE_SUMS,
     OPEN_DIFFUSE,
     OPEN_SPECULAR,
     SPECULAR,
-    SUMS,
     GridHorizons,
     directions,
     shade_footprint,
     shade_footprint_behind,
 )
+from pipeline.analytic.soft_nodes.wide import NARROW
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import GAP
@@ -63,7 +60,7 @@ _0 = np.float32(0.0)
 
 
 @kernel
-def _offsets(table: Table, low: int, high: int) -> tuple[np.uint32, np.uint32]:
+def _offsets(table: SoftNodeTable, low: int, high: int) -> tuple[np.uint32, np.uint32]:
     """Return what leads from a node's cell to its horizons at two azimuths."""
     per_azimuth = table.grid.shape[2] * table.grid.shape[3]
     return np.uint32(low * per_azimuth), np.uint32(high * per_azimuth)
@@ -71,7 +68,7 @@ def _offsets(table: Table, low: int, high: int) -> tuple[np.uint32, np.uint32]:
 
 @kernel
 def _place_round(
-    table: Table, scratch: Scratch, look: Look, dx: np.float32, dy: np.float32, reach: float, parts: int
+    table: SoftNodeTable, scratch: Scratch, look: SoftQuery, dx: np.float32, dy: np.float32, reach: float, parts: int
 ) -> np.float32:  # fmt: skip
     """Place nodes in every piece that a footprint along the axes touches; return the area seen through gaps.
 
@@ -98,7 +95,7 @@ def _place_round(
                     if x_high - x_low < least * dx or y_high - y_low < least * dy:
                         continue
                     family, first = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * AZIMUTHS * per_azimuth
-                    part = Part(np.float32(x_low), np.float32(x_high), np.float32(y_low), np.float32(y_high))
+                    part = CoveredPart(np.float32(x_low), np.float32(x_high), np.float32(y_low), np.float32(y_high))
                     if family == GAP:
                         gaps += gap_area(bounds, first, size, viewer, sharp, look.oz, at, part, table.legendre)
                         continue
@@ -108,8 +105,8 @@ def _place_round(
 
 
 @inlined_kernel
-def _shade(table: Table, scratch: Scratch, look: Look, sharp: np.float32, result: Float32) -> None:
-    """Write the sums over the nodes that are placed, (K, SUMS)."""
+def _shade(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, sharp: np.float32, result: Float32) -> None:
+    """Write the sums over the nodes that are placed, (K, NODE_SUMS)."""
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
     low_i, high_i = _offsets(table, look.low_i, look.high_i)
     viewer = GridHorizons(scratch.grid, *_offsets(table, look.low_o, look.high_o), look.turn_o)
@@ -135,14 +132,14 @@ def _shade(table: Table, scratch: Scratch, look: Look, sharp: np.float32, result
             nodes, cells, scratch.grid, low_i, high_i, look.turn_i, viewer.low, viewer.high, viewer.turn, sharp, d,
             table.yarn[family], thickness,
         )  # fmt: skip
-        for q in range(SUMS):
+        for q in range(NODE_SUMS):
             result[kind, q] = found[q]
 
 
 # Not in `_shade`: flat cloth is not to wait for it.
 @kernel
 def _shade_curved(
-    table: Table, scratch: Scratch, look: Look, sharp: np.float32, kind: int, count: int, result: Float32
+    table: SoftNodeTable, scratch: Scratch, look: SoftQuery, sharp: np.float32, kind: int, count: int, result: Float32
 ) -> None:  # fmt: skip
     """Write the sums over the placed nodes of a kind of yarn, over curved cloth."""
     family = 0 if kind < table.kinds[0] else 1
@@ -170,13 +167,13 @@ def _shade_curved(
         nodes, order, horizons, of_light.low, of_light.high, _0, of_viewer.low, of_viewer.high, _0, sharp, d, yarn,
         thickness,
     )  # fmt: skip
-    for q in range(SUMS):
+    for q in range(NODE_SUMS):
         result[kind, q] = found[q]
 
 
 @inlined_kernel
-def sum_ellipse(table: Table, scratch: Scratch, look: Look, shape: Ellipse, result: Float32) -> np.float32:
-    """Write the sums of a thin ellipse (K, SUMS), and return the area seen through gaps."""
+def sum_ellipse(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, shape: Ellipse, result: Float32) -> np.float32:
+    """Write the sums of a thin ellipse (K, NODE_SUMS), and return the area seen through gaps."""
     viewer = GridHorizons(scratch.grid, *_offsets(table, look.low_o, look.high_o), look.turn_o)
     scratch.stops[:] = 0
     gaps = place_ellipse(table, shape, look.x, look.y, viewer, look.oz, scratch.nodes, scratch.cells, scratch.stops)
@@ -186,19 +183,19 @@ def sum_ellipse(table: Table, scratch: Scratch, look: Look, shape: Ellipse, resu
 
 @inlined_kernel
 def sum_round(
-    table: Table, scratch: Scratch, look: Look, dx: np.float32, dy: np.float32, result: Float32
+    table: SoftNodeTable, scratch: Scratch, look: SoftQuery, dx: np.float32, dy: np.float32, result: Float32
 ) -> np.float32:  # fmt: skip
-    """Write the sums of a footprint along the axes (K, SUMS), and return the area seen through gaps.
+    """Write the sums of a footprint along the axes (K, NODE_SUMS), and return the area seen through gaps.
 
     Parameters
     ----------
-    table, scratch : Table, Scratch
+    table, scratch : SoftNodeTable, Scratch
         The cloth, and memory for its queries.
-    look : Look
+    look : SoftQuery
         The query.
     dx, dy : float32
         Deviations; for a rotated footprint those of one along the axes of the same area.
-    result : float32 (K, SUMS)
+    result : float32 (K, NODE_SUMS)
         Written.
     """
     parts, gaps, seen = 1, _0, _0

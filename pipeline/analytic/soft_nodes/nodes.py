@@ -16,20 +16,24 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.curved_horizons import CURVATURES, FALL
 from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
-from pipeline.analytic.soft_horizons import over_boxes
-from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
-from pipeline.analytic.soft_nodes.diamond import AZIMUTHS, from_even
-from pipeline.analytic.soft_nodes.groups import COLUMNS, PieceGroup, gather
-from pipeline.analytic.soft_nodes.surface import LEVEL, STEEPEST, piece_rows
+from pipeline.analytic.soft_horizons import AZIMUTHS, CURVATURES, FALL, from_even, over_boxes
+from pipeline.analytic.soft_nodes.groups import (
+    COLUMNS,
+    DETAILS,
+    FLAT,
+    LARGEST_SINE,
+    USUAL,
+    PieceGroup,
+    gather,
+    piece_rows,
+)
 from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
-from pipeline.truth.geometry.pieces import Piece, cell_pieces
-from pipeline.truth.geometry.symmetry import longest_period, orbits
+from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, longest_period, orbits
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
@@ -50,14 +54,14 @@ EVEN: Final = 0.42
 
 _SHARPEST = 0.02  # least spread of a horizon
 
-# Columns of `Table.groups`.
+# Columns of `SoftNodeTable.groups`.
 START, LINES, RULE_X, RULE_Y, GROUP_FAMILY = range(5)
-# Columns of `Table.pieces` and of `Table.bounds`.
+# Columns of `SoftNodeTable.pieces` and of `SoftNodeTable.bounds`.
 FAMILY, BLOCK = range(2)
 X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
 
 
-class Table(NamedTuple):
+class SoftNodeTable(NamedTuple):
     """A cloth's nodes and grids.
 
     Attributes
@@ -158,7 +162,7 @@ class Table(NamedTuple):
 
 def tabulate(
     fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False
-) -> Table:
+) -> SoftNodeTable:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
@@ -197,7 +201,7 @@ def tabulate(
                 stop += group.nodes
         stop += -stop % BLOCK_NODES
     starts.append(stop // BLOCK_NODES)
-    nodes = np.tile(LEVEL[:, None], stop)
+    nodes = np.tile(FLAT[:, None], stop)
     evenly, (mean, variance) = np.zeros(stop), _no_horizons(stop)
     behind_mean, behind_variance = _no_horizons(stop if behind else 0)
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
@@ -217,7 +221,7 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    return Table(
+    return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
@@ -260,7 +264,7 @@ def _in_blocks(values: Float64) -> Float32:
 
 
 class PieceGrids(NamedTuple):
-    """The pieces of a cloth and their grids of horizons alone: columns of `Table` of the same names.
+    """The pieces of a cloth and their grids of horizons alone: columns of `SoftNodeTable` of the same names.
 
     Attributes
     ----------
@@ -286,9 +290,9 @@ def tabulate_pieces(model: ClothSide, size: int) -> PieceGrids:
 class _Located(NamedTuple):
     """The pieces of all cells, with their cell and their grid; where those of each cell begin; one piece a grid."""
 
-    pieces: list[tuple[tuple[int, int], Piece, int]]
+    pieces: list[tuple[tuple[int, int], CellPiece, int]]
     starts: list[int]
-    samples: list[tuple[int, int, Piece]]
+    samples: list[tuple[int, int, CellPiece]]
 
 
 def _locate(front: HeightField) -> _Located:
@@ -308,7 +312,7 @@ def _locate(front: HeightField) -> _Located:
 
 
 def _piece_columns(located: _Located) -> dict[str, Any]:
-    """Return the columns of `Table` about pieces."""
+    """Return the columns of `SoftNodeTable` about pieces."""
     return {
         "piece_starts": np.array(located.starts, np.int64),
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
@@ -340,7 +344,7 @@ def _by_axis(groups: list[PieceGroup], rules: list[tuple[Rule, Rule]]) -> tuple[
 def _group_rows(
     groups: list[PieceGroup], first_nodes: list[int], axes: tuple[_AxisRules, _AxisRules]
 ) -> npt.NDArray[np.uint32]:
-    """Return `Table.groups`."""
+    """Return `SoftNodeTable.groups`."""
     rows = zip(groups, first_nodes, axes[0].of_groups, axes[1].of_groups, strict=True)
     return np.array([(first, group.lines, x, y, group.piece.family) for group, first, x, y in rows], np.uint32)
 
@@ -368,9 +372,9 @@ def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
     return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, group.lines, 0.0)
 
 
-def _bounds(piece: Piece) -> tuple[float, ...]:
+def _bounds(piece: CellPiece) -> tuple[float, ...]:
     x, y = piece.box
-    return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, STEEPEST))
+    return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, LARGEST_SINE))
 
 
 def _filled(rows: list[Float64], edge: bool) -> Float32:
@@ -390,7 +394,7 @@ def _float_lengths(front: HeightField) -> Float32:
     return np.array(found, np.float32)
 
 
-def _grid_places(samples: list[tuple[int, int, Piece]], size: int) -> tuple[Float64, Float64, Mask]:
+def _grid_places(samples: list[tuple[int, int, CellPiece]], size: int) -> tuple[Float64, Float64, Mask]:
     """Return the middles of the cells of all grids of pieces, given with pick and end, and which lie in gaps."""
     xs, ys, gaps = [], [], []
     for pick, end, piece in samples:

@@ -1,4 +1,4 @@
-"""Scratch memory of the sums of one query, made once for all queries of a call."""
+"""One query as the sums take it, and their scratch memory, made once for all queries of a call."""
 
 from __future__ import annotations
 
@@ -8,12 +8,52 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, Table
-from pipeline.analytic.soft_nodes.shade import ROWS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
+from pipeline.analytic.soft_nodes.shade import BLOCK_ROWS
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER
 from pipeline.compiled.arrays import Float32, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE
+
+
+class SoftQuery(NamedTuple):
+    """A query.
+
+    Attributes
+    ----------
+    x, y : float64
+        Centre of the footprint, within the repeat.
+    dx, dy, rho, narrowest : float32
+        Deviations along x and y in yarn spacings, correlation of the axes, and the least deviation of any direction.
+    ix, iy, iz, ox, oy, oz : float32
+        wi and wo.
+    low_i, high_i, turn_i, low_o, high_o, turn_o
+        Azimuths around wi and wo, and where between them these lie.
+    bend_i, bend_o : float32
+        Curvatures of the cloth towards wi and wo, 1/yarn spacings.
+    """
+
+    x: float
+    y: float
+    dx: np.float32
+    dy: np.float32
+    rho: np.float32
+    narrowest: np.float32
+    ix: np.float32
+    iy: np.float32
+    iz: np.float32
+    ox: np.float32
+    oy: np.float32
+    oz: np.float32
+    low_i: int
+    high_i: int
+    turn_i: np.float32
+    low_o: int
+    high_o: int
+    turn_o: np.float32
+    bend_i: np.float32
+    bend_o: np.float32
+
 
 TURN_ROWS: Final = 4
 """Rows of `Scratch.turns`: cosines and sines of whole turns of x, then of y."""
@@ -37,7 +77,7 @@ class Scratch(NamedTuple):
         Densities along both axes, which cells they touch, and the list of these.
     line_places, line_shares : float32 (points,)
         Points of the line of a mixture.
-    nodes : float32 (K, ROWS, most)
+    nodes : float32 (K, BLOCK_ROWS, most)
         Nodes placed in the footprint, for each kind of yarn.
     cells : uint32 (K, most)
         Cells of the grids for these.
@@ -81,7 +121,7 @@ class Scratch(NamedTuple):
 
 
 @allocating_kernel
-def scratch_for(table: Table, most: int) -> Scratch:
+def scratch_for(table: SoftNodeTable, most: int) -> Scratch:
     """Return what the queries of a call need; `most` is the largest number of nodes placed in a footprint."""
     kinds = table.kinds[0] + table.kinds[1]
     ends, picks, fixed = table.repeat[0], table.repeat[1], table.starts[kinds + 1]
@@ -100,7 +140,7 @@ def scratch_for(table: Table, most: int) -> Scratch:
         np.zeros(picks, np.uint32),
         np.zeros(_POINTS, np.float32),
         np.zeros(_POINTS, np.float32),
-        np.empty((kinds, ROWS, room), np.float32),
+        np.empty((kinds, BLOCK_ROWS, room), np.float32),
         np.empty((kinds, room), np.uint32),
         np.zeros(kinds, np.int64),
         np.zeros((LINE_ROWS, 8), np.float32),

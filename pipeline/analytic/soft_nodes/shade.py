@@ -22,16 +22,15 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.flakes_float32 import sigma, spread
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS
-from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, spread, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
-SUMS: Final = 10
+NODE_SUMS: Final = 10
 """Sums of a family."""
 
 AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(8)
@@ -48,10 +47,10 @@ FADED: Final = np.float32(1e-4)
 TINY: Final = np.float32(1e-18)
 """Keeps a quotient of sums finite."""
 
-ROWS: Final = 8
+BLOCK_ROWS: Final = 8
 """Rows of a block of nodes placed in a footprint."""
 
-SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(ROWS)
+SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(BLOCK_ROWS)
 """Sine and cosine of v; position along the yarn from its float's middle; half boxes across and along; weight; curve,
 negative beneath; largest sine of u."""
 
@@ -72,7 +71,7 @@ _LEVELS = np.float32(LEVELS)
 _TAIL = np.float32(0.0005)
 
 
-class Directions(NamedTuple):
+class YarnDirections(NamedTuple):
     """One query's directions in the frame of one family.
 
     Attributes
@@ -97,7 +96,7 @@ class Directions(NamedTuple):
     opposite: np.float32
 
 
-class Frame(NamedTuple):
+class NodeFrame(NamedTuple):
     """Surface at a node: unit normal, 1 / n_z and unit tangent."""
 
     nx: np.float32
@@ -109,7 +108,7 @@ class Frame(NamedTuple):
     tz: np.float32
 
 
-class Layer(NamedTuple):
+class YarnLayer(NamedTuple):
     """Optics of a family: squared roughness, scale of its flakes, optical thickness and blend."""
 
     square: np.float32
@@ -118,7 +117,7 @@ class Layer(NamedTuple):
     blend: np.float32
 
 
-class Horizons(NamedTuple):
+class NodeHorizons(NamedTuple):
     """Mean horizons of blocks of fixed nodes at the azimuths around a direction, and where between them it lies."""
 
     low: Float32
@@ -142,18 +141,18 @@ class GridHorizons(NamedTuple):
 @fast_kernel
 def directions(
     ix: np.float32, iy: np.float32, iz: np.float32, ox: np.float32, oy: np.float32, oz: np.float32, family: int
-) -> Directions:
+) -> YarnDirections:
     """Prepare a query's directions for a family."""
     size = _1 / max((ix + ox) ** 2 + (iy + oy) ** 2 + (iz + oz) ** 2, _SHORTEST)
     alike, right, opposite = azimuths_apart(ix, iy, ox, oy)
     if family == WEFT:
         ix, iy, ox, oy = iy, -ix, oy, -ox
-    return Directions(ix, iy, iz, ox, oy, oz, size, alike, right, opposite)
+    return YarnDirections(ix, iy, iz, ox, oy, oz, size, alike, right, opposite)
 
 
 @inlined_fast_kernel
 def shade_node(
-    d: Directions,
+    d: YarnDirections,
     nx: np.float32,
     ny: np.float32,
     nz: np.float32,
@@ -197,14 +196,14 @@ def shade_node(
 
 @inlined_fast_kernel
 def _node_behind(
-    d: Directions,
-    at: Frame,
+    d: YarnDirections,
+    at: NodeFrame,
     along: np.float32,
     across: np.float32,
     seen: np.float32,
     lit: np.float32,
     weight: np.float32,
-    layer: Layer,
+    layer: YarnLayer,
 ) -> Five:
     """Return a node's shares of the five sums with the light behind; `along`, `across` as for `shade_node`."""
     cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _0)
@@ -236,7 +235,7 @@ def shade_fixed(
     high_o: Float32,
     sharpness_o: Float32,
     turn_o: np.float32,
-    d: Directions,
+    d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
@@ -279,15 +278,15 @@ def shade_fixed(
 def shade_fixed_behind(
     nodes: Float32,
     weight: Float32,
-    light: Horizons,
-    viewer: Horizons,
-    d: Directions,
+    light: NodeHorizons,
+    viewer: NodeHorizons,
+    d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
 ) -> Five:
     """Return the sums over fixed nodes with the light behind; `light` has the horizons of the back."""
-    layer = Layer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, blend)
+    layer = YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for b in range(len(weight)):
@@ -297,7 +296,7 @@ def shade_fixed_behind(
             seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
             along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
             across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
-            at = Frame(
+            at = NodeFrame(
                 nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
                 nodes[b, 6, k],
             )  # fmt: skip
@@ -322,7 +321,7 @@ def shade_footprint(
     high_o: np.uint32,
     turn_o: np.float32,
     sharpness: np.float32,
-    d: Directions,
+    d: YarnDirections,
     yarn: Float32,
     thickness: np.float32,
 ) -> Ten:
@@ -375,14 +374,14 @@ def shade_footprint_behind(
     light: GridHorizons,
     viewer: GridHorizons,
     sharpness: np.float32,
-    d: Directions,
+    d: YarnDirections,
     yarn: Float32,
     thickness: np.float32,
 ) -> Five:
     """Return the sums over nodes placed in a footprint with the light behind; `light` has the grids of the back."""
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     alpha = yarn[ALPHA]
-    layer = Layer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
+    layer = YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, through = _0, _0, _0, _0, _0
@@ -399,7 +398,7 @@ def shade_footprint_behind(
         by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
         along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
         across = nodes[HALF_V, k] * _GAUSS * by_v
-        at = Frame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
+        at = NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
         found = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
         a += found[0]
         c += found[1]

@@ -1,30 +1,192 @@
-"""Sums of a wide footprint over the fixed nodes of the cloth."""
+"""Sums of a wide footprint over the fixed nodes of the cloth, weighted by waves or by the Gaussian over all its images.
+
+A Gaussian along the axes is a product: one outer product of densities for every touched cell and group, and densities
+at the nodes of a cell are those of a rule along x times those of a rule along y. A rotated one is a mixture of these
+(pipeline.truth.footprint.mixture); waves take any Gaussian.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from pipeline.analytic.axis_densities import axis_densities
-from pipeline.analytic.curved_horizons import bend_of, bend_rows
+from pipeline.analytic.soft_horizons import bend_of, bend_rows
 from pipeline.analytic.soft_nodes.footprint_nodes import REACH
-from pipeline.analytic.soft_nodes.look import Look
-from pipeline.analytic.soft_nodes.nodes import Table
-from pipeline.analytic.soft_nodes.scratch import Scratch
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, GROUP_FAMILY, LINES, RULE_X, RULE_Y, START, SoftNodeTable
+from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.shade import (
-    SUMS,
-    Horizons,
+    NODE_SUMS,
+    NodeHorizons,
     directions,
     shade_fixed,
     shade_fixed_behind,
     shade_gaps,
 )
-from pipeline.analytic.soft_nodes.weights import product_weights, wave_weights, waves_kept
-from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER, faintest
+from pipeline.compiled.arrays import Float32, Index, Mask
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.float32 import remaining
 from pipeline.truth.footprint.mixture import COARSE_LINE, line_points
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
+
+NARROW: Final = 0.25
+"""Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""
+
+_0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
+
+
+@inlined_fast_kernel
+def axis_densities(
+    places: Float32,
+    weights: Float32,
+    centre: np.float32,
+    deviation: np.float32,
+    reach: np.float32,
+    density: Float32,
+    touched: Mask,
+    found: npt.NDArray[np.uint32],
+) -> int:
+    """Write the Gaussian at the nodes of all rules, times their weights, in the cells of one axis; list those touched.
+
+    Parameters
+    ----------
+    places, weights : float32 (n,)
+        Rules within a cell, one after another: a single loop for the vector units.
+    centre, deviation, reach : float32
+        The footprint, in cells; where it is cut off, in deviations.
+    density : float32 (cells, n)
+        Written, for touched cells only.
+    touched, found : bool (cells,), uint32 (cells,)
+        Written: which cells are touched, and their list.
+
+    Returns
+    -------
+    int
+        Number of touched cells.
+    """
+    cells = len(touched)
+    reach = reach * deviation
+    inverse = _1 / deviation
+    first, last = int(np.floor(centre - reach)), int(np.floor(centre + reach))
+    count = 0
+    touched[:] = False
+    cell = first % cells
+    for column in range(first, last + 1):
+        here = density[cell]
+        if not touched[cell]:
+            touched[cell] = True
+            found[count] = cell
+            count += 1
+            here[:] = _0
+        middle = centre - np.float32(column)
+        for k in range(len(here)):
+            d = (places[k] - middle) * inverse
+            here[k] += weights[k] * remaining(_HALF * d * d)
+        cell = cell + 1 if cell + 1 < cells else 0
+    return count
+
+
+_TURN = np.float32(2.0 * math.pi)
+_DAMPING = np.float32(2.0 * math.pi**2)
+_FAINTEST = np.float32(faintest(1.0) ** 2)
+
+
+@kernel
+def waves_kept(size: Float32, narrowest: np.float32) -> int:
+    """Return how many waves are not faint under a Gaussian of a least deviation, a multiple of TOGETHER."""
+    last, count = _FAINTEST / (narrowest * narrowest), 0
+    while count < len(size) and size[count] < last:
+        count += TOGETHER
+    return count
+
+
+@fast_kernel
+def wave_weights(
+    waves: Index,
+    nodes: Float32,
+    evenly: Float32,
+    look: SoftQuery,
+    count: int,
+    repeat: Index,
+    turns: Float32,
+    phases: Float32,
+    weight: Float32,
+) -> None:
+    """Write the weights of all nodes as a sum of the first `count` waves, a multiple of TOGETHER.
+
+    `turns` and `phases` are scratch.
+    """
+    ends, picks = np.float32(repeat[0]), np.float32(repeat[1])
+    x, y = np.float32(look.x), np.float32(look.y)
+    for axis in range(2):
+        angle = _TURN * (x / ends if axis == 0 else y / picks)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turns[2 * axis, 0], turns[2 * axis + 1, 0] = _1, _0
+        for m in range(HIGHEST):
+            p, q = turns[2 * axis, m], turns[2 * axis + 1, m]
+            turns[2 * axis, m + 1], turns[2 * axis + 1, m + 1] = p * cosine - q * sine, p * sine + q * cosine
+    for h in range(count):
+        m, n = waves[h, 0], waves[h, 1]
+        of_x, of_y = np.float32(m) / ends * look.dx, np.float32(n) / picks * look.dy
+        damping = remaining(_DAMPING * (of_x * of_x + of_y * of_y + _2 * look.rho * of_x * of_y))
+        cos_x, sin_x, cos_y, sin_y = turns[0, m], turns[1, m], turns[2, abs(n)], turns[3, abs(n)]
+        sin_y = -sin_y if n < 0 else sin_y
+        own_phase, at = phases[h // TOGETHER], 2 * (h % TOGETHER)
+        own_phase[at] = damping * (cos_x * cos_y - sin_x * sin_y)
+        own_phase[at + 1] = damping * (sin_x * cos_y + cos_x * sin_y)
+    for b in range(len(weight)):
+        for k in range(BLOCK_NODES):
+            weight[b, k] = _1
+        # Several waves at a time: sums stay in registers.
+        own = weight[b]
+        for g in range(count // TOGETHER):
+            part, phase = nodes[b, g], phases[g]
+            p0, p1, p2, p3, p4, p5, p6, p7 = (
+                phase[0], phase[1], phase[2], phase[3], phase[4], phase[5], phase[6], phase[7]
+            )  # fmt: skip
+            for k in range(BLOCK_NODES):
+                own[k] += (
+                    p0 * part[0, k] + p1 * part[1, k] + p2 * part[2, k] + p3 * part[3, k]
+                    + p4 * part[4, k] + p5 * part[5, k] + p6 * part[6, k] + p7 * part[7, k]
+                )  # fmt: skip
+        for k in range(BLOCK_NODES):
+            weight[b, k] = max(weight[b, k], _0) * evenly[b, k]
+
+
+@fast_kernel
+def product_weights(
+    group_starts: npt.NDArray[np.uint32],
+    cell_groups: npt.NDArray[np.uint32],
+    groups: npt.NDArray[np.uint32],
+    density_x: Float32,
+    density_y: Float32,
+    columns: npt.NDArray[np.uint32],
+    rows: npt.NDArray[np.uint32],
+    ends: int,
+    share: np.float32,
+    weight: Float32,
+) -> None:
+    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a group's touched cells."""
+    for pick in rows:
+        for end in columns:
+            cell = pick * np.uint32(ends) + end
+            for c in range(group_starts[cell], group_starts[cell + np.uint32(1)]):
+                group = groups[cell_groups[np.uint32(c)]]
+                # Rules follow each other, COLUMNS numbers each.
+                at_x, at_y = group[RULE_X] * np.uint32(COLUMNS), group[RULE_Y] * np.uint32(COLUMNS)
+                across, along = density_x[end, at_x : at_x + COLUMNS], density_y[pick, at_y : at_y + COLUMNS]
+                if group[GROUP_FAMILY] == WEFT:
+                    along, across = across, along
+                start = group[START] // np.uint32(COLUMNS)
+                for j in range(group[LINES]):
+                    factor, own = share * along[j], weight[start + j]
+                    for k in range(COLUMNS):
+                        own[k] += factor * across[k]
+
 
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
@@ -37,11 +199,10 @@ _WAVE: Final = 2.3
 _DENSITIES: Final = 100.0
 _DENSITY: Final = 0.25
 _PRODUCT: Final = 6.0
-_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
 @inlined_kernel
-def _mix_densities(table: Table, scratch: Scratch, look: Look, widest: float) -> None:
+def _mix_densities(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: float) -> None:
     """Write the weights of all nodes as products of densities along both axes, a mixture for a rotated footprint."""
     ends, rho = table.repeat[0], look.rho
     blur = np.sqrt(_1 - abs(rho))
@@ -67,7 +228,7 @@ def _mix_densities(table: Table, scratch: Scratch, look: Look, widest: float) ->
 
 
 @kernel
-def _waves_pay(table: Table, look: Look, widest: float) -> bool:
+def _waves_pay(table: SoftNodeTable, look: SoftQuery, widest: float) -> bool:
     """Return whether waves take less time than densities."""
     waves = _WAVES + _WAVE * waves_kept(table.wave_size, look.narrowest) * len(table.evenly)
     blur = np.sqrt(_1 - abs(look.rho))
@@ -80,18 +241,18 @@ def _waves_pay(table: Table, look: Look, widest: float) -> bool:
 
 
 @inlined_kernel
-def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result: Float32) -> np.float32:
-    """Write the sums of each kind of yarn (K, SUMS), and return the area seen through gaps.
+def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: float, result: Float32) -> np.float32:
+    """Write the sums of each kind of yarn (K, NODE_SUMS), and return the area seen through gaps.
 
     Parameters
     ----------
-    table, scratch : Table, Scratch
+    table, scratch : SoftNodeTable, Scratch
         The cloth, and memory for its queries.
-    look : Look
+    look : SoftQuery
         The query.
     widest : float
         Deviation from which on an axis is even.
-    result : float32 (K, SUMS)
+    result : float32 (K, NODE_SUMS)
         Written.
     """
     shares = scratch.weight
@@ -119,11 +280,11 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         alpha, blend = table.yarn[family, ALPHA], table.yarn[family, BLEND]
         if look.iz < _0:
-            light = Horizons(
+            light = NodeHorizons(
                 table.behind_mean[look.low_i, a:b], table.behind_mean[look.high_i, a:b],
                 table.behind_sharpness[near_i, a:b], look.turn_i,
             )  # fmt: skip
-            viewer = Horizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
+            viewer = NodeHorizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
             through = shade_fixed_behind(
                 table.nodes[a:b], shares[a:b], light, viewer, d, alpha, np.float32(table.thickness), blend
             )
@@ -135,7 +296,7 @@ def sum_fixed(table: Table, scratch: Scratch, look: Look, widest: float, result:
             table.sharpness[near_i, a:b], look.turn_i, mean[low_o, a:b], mean[high_o, a:b],
             table.sharpness[near_o, a:b], look.turn_o, d, alpha, np.float32(table.thickness), blend,
         )  # fmt: skip
-        for q in range(SUMS):
+        for q in range(NODE_SUMS):
             result[kind, q] = found[q]
     a, b = table.starts[kinds], table.starts[kinds + 1]
     if b == a:

@@ -1,9 +1,9 @@
 """The components of queries: four reads of each cluster's tables, and one evaluation of the point model.
 
 A footprint has the nearest level, read bilinearly; one smaller than those of the first level, a sixteenth of a yarn or
-more (tables), is answered as that. A long one is the mean of up to `TAPS` round ones along its longer axis. Components
-are sums over clusters, divided by the seen area, as those of points are; patches of which hardly anything is seen fade
-to 0, as in the truth.
+more (tables), is answered as that. A long one is the mean of up to `MOST_TAPS` round ones along its longer axis.
+Components are sums over clusters, divided by the seen area, as those of points are; patches of which hardly anything is
+seen fade to 0, as in the truth.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.soft_horizons import ramp
-from pipeline.analytic.soft_nodes.diamond import around
+from pipeline.analytic.gauss_rules import taps
+from pipeline.analytic.soft_horizons import around, ramp
 from pipeline.analytic.soft_nodes.shade import directions
-from pipeline.analytic.summed_area.levels import STEPS
 from pipeline.analytic.summed_area.shade import (
     CORNERS,
     Azimuth,
@@ -25,16 +24,15 @@ from pipeline.analytic.summed_area.shade import (
     over_horizon,
     sum_clusters,
 )
-from pipeline.analytic.summed_area.tables import AZIMUTHS, Tables
-from pipeline.analytic.taps import taps
+from pipeline.analytic.summed_area.tables import OCTAVE_STEPS, TEXEL_AZIMUTHS, ClusterTables
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
 from pipeline.truth.query import Queries
 
-TAPS: Final = 12
+MOST_TAPS: Final = 12
 """Most round footprints in place of a long one."""
 
-_PLACES: Final = taps(TAPS)
+_PLACES: Final = taps(MOST_TAPS)
 _DENSE = 1.5  # round footprints a ratio of the axes of 1
 _ROUND = 1.02  # ratio of the axes up to which a footprint is round
 
@@ -44,7 +42,7 @@ _TINY = np.float32(1e-18)
 _FADED = np.float32(2e-3)  # seen share of the area at which components have faded to a half
 
 
-class Window(NamedTuple):
+class TexelWindow(NamedTuple):
     """Texels around a centre, int64 (CORNERS,), and their weights."""
 
     texels: Index
@@ -80,9 +78,9 @@ def rounds(queries: Queries) -> Rounds:
     major, minor = queries.sigma.astype(np.float64), queries.sigma_minor.astype(np.float64)
     major, minor = np.maximum(major, minor), np.minimum(major, minor)
     angle = queries.angle + np.where(queries.sigma < queries.sigma_minor, 0.5 * math.pi, 0.0)
-    minor = np.maximum(minor, major * (_DENSE / TAPS))
+    minor = np.maximum(minor, major * (_DENSE / MOST_TAPS))
     ratio = major / minor
-    count = np.where(ratio > _ROUND, np.clip(np.ceil(_DENSE * ratio), 2, TAPS), 1).astype(np.int64)
+    count = np.where(ratio > _ROUND, np.clip(np.ceil(_DENSE * ratio), 2, MOST_TAPS), 1).astype(np.int64)
     spread = np.where(count > 1, np.sqrt(np.maximum(major**2 - minor**2, 0.0)), 0.0)
     columns = (queries.u, queries.v, np.where(count > 1, minor, np.sqrt(major * minor)), np.cos(angle), np.sin(angle))
     u, v, sigma, cosine, sine, spread, wi, wo = (
@@ -91,7 +89,7 @@ def rounds(queries: Queries) -> Rounds:
     return Rounds(u, v, sigma, cosine, sine, count, spread, wi, wo)
 
 
-def answer(tables: Tables, queries: Queries) -> Float32:
+def answer(tables: ClusterTables, queries: Queries) -> Float32:
     """Return the components of N queries about flat cloth, light and viewer in front, (N, 4)."""
     return _answer(tables, rounds(queries), _PLACES)
 
@@ -102,19 +100,19 @@ def azimuth(x: np.float32, y: np.float32) -> Azimuth:
     fine, _, turn = around(x, y)
     low = fine >> 1
     turn = _HALF * (np.float32(fine & 1) + turn)
-    high = low + 1 if low + 1 < AZIMUTHS else 0
+    high = low + 1 if low + 1 < TEXEL_AZIMUTHS else 0
     return Azimuth(low, high, high if turn > _HALF else low, turn)
 
 
 @inlined_kernel
-def level_of(tables: Tables, sigma: np.float32) -> int:
+def level_of(tables: ClusterTables, sigma: np.float32) -> int:
     """Return the level nearest to a deviation, by ratio."""
     octaves = math.log2(max(np.float64(sigma), tables.finest) / tables.finest)
-    return min(int(octaves * STEPS + 0.5), len(tables.levels) - 1)
+    return min(int(octaves * OCTAVE_STEPS + 0.5), len(tables.levels) - 1)
 
 
 @inlined_kernel
-def find(tables: Tables, level: int, x: float, y: float, texels: Index, weights: Float32) -> None:
+def find(tables: ClusterTables, level: int, x: float, y: float, texels: Index, weights: Float32) -> None:
     """Write the texels around a place, (CORNERS,), and their weights."""
     first, n, shift = tables.levels[level, 0], tables.levels[level, 1], tables.levels[level, 2]
     weights[:] = _0
@@ -143,7 +141,7 @@ def find(tables: Tables, level: int, x: float, y: float, texels: Index, weights:
 
 
 @inlined_kernel
-def touched(tables: Tables, texels: Index, first: int, last: int, slots: Slots) -> int:
+def touched(tables: ClusterTables, texels: Index, first: int, last: int, slots: Slots) -> int:
     """List the blocks from `first` to `last` that any texel has: (n, CORNERS); return how many."""
     count = 0
     for block in range(first, last):
@@ -159,7 +157,7 @@ def touched(tables: Tables, texels: Index, first: int, last: int, slots: Slots) 
 
 @inlined_kernel
 def gap_area(
-    tables: Tables, texels: Index, weights: Float32, o: Azimuth, oz: np.float32
+    tables: ClusterTables, texels: Index, weights: Float32, o: Azimuth, oz: np.float32
 ) -> tuple[np.float32, np.float32]:
     """Return area and seen area of gaps, over that of the cloth."""
     area, low, width = _0, _0, _0
@@ -174,10 +172,10 @@ def gap_area(
 
 
 @allocating_kernel
-def _answer(tables: Tables, queries: Rounds, places: Float64) -> Float32:
+def _answer(tables: ClusterTables, queries: Rounds, places: Float64) -> Float32:
     """Return the components of all queries."""
     result = np.zeros((len(queries.u), 4), np.float32)
-    window = Window(np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32))
+    window = TexelWindow(np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32))
     slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
     _answer_rows(tables, queries, places, window, slots, result)
     return result
@@ -186,7 +184,7 @@ def _answer(tables: Tables, queries: Rounds, places: Float64) -> Float32:
 # Not in `_answer`: what allocates counts references to every slice.
 @kernel
 def _answer_rows(
-    tables: Tables, queries: Rounds, places: Float64, window: Window, slots: Slots, result: Float32
+    tables: ClusterTables, queries: Rounds, places: Float64, window: TexelWindow, slots: Slots, result: Float32
 ) -> None:
     """Write the components of all queries; `window` and `slots` are scratch memory."""
     texels, weights = window

@@ -12,12 +12,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pipeline.analytic import soft_horizons
 from pipeline.analytic.gauss_rules import grid_edges, grid_middles
 from pipeline.analytic.horizon_points.horizon_map import HorizonMap, slot_of
-from pipeline.analytic.soft_nodes import diamond
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.truth.geometry.heightfield import BETA, GAP, RADIUS, WARP, HeightField
-from pipeline.truth.geometry.pieces import Piece, cell_pieces
+from pipeline.truth.geometry.pieces import CellPiece, cell_pieces
 
 LANES: Final = 8
 """Clusters of a block: parts across a yarn."""
@@ -33,7 +33,7 @@ class Patch(NamedTuple):
 
     Attributes
     ----------
-    piece : Piece
+    piece : CellPiece
         Its place within a cell.
     surface : float64 (G, G)
         Area of the surface over that of the plane.
@@ -43,14 +43,14 @@ class Patch(NamedTuple):
         Sine of the horizon's elevation, at every other azimuth of soft nodes.
     """
 
-    piece: Piece
+    piece: CellPiece
     surface: Float64
     v: Float64
     u: Float64
     horizon: Float64
 
 
-class Source(NamedTuple):
+class PlacedPatch(NamedTuple):
     """A patch at a cell (pick, end) of the repeat; `block` is its number in the horizon map."""
 
     pick: int
@@ -58,7 +58,7 @@ class Source(NamedTuple):
     block: int
 
 
-def sources(field: HeightField, table: HorizonMap) -> tuple[list[Source], dict[int, Patch]]:
+def sources(field: HeightField, table: HorizonMap) -> tuple[list[PlacedPatch], dict[int, Patch]]:
     """Return all pieces of the repeat, and the patch of each block of the horizon map."""
     picks, ends = field.top.shape
     size = table.azimuths * table.grid**2
@@ -71,16 +71,16 @@ def sources(field: HeightField, table: HorizonMap) -> tuple[list[Source], dict[i
             key = block if piece.family != GAP else -1 - 4 * block - 2 * (piece.across[0] > 0) - (piece.along[0] > 0)
             if key not in patches:
                 patches[key] = _patch(field, table, piece, block)
-            found.append(Source(pick, end, key))
+            found.append(PlacedPatch(pick, end, key))
     return found, patches
 
 
-def _patch(field: HeightField, table: HorizonMap, piece: Piece, block: int) -> Patch:
+def _patch(field: HeightField, table: HorizonMap, piece: CellPiece, block: int) -> Patch:
     """Return the surface at the nodes of a block."""
     grid, azimuths = table.grid, table.azimuths
     size = azimuths * grid * grid
     evenly = table.horizon[block * size : (block + 1) * size].reshape(azimuths, -1).astype(np.float64)
-    horizon = diamond.from_even(evenly)[::2].reshape(-1, grid, grid)
+    horizon = soft_horizons.from_even(evenly)[::2].reshape(-1, grid, grid)
     if piece.family == GAP:
         none = np.zeros((grid, grid))
         return Patch(piece, none + 1.0, none, none, np.broadcast_to(horizon[:, :1, :1], horizon.shape))
@@ -101,7 +101,7 @@ def _patch(field: HeightField, table: HorizonMap, piece: Piece, block: int) -> P
 
 
 def blocks_of(
-    found: list[Source], patches: dict[int, Patch], count: int
+    found: list[PlacedPatch], patches: dict[int, Patch], count: int
 ) -> tuple[dict[int, Index], tuple[int, int, int]]:
     """Return the block of each slice of each patch, (G,), and where warps and wefts begin and end among the blocks.
 

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import ramp
-from pipeline.analytic.soft_nodes.shade import Directions, Eight, shade_node
+from pipeline.analytic.soft_nodes.shade import Eight, YarnDirections, shade_node
 from pipeline.analytic.summed_area.clusters import LANES
-from pipeline.analytic.summed_area.tables import AREA, LEVELS, MEAN, SPREAD, SPREAD_U, SPREAD_V, SPREADS, U, V
+from pipeline.analytic.summed_area.tables import AREA, MEAN, MEAN_SCALE, SPREAD, SPREAD_SCALE, SPREAD_U, SPREAD_V, U, V
 from pipeline.analytic.torus_frame import Angles, Fibre, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel
@@ -29,9 +29,9 @@ Four = tuple[np.float32, np.float32, np.float32, np.float32]
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _TINY = np.float32(1e-18)
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a cluster; 1 / (4 pi) of the density
-_ONE_LEVEL = _1 / LEVELS
+_ONE_LEVEL = _1 / MEAN_SCALE
 # Width of a ramp: a share of that of an even distribution, sqrt 12 standard deviations, and a least one.
-_WIDTH = np.float32(0.8 * math.sqrt(12.0)) / SPREADS
+_WIDTH = np.float32(0.8 * math.sqrt(12.0)) / SPREAD_SCALE
 _SHARPEST = np.float32(0.02)
 # A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
 _TAIL = np.float32(0.001)
@@ -106,7 +106,7 @@ def _evaluate(
     width_i: np.float32,
     low_o: np.float32,
     width_o: np.float32,
-    d: Directions,
+    d: YarnDirections,
     own: Optics,
 ) -> Eight:
     """Return a cluster's sums as `shade_node` does, from its sums over the texels."""
@@ -141,7 +141,7 @@ def _cluster(
     weights: Four,
     i: Azimuth,
     o: Azimuth,
-    d: Directions,
+    d: YarnDirections,
     own: Optics,
 ) -> Eight:
     """Return the sums of cluster k of a block."""
@@ -165,7 +165,7 @@ def sum_clusters(
     weights: Four,
     i: Azimuth,
     o: Azimuth,
-    d: Directions,
+    d: YarnDirections,
     yarn: Float32,
     thickness: np.float32,
 ) -> Four:

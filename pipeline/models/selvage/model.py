@@ -37,7 +37,7 @@ from pipeline.analytic.soft_nodes.features import (
     cloth_features,
     read_queries,
 )
-from pipeline.analytic.soft_nodes.nodes import Table, tabulate
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import CHUNK, Batch
 from pipeline.models.networks.perceptron import Layer
@@ -185,7 +185,7 @@ class SelvageNetwork(nn.Module):
 class _Cloth(NamedTuple):
     """A fabric's table, and the biases of the first layers of the correction and of the estimate."""
 
-    table: Table
+    table: SoftNodeTable
     bias: Tensor
     estimate_bias: Tensor
 

@@ -15,10 +15,9 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.behind import read_behind
-from pipeline.analytic.soft_nodes.detail import USUAL
-from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.nodes import Table, tabulate
+from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.groups import USUAL
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.models.method import CHUNK
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.plain import refuse_other
@@ -77,7 +76,7 @@ class SoftNodes:
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
         return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
 
-    def table_for(self, fabric: Fabric, queries: Queries) -> Table:
+    def table_for(self, fabric: Fabric, queries: Queries) -> SoftNodeTable:
         """Return the smallest table that knows all queries; every table answers what it knows by the same bits."""
         if (queries.curvature > 0.0).any():
             return self._curved.of(fabric)

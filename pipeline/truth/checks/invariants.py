@@ -1,7 +1,8 @@
 """Physical invariants of a fabric: reciprocity, energy, periodicity, agreement of the estimators.
 
-Every test returns check results: measured value, expected value, and whether both agree
-(pipeline.truth.checks.check_result).
+Every check returns measured value, expected value, and whether both agree: exactly, within the statistical error, or
+not. A number without statistical error passes if it equals its expected value up to rounding. Many numbers with errors
+pass if Student's t of the worst stays below the quantile of `SIGNIFICANCE`, with Sidak's correction for their number.
 """
 
 from __future__ import annotations
@@ -10,27 +11,115 @@ import itertools
 import math
 from collections.abc import Callable
 from itertools import product
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+from scipy import stats
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel
-from pipeline.truth.checks.check_result import ROUNDING, CheckResult, exact, largest, quotient, worst
-from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions, ratios
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering.microflake import density, sigma
 from pipeline.truth.scattering.point import point_share
-from pipeline.truth.scattering.slab import reflection, transmission
+from pipeline.truth.scattering.slab import density, reflection, sigma, transmission
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.surface import GAP as NO_YARN
 from weaves.surface import surface_at
+
+SIGNIFICANCE: Final = 1e-4
+"""Probability that a check fails although the invariant holds."""
+
+ROUNDING: Final = 2e-6
+"""Relative error of a few operations on answers in single precision."""
+
+
+class CheckResult(NamedTuple):
+    """A measured number, its expected value, and whether both agree.
+
+    Attributes
+    ----------
+    name : str
+        Measured quantity.
+    measured, expected, standard_error : float
+        Measured number, expected value, and standard error, which is 0 for an exact number.
+    relation : str
+        Expected relation of the number to the expected value; ``reported``: there is no expected value.
+    status : str
+        ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
+    note : str
+        Remark, shown in the table.
+    """
+
+    name: str
+    measured: float
+    expected: float
+    standard_error: float
+    relation: Literal["=", "<=", "reported"]
+    status: Literal["exact", "statistics", "broken", "reported"]
+    note: str
+
+    @property
+    def sigmas(self) -> float:
+        """Distance from the expected value in standard errors; 0 for an exact number."""
+        return (self.measured - self.expected) / self.standard_error if self.standard_error else 0.0
+
+
+def exact(
+    name: str, measured: float, expected: float, tolerance: float, relation: Literal["=", "<="] = "=", note: str = ""
+) -> CheckResult:
+    """Check a number without statistical error; NaN is broken."""
+    beyond = measured - expected if relation == "<=" else abs(measured - expected)
+    return CheckResult(name, measured, expected, 0.0, relation, "exact" if beyond <= tolerance else "broken", note)
+
+
+def worst(
+    name: str,
+    measured: npt.ArrayLike,
+    expected: float,
+    errors: npt.ArrayLike,
+    freedom: int,
+    relation: Literal["=", "<="] = "=",
+    note: str = "",
+) -> CheckResult:
+    """Check many numbers; the result is that of the number furthest off, in its standard errors.
+
+    Parameters
+    ----------
+    measured, errors : float (N,)
+        The numbers and their standard errors.
+    freedom : int
+        Degrees of freedom of the errors.
+    """
+    values, spread = np.broadcast_arrays(np.atleast_1d(np.asarray(measured, np.float64)), np.asarray(errors))
+    # Rounding counts as error too: two sums of the same points differ by it and by nothing else.
+    beyond = (values - expected) / (spread + ROUNDING * max(abs(expected), 1e-3))
+    score = beyond if relation == "<=" else np.abs(beyond)
+    row = int(np.argmax(np.where(np.isnan(score), np.inf, score)))
+    level = 1.0 - (1.0 - SIGNIFICANCE) ** (1.0 / len(values))
+    limit = float(stats.t.isf(level if relation == "<=" else level / 2.0, freedom))
+    holds = bool(score[row] <= limit)
+    note = note or (f"worst of {len(values)}, limit {limit:.1f} σ" if len(values) > 1 else "")
+    status: Literal["statistics", "broken"] = "statistics" if holds else "broken"
+    return CheckResult(name, float(values[row]), expected, float(spread[row]), relation, status, note)
+
+
+def quotient(first: npt.ArrayLike, second: npt.ArrayLike) -> Float64:
+    """Return first / second, and 1 where they are equal, 0 / 0 included."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.equal(first, second), 1.0, np.divide(first, second, dtype=np.float64))
+
+
+def largest(values: Float64) -> float:
+    """Return the greatest modulus; NaN if there is one."""
+    return float(np.abs(values).max())
+
 
 _SEED = 20_250_101
 _STEPS = 128  # directions of light in each randomisation of a furnace
@@ -248,7 +337,7 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
 @allocating_kernel
 def _lattice(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     row: int,
     side: int,
     shifts: Float64,
@@ -258,7 +347,7 @@ def _lattice(
 ) -> float:
     """Average a query over the repeat by shifted square lattices; write the components, return the coloured whole."""
     picks, ends = cloth.front.top.shape
-    directions, sums, coloured = query_directions(columns, row), np.zeros((RANDOMISATIONS, SUMS)), 0.0
+    directions, sums, coloured = query_directions(columns, row), np.zeros((RANDOMISATIONS, POINT_SUMS)), 0.0
     for r in range(RANDOMISATIONS):
         for a in range(side * ends):
             for b in range(side * picks):
@@ -266,13 +355,13 @@ def _lattice(
                 family, area, specular, diffuse, _ = point_share(
                     cloth.front, cloth.back, x, y, directions, cloth.choices
                 )
-                sums[r, AREA] += area
+                sums[r, AREA_SUM] += area
                 if family != GAP:
                     sums[r, family] += specular
                     sums[r, 2 + family] += diffuse
                     coloured += colours[family] * specular + colours[2 + family] * diffuse
     ratios(sums, mean, error)
-    return float(coloured / sums[:, AREA].sum())
+    return float(coloured / sums[:, AREA_SUM].sum())
 
 
 def translation(fabric: Fabric) -> list[CheckResult]:

@@ -1,1 +1,1 @@
-"""Points of the repeat under a footprint, and their weights: place, masses, mixture (rotated ellipses), sequences."""
+"""Points of the repeat under a footprint, and their weights: place, mixture (rotated ellipses), sequences."""

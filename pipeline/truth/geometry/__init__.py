@@ -1,5 +1,5 @@
 """Geometry of one repeat: heightfield (surface), visibility (shadows and masking), horizon, opacity.
 
-horizon tabulates visibility; opacity is that of curved cloth. pieces and symmetry find the different parts of a repeat;
-gloss varies the specular colour from float to float; march and azimuths are shared helpers.
+horizon tabulates visibility; opacity is that of curved cloth. pieces finds the different parts of a repeat; march is
+shared by all rays.
 """

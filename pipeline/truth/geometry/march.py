@@ -1,11 +1,11 @@
-"""The endless cloth: positions wrapped into its repeat, and the march of a ray from cell to cell."""
+"""The endless cloth: positions wrapped into its repeat, rays that march from cell to cell, azimuths of tables."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from pipeline.compiled.decorators import inlined_kernel
+from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import OFFSET, RADIUS, TOP, WARP, HeightField, span_over
 
 
@@ -90,3 +90,11 @@ def span_on_top(
     low, high = span_over(field, family, x, y, dx, dy, start, stop, cell.column, cell.row)
     enter = min(low, stop)
     return enter, max(high, enter)
+
+
+@kernel
+def azimuth_rows(x: float, y: float, count: int) -> tuple[int, int, float]:
+    """Return the two of `count` azimuths, even from +x counter-clockwise, around a direction, and its place between."""
+    place = math.atan2(y, x) / (2.0 * math.pi) * count
+    row = math.floor(place)
+    return int(row) % count, int(row + 1) % count, place - row

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
 from pipeline.truth.geometry.march import wrap
@@ -118,7 +118,7 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
 @allocating_kernel
 def _opacity_rows(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     index: Index,
     tolerance: float,
     min_count: int,

@@ -1,12 +1,19 @@
-"""Pieces: the rectangles of a cell as seen from above, each with one surface.
+"""Parts of a repeat: the rectangles of a cell that have one surface, and the cells that differ.
 
-A cell shows its top yarn; if that yarn is narrow, also the yarn beneath on either side, and gaps in the corners.
+A cell shows its top yarn; if that yarn is narrow, also the yarn beneath on either side, and gaps in the corners. A
+satin of 8 ends has 64 cells a repeat, of which 8 differ: cells that a translation carries into one another form an
+orbit, and their pieces, horizons and nodes are those of one of them.
 """
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import Final, NamedTuple
 
+import numpy as np
+
+from pipeline.compiled.arrays import Mask
 from pipeline.truth.geometry.heightfield import (
     BEND_RADIUS,
     GAP,
@@ -24,7 +31,7 @@ _NONE: Final = 1e-6  # width of margins, in yarn spacings, that are not there
 Extent = tuple[float, float]
 
 
-class Piece(NamedTuple):
+class CellPiece(NamedTuple):
     """A rectangle of a cell with one surface; x runs across a warp and along a weft, and across a gap.
 
     Attributes
@@ -70,25 +77,25 @@ class Piece(NamedTuple):
         return (self.radius, 0.0) if self.family in (WARP, GAP) else (0.0, self.radius)
 
 
-def cell_pieces(field: HeightField, pick: int, end: int) -> list[Piece]:
+def cell_pieces(field: HeightField, pick: int, end: int) -> list[CellPiece]:
     """Return everything seen from above in a cell: the yarn on top, the one beneath, low side first, then gaps."""
     top = int(field.top[pick, end])
     beneath = 1 - top
     radius, radius_beneath = float(field.yarn[top, RADIUS]), float(field.yarn[beneath, RADIUS])
 
-    def on_yarn(family: int, side: int, radius: float, along: Extent) -> Piece:
+    def on_yarn(family: int, side: int, radius: float, along: Extent) -> CellPiece:
         own = field.floats[pick, end, side]
         bend = float(own[BEND_RADIUS])
         curve = 1.0 / bend if bend else 0.0
         across = (0.5 - radius, 0.5 + radius)
-        return Piece(family, side, across, along, radius, float(own[OFFSET]), curve, float(own[HALF_LENGTH]))
+        return CellPiece(family, side, across, along, radius, float(own[OFFSET]), curve, float(own[HALF_LENGTH]))
 
     found = [on_yarn(top, TOP, radius, (0.0, 1.0))]
     found += [on_yarn(beneath, UNDER, radius_beneath, margin) for margin in _margins(radius)]
     for margin in _margins(radius):
         for gap in _margins(radius_beneath):
             x, y = (margin, gap) if top == WARP else (gap, margin)
-            found.append(Piece(GAP, UNDER, x, y, 0.0, 0.0, 0.0, 0.5))
+            found.append(CellPiece(GAP, UNDER, x, y, 0.0, 0.0, 0.0, 0.5))
     return found
 
 
@@ -96,3 +103,65 @@ def _margins(radius: float) -> list[Extent]:
     """Return the extents on both sides of a yarn that it does not cover."""
     width = 0.5 - radius
     return [(0.0, width), (1.0 - width, 1.0)] if width > _NONE else []
+
+
+Cell = tuple[int, int]
+"""A cell of the repeat, (pick, end)."""
+
+
+def translations(field: HeightField) -> tuple[Cell, ...]:
+    """Return the shifts by picks and ends that map the cloth onto itself; (0, 0) is the first."""
+    return _translations(field.top.shape, field.top.tobytes(), field.floats.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _translations(shape: Cell, top: bytes, floats: bytes) -> tuple[Cell, ...]:
+    """Return the shifts; the bytes are those of `HeightField.top` and `HeightField.floats`."""
+    cells = np.frombuffer(top, np.int8).reshape(shape)
+    of_cells = np.frombuffer(floats, np.float64).reshape(*shape, -1)
+    return tuple(
+        shift
+        for shift in np.ndindex(shape)
+        if np.array_equal(np.roll(cells, shift, (0, 1)), cells)
+        and np.array_equal(np.roll(of_cells, shift, (0, 1)), of_cells)
+    )
+
+
+def orbits(field: HeightField) -> list[list[Cell]]:
+    """Return the cells of the repeat in orbits, each orbit from its first cell on."""
+    picks, ends = field.top.shape
+    shifts = translations(field)
+    left = dict.fromkeys(np.ndindex(picks, ends))
+    found = []
+    while left:
+        pick, end = next(iter(left))
+        found.append([((pick + p) % picks, (end + e) % ends) for p, e in shifts])
+        for cell in found[-1]:
+            del left[cell]
+    return found
+
+
+def different_cells(field: HeightField) -> int:
+    """Return the number of orbits."""
+    return field.top.size // len(translations(field))
+
+
+def first_cells(field: HeightField) -> Mask:
+    """Return for each cell, (picks, ends), whether it is the first of its orbit."""
+    first = np.zeros(field.top.shape, np.bool_)
+    for orbit in orbits(field):
+        first[orbit[0]] = True
+    return first
+
+
+def longest_period(field: HeightField) -> float:
+    """Return the longest wavelength of a function with the cloth's translations, in yarn spacings."""
+    picks, ends = field.top.shape
+    shifts = translations(field)
+    shortest = min(
+        math.hypot(m / ends, n / picks)
+        for m in range(ends + 1)
+        for n in range(-picks, picks + 1)
+        if (m or n) and all((m * e * picks + n * p * ends) % (ends * picks) == 0 for p, e in shifts)
+    )
+    return 1.0 / shortest

@@ -1,7 +1,6 @@
 """The estimators `node_table` and `auto`: sums over tabulated nodes with exact horizons.
 
-cascade is `auto`: a coarse table, a fine one, sampling. tables keeps the nodes of the last cloths; build makes them.
-answer sums over nodes for each query. doubts says which nodes may be wrong, refine integrates those, cut a row through
-one of them. weights spreads a footprint over nodes; kernels has the loops over nodes, shares their arrays, directions
-the light and viewer.
+tables keeps the nodes of the last cloths; build makes them. answer sums over nodes for each query. doubts says which
+nodes may be wrong, refine integrates those, cut a row through one of them. weights spreads a footprint over nodes;
+kernels has the loops over nodes and their arrays.
 """

@@ -17,29 +17,39 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
 from pipeline.truth.calibration import Factors, standard_error
-from pipeline.truth.cloth import ClothSide, Columns
-from pipeline.truth.footprint.hidden import conceal
+from pipeline.truth.cloth import ClothSide, WideQueries
 from pipeline.truth.footprint.mixture import Line
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.footprint.sequences import derive
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP
-from pipeline.truth.monte_carlo import query_directions
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE, FINE_START, ROWS, START, Table
-from pipeline.truth.node_table.directions import NodeDirections, node_directions
+from pipeline.truth.monte_carlo import conceal, query_directions
+from pipeline.truth.node_table.build import (
+    FINE_COUNT,
+    FIRST_FINE,
+    FIRST_NODE,
+    NODES_X,
+    NODES_Y,
+    PIECE_FAMILY,
+    ExactNodes,
+)
 from pipeline.truth.node_table.doubts import doubtful_from
 from pipeline.truth.node_table.kernels import (
-    Horizons,
-    Layer,
+    FlakeLayer,
+    HorizonSlopes,
+    NodeDirections,
+    NodeShares,
     Normals,
     Tangents,
     borders,
     crossing,
+    no_shares,
+    node_directions,
     reflected,
     transmitted,
     weigh,
+    with_weight,
 )
 from pipeline.truth.node_table.refine import UNSEEN, RefineRoom, refine, refine_room
-from pipeline.truth.node_table.shares import NodeShares, no_shares, with_weight
 from pipeline.truth.node_table.weights import any_weight, fill_weights
 
 _ROWS: Final = (2, 4, 8)
@@ -98,8 +108,8 @@ class _Found(NamedTuple):
 @allocating_kernel
 def sum_rows(
     cloth: ClothSide,
-    table: Table,
-    columns: Columns,
+    table: ExactNodes,
+    columns: WideQueries,
     index: Index,
     requested: Requested,
     seed: np.uint64,
@@ -132,8 +142,8 @@ def sum_rows(
 @kernel
 def _answer_rows(
     cloth: ClothSide,
-    table: Table,
-    columns: Columns,
+    table: ExactNodes,
+    columns: WideQueries,
     index: Index,
     requested: Requested,
     seed: np.uint64,
@@ -155,8 +165,8 @@ def _answer_rows(
 @kernel
 def _answer_row(
     cloth: ClothSide,
-    table: Table,
-    columns: Columns,
+    table: ExactNodes,
+    columns: WideQueries,
     row: int,
     key: np.uint64,
     requested: Requested,
@@ -233,7 +243,7 @@ def _squared_norm(components: Float64) -> float:
 @kernel
 def _sum_pieces(
     cloth: ClothSide,
-    table: Table,
+    table: ExactNodes,
     towards: NodeDirections,
     shares: NodeShares,
     sums: Float64,
@@ -254,7 +264,12 @@ def _sum_pieces(
     moved[:] = 0.0
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
-        start, across, count, family = piece[START], piece[COLUMNS], piece[COLUMNS] * piece[ROWS], piece[FAMILY]
+        start, across, count, family = (
+            piece[FIRST_NODE],
+            piece[NODES_X],
+            piece[NODES_X] * piece[NODES_Y],
+            piece[PIECE_FAMILY],
+        )
         stop = start + count
         if not any_weight(shares.weight[start:stop]):
             continue
@@ -307,23 +322,23 @@ def _sum_pieces(
 
 @inlined_kernel
 def _weigh_piece(
-    cloth: ClothSide, table: Table, towards: NodeDirections, piece: Index, normal: Normals, shares: NodeShares
+    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, piece: Index, normal: Normals, shares: NodeShares
 ) -> tuple[np.float32, np.float32]:
     """Write which nodes of a piece are visible and lit; return its sums of area and of diffuse shares.
 
     The straight way through a gap must clear both sides of the cloth, so a gap is lit by its own ray.
     """
-    gap = piece[FAMILY] == GAP
-    start, stop = piece[START], piece[START] + piece[COLUMNS] * piece[ROWS]
+    gap = piece[PIECE_FAMILY] == GAP
+    start, stop = piece[FIRST_NODE], piece[FIRST_NODE] + piece[NODES_X] * piece[NODES_Y]
     light, viewer = towards.through if gap else towards.light, towards.viewer
     slope = table.slope_behind if gap or towards.behind else table.slope
     return weigh(
         normal,
         light,
-        Horizons(slope[light.first, start:stop], slope[light.second, start:stop]),
+        HorizonSlopes(slope[light.first, start:stop], slope[light.second, start:stop]),
         viewer,
-        Horizons(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
-        np.float32(cloth.front.yarn[min(piece[FAMILY], 1), BLEND]),
+        HorizonSlopes(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
+        np.float32(cloth.front.yarn[min(piece[PIECE_FAMILY], 1), BLEND]),
         shares,
     )
 
@@ -331,7 +346,7 @@ def _weigh_piece(
 @inlined_kernel
 def _scatter(
     cloth: ClothSide,
-    table: Table,
+    table: ExactNodes,
     towards: NodeDirections,
     piece: Index,
     normal: Normals,
@@ -343,15 +358,15 @@ def _scatter(
 
     The unscattered light is added too. Returns the number of finer nodes visited beyond one a node.
     """
-    count, fine, family = piece[COLUMNS] * piece[ROWS], piece[FINE], piece[FAMILY]
+    count, fine, family = piece[NODES_X] * piece[NODES_Y], piece[FINE_COUNT], piece[PIECE_FAMILY]
     yarn = cloth.front.yarn[family]
-    layer = Layer(
+    layer = FlakeLayer(
         np.float32(yarn[ALPHA] ** 2),
         np.float32(cloth.front.thickness),
         np.float32(yarn[ALPHA] ** 3 / (4.0 * math.pi * fine)),
     )
     light, viewer = towards.light, towards.viewer
-    f0 = piece[FINE_START]
+    f0 = piece[FIRST_FINE]
     f1 = f0 + count
     tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
     sums[4] += crossing(normal, tangent, viewer, layer, shares.areas)

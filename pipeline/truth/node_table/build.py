@@ -30,19 +30,18 @@ from pipeline.truth.geometry.heightfield import (
     surface_at,
 )
 from pipeline.truth.geometry.horizon import horizons
-from pipeline.truth.geometry.pieces import cell_pieces
-from pipeline.truth.geometry.symmetry import longest_period, orbits
+from pipeline.truth.geometry.pieces import cell_pieces, longest_period, orbits
 
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
 _SIDE = 0.25  # share of a node by which the last one along a yarn is cut in two
 _FADED = math.sqrt(math.log(5e4) / 2.0) / math.pi  # times the shortest period: a Gaussian whose waves are below 2e-5
 
-# Columns of `Table.pieces`.
-START, COLUMNS, ROWS, KIND_X, KIND_Y, FAMILY, FINE_START, FINE = range(8)
+# Columns of `ExactNodes.pieces`.
+FIRST_NODE, NODES_X, NODES_Y, EDGES_X, EDGES_Y, PIECE_FAMILY, FIRST_FINE, FINE_COUNT = range(8)
 
 
-class Table(NamedTuple):
+class ExactNodes(NamedTuple):
     """Nodes of one side of a cloth.
 
     Attributes
@@ -88,7 +87,7 @@ def tabulate(
     behind: bool,
     nodes: int,
     azimuths: int,
-) -> Table:
+) -> ExactNodes:
     """Build the table of one side of a cloth.
 
     Parameters
@@ -132,7 +131,7 @@ def tabulate(
     behind = behind or any(family == GAP for _, _, family, *_ in grids)
     slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
     pieces = np.array(rows, np.int64)
-    return Table(
+    return ExactNodes(
         repeat=np.array([ends, picks], np.int64),
         pieces=pieces,
         copies=np.array(copies, np.int64),

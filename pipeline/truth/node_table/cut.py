@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
-from pipeline.truth.cloth import AREA, SUMS, ClothSide
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.geometry.heightfield import GAP, UNDER, surface_at
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.scattering.point import Choices, Directions, lit_from_behind, point_share
@@ -76,7 +76,7 @@ class RowRoom(NamedTuple):
         Whether each place is hidden, seen, or seen and lit.
     parts : int64 (2 PLACES, 2)
         First and last place of parts not yet decided.
-    value : float64 (SUMS,)
+    value : float64 (POINT_SUMS,)
         The row's sums.
     """
 
@@ -88,7 +88,7 @@ class RowRoom(NamedTuple):
 @allocating_kernel
 def row_room() -> RowRoom:
     """Return room for a row."""
-    return RowRoom(np.zeros(PLACES, np.int64), np.zeros((2 * PLACES, 2), np.int64), np.zeros(SUMS))
+    return RowRoom(np.zeros(PLACES, np.int64), np.zeros((2 * PLACES, 2), np.int64), np.zeros(POINT_SUMS))
 
 
 @kernel
@@ -117,7 +117,7 @@ def add_row(cloth: ClothSide, directions: Directions, row: Row, known: Known, ro
                 if family != GAP and states[first] == _LIT:
                     value[family] += share * specular
                     value[2 + family] += share * diffuse
-                value[AREA] += share * (directions.viewer.z if cloth.projected else area)
+                value[AREA_SUM] += share * (directions.viewer.z if cloth.projected else area)
         first = stop
     return tested
 

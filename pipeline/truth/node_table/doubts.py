@@ -16,9 +16,8 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, ROWS, START, Table
-from pipeline.truth.node_table.kernels import SMOOTH
-from pipeline.truth.node_table.shares import NodeShares
+from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
+from pipeline.truth.node_table.kernels import SMOOTH, NodeShares
 from pipeline.truth.node_table.weights import any_weight
 
 _LEFT: Final = 0.35
@@ -84,7 +83,7 @@ def no_doubts(nodes: int) -> Doubts:
 
 @kernel
 def doubtful_from(
-    table: Table, shares: NodeShares, mean: Float64, below: float, requested: float, doubts: Doubts
+    table: ExactNodes, shares: NodeShares, mean: Float64, below: float, requested: float, doubts: Doubts
 ) -> float:
     """Write the doubts of all nodes; return the score from which on a node is to be refined.
 
@@ -99,8 +98,8 @@ def doubtful_from(
     zero = math.frexp(whole)[1] - 1 - _MIDDLE
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
-        start, across, family = piece[START], piece[COLUMNS], piece[FAMILY]
-        stop = start + across * piece[ROWS]
+        start, across, family = piece[FIRST_NODE], piece[NODES_X], piece[PIECE_FAMILY]
+        stop = start + across * piece[NODES_Y]
         doubts.score[start:stop] = _0
         if not any_weight(shares.weight[start:stop]):
             continue
@@ -133,7 +132,7 @@ def doubtful_from(
 @kernel
 def _score(piece: Index, shares: NodeShares, specular: float, diffuse: float, doubts: Doubts) -> None:
     """Write half the doubts of each node's four links, and its error from curvature; two components of the patch."""
-    start, across, lines, gap = piece[START], piece[COLUMNS], piece[ROWS], piece[FAMILY] == GAP
+    start, across, lines, gap = piece[FIRST_NODE], piece[NODES_X], piece[NODES_Y], piece[PIECE_FAMILY] == GAP
     right, down = doubts.right, doubts.down
     s_mean, c_mean = np.float32(specular), np.float32(diffuse)
     for line in range(lines):
@@ -157,7 +156,7 @@ def _score(piece: Index, shares: NodeShares, specular: float, diffuse: float, do
 @kernel
 def _doubt_links(piece: Index, shares: NodeShares, mean: Float64, squares: float, doubts: Doubts) -> None:
     """Write the doubts of the links between the nodes of a piece, and the changes; `squares` is |mean|^2."""
-    start, across, lines, family = piece[START], piece[COLUMNS], piece[ROWS], piece[FAMILY]
+    start, across, lines, family = piece[FIRST_NODE], piece[NODES_X], piece[NODES_Y], piece[PIECE_FAMILY]
     stop = start + across * lines
     gap = family == GAP
     own = 0 if gap else family

@@ -1,33 +1,169 @@
-"""The flat loops over nodes in single precision: visibility, reflection, transmission, borders of shadows.
+"""Arrays with one float32 number a node, and the flat loops over them: visibility, reflection, transmission, borders.
 
-The formulas are those of `scattering.point` and `scattering.microflake`; the layer is `scattering.slab_float32`. Every
-array holds one number a node of a piece. The loops have no branch and no call left, so that vector units run them.
+The formulas are those of `scattering.point` and `scattering.slab`; the layer is `scattering.slab_float32`. Arrays are
+those of the nodes of one piece. The loops have no branch and no call left, so that vector units run them.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
-from pipeline.truth.node_table.directions import Direction
-from pipeline.truth.node_table.shares import NodeShares
+from pipeline.compiled.arrays import Float32, Float64
+from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
+from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
+
+_STEEPEST = 1e4
+_EDGE: Final = np.float32(0.01)
+_EDGE_JUMP: Final = np.float32(0.1)
+_0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_JUMP = np.float32(3.0)
+_TINY = np.float32(1e-30)
+
+
+class Direction(NamedTuple):
+    """A unit direction, and where horizons towards it stand in a table.
+
+    Attributes
+    ----------
+    x, y, z : float32
+        Components.
+    slope : float32
+        Rise per unit of distance in the fabric plane.
+    first, second : int
+        The two azimuths of the table around it.
+    turn : float32
+        Its place between them, 0 to 1.
+    """
+
+    x: np.float32
+    y: np.float32
+    z: np.float32
+    slope: np.float32
+    first: int
+    second: int
+    turn: np.float32
+
+
+class NodeDirections(NamedTuple):
+    """Directions of one query.
+
+    Attributes
+    ----------
+    behind : bool
+        Whether the light is behind the cloth.
+    light : Direction
+        wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane.
+    viewer : Direction
+        wo.
+    through : Direction
+        -wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it.
+    size : float32
+        1 / |wi + wo|^2.
+    """
+
+    behind: bool
+    light: Direction
+    viewer: Direction
+    through: Direction
+    size: np.float32
+
+
+@kernel
+def node_directions(wi: Float64, wo: Float64, azimuths: int) -> NodeDirections:
+    """Prepare unit directions, wo with z > 0, for a table with so many azimuths."""
+    behind = wi[2] < 0.0
+    sign = -1.0 if behind else 1.0
+    half = (wi[0] + wo[0]) ** 2 + (wi[1] + wo[1]) ** 2 + (wi[2] + wo[2]) ** 2
+    first, second, turn = azimuth_rows(wi[0], wi[1], azimuths)
+    light = Direction(
+        np.float32(sign * wi[0]),
+        np.float32(sign * wi[1]),
+        np.float32(sign * wi[2]),
+        _slope(wi),
+        first,
+        second,
+        np.float32(turn),
+    )
+    x, y, z, slope = np.float32(wo[0]), np.float32(wo[1]), np.float32(wo[2]), _slope(wo)
+    first, second, turn = azimuth_rows(wo[0], wo[1], azimuths)
+    viewer = Direction(x, y, z, slope, first, second, np.float32(turn))
+    first, second, turn = azimuth_rows(-wo[0], -wo[1], azimuths)
+    through = Direction(-x, -y, z, slope, first, second, np.float32(turn))
+    return NodeDirections(behind, light, viewer, through, np.float32(1.0 / max(half, 1e-12)))
+
+
+@kernel
+def _slope(w: Float64) -> np.float32:
+    """Return the rise of a direction, on either side of the cloth, bounded."""
+    return np.float32(min(abs(w[2]) / max(math.sqrt(w[0] * w[0] + w[1] * w[1]), 1e-9), _STEEPEST))
+
+
+class NodeShares(NamedTuple):
+    """Shares of the nodes in the sums of one query; overwritten for each query.
+
+    Attributes
+    ----------
+    weight : float32 (N,)
+        Share of the footprint.
+    lit : float32 (N,)
+        `weight` where the viewer and the light are visible, else 0.
+    areas, diffuses, speculars : float32 (N,)
+        Share in the denominator, and in the diffuse (times pi) and specular numerators.
+    margins, lit_margins : float32 (N,)
+        Slope by which the viewer, and viewer and light, lie above the horizon; negative below it.
+    undecided : float32 (N,)
+        Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0.
+    """
+
+    weight: Float32
+    lit: Float32
+    areas: Float32
+    diffuses: Float32
+    speculars: Float32
+    margins: Float32
+    lit_margins: Float32
+    undecided: Float32
+
+
+@allocating_kernel
+def no_shares(nodes: int) -> NodeShares:
+    """Return arrays for so many nodes, all 0."""
+    return NodeShares(
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+        np.zeros(nodes, np.float32),
+    )
+
+
+@allocating_kernel
+def with_weight(shares: NodeShares, weight: Float32) -> NodeShares:
+    """Return shares that use other weights; the remaining arrays are the same."""
+    return NodeShares(
+        weight,
+        shares.lit,
+        shares.areas,
+        shares.diffuses,
+        shares.speculars,
+        shares.margins,
+        shares.lit_margins,
+        shares.undecided,
+    )
+
 
 SMOOTH: Final = np.float32(0.0005)
 """Squared error of a node's share from curvature within it, relative to its square."""
 
-STEP: Final = np.float32(0.1)
+LEAP: Final = np.float32(0.1)
 """Difference of a node's horizons at two azimuths between which they are not interpolated: another yarn's edge."""
-
-_EDGE: Final = np.float32(0.01)
-_EDGE_JUMP: Final = np.float32(0.1)
-
-_0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
-_JUMP = np.float32(3.0)
-_TINY = np.float32(1e-30)
 
 
 class Normals(NamedTuple):
@@ -47,14 +183,14 @@ class Tangents(NamedTuple):
     z: Float32
 
 
-class Horizons(NamedTuple):
+class HorizonSlopes(NamedTuple):
     """Slopes of the nodes' horizons at the two azimuths around a direction, float32 (N,)."""
 
     first: Float32
     second: Float32
 
 
-class Layer(NamedTuple):
+class FlakeLayer(NamedTuple):
     """The layer of flakes on a piece of yarn.
 
     Attributes
@@ -76,16 +212,16 @@ class Layer(NamedTuple):
 def weigh(
     normal: Normals,
     light: Direction,
-    light_horizon: Horizons,
+    light_horizon: HorizonSlopes,
     viewer: Direction,
-    viewer_horizon: Horizons,
+    viewer_horizon: HorizonSlopes,
     blend: np.float32,
     shares: NodeShares,
 ) -> tuple[np.float32, np.float32]:
     """Write which nodes are lit, their shares of area and diffuse, and their margins; return the sums of both shares.
 
     The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not. A node
-    is undecided if a direction clears the horizon at one of the two azimuths beside it and the horizon makes a `STEP`.
+    is undecided if a direction clears the horizon at one of the two azimuths beside it and the horizon makes a `LEAP`.
     """
     area, diffuse = _0, _0
     for k in range(len(shares.weight)):
@@ -93,9 +229,9 @@ def weigh(
         cos_i = light.x * normal.x[k] + light.y * normal.y[k] + light.z * normal.z[k]
         low, high = viewer_horizon.first[k], viewer_horizon.second[k]
         margin_o = viewer.slope - low - viewer.turn * (high - low)
-        seen_between = min(low, high) < viewer.slope and viewer.slope < max(low, high) and abs(high - low) > STEP
+        seen_between = min(low, high) < viewer.slope and viewer.slope < max(low, high) and abs(high - low) > LEAP
         low, high = light_horizon.first[k], light_horizon.second[k]
-        lit_between = min(low, high) < light.slope and light.slope < max(low, high) and abs(high - low) > STEP
+        lit_between = min(low, high) < light.slope and light.slope < max(low, high) and abs(high - low) > LEAP
         margin_i = min(min(light.slope - low - light.turn * (high - low), cos_i), margin_o)
         visible = shares.weight[k] if margin_o > _0 else _0
         both = shares.weight[k] if margin_i > _0 else _0
@@ -188,7 +324,7 @@ def reflected(
     light: Direction,
     viewer: Direction,
     size: np.float32,
-    layer: Layer,
+    layer: FlakeLayer,
     lit: Float32,
     speculars: Float32,
 ) -> np.float32:
@@ -221,7 +357,7 @@ def transmitted(
     light: Direction,
     viewer: Direction,
     size: np.float32,
-    layer: Layer,
+    layer: FlakeLayer,
     lit: Float32,
     speculars: Float32,
 ) -> np.float32:
@@ -244,7 +380,7 @@ def transmitted(
 
 
 @fast_kernel
-def crossing(normal: Normals, tangent: Tangents, viewer: Direction, layer: Layer, areas: Float32) -> np.float32:
+def crossing(normal: Normals, tangent: Tangents, viewer: Direction, layer: FlakeLayer, areas: Float32) -> np.float32:
     """Return the unscattered light through the layer, the sum of exp(-T Lambda) times each node's share of the area."""
     total = _0
     for k in range(len(areas)):

@@ -14,13 +14,22 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.cloth import AREA, SUMS, ClothSide
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE, KIND_X, KIND_Y, ROWS, START, Table
+from pipeline.truth.node_table.build import (
+    EDGES_X,
+    EDGES_Y,
+    FINE_COUNT,
+    FIRST_NODE,
+    NODES_X,
+    NODES_Y,
+    PIECE_FAMILY,
+    ExactNodes,
+)
 from pipeline.truth.node_table.cut import Known, Row, RowRoom, add_row, row_room
 from pipeline.truth.node_table.doubts import Doubts, no_doubts
-from pipeline.truth.node_table.shares import NodeShares
+from pipeline.truth.node_table.kernels import NodeShares
 from pipeline.truth.scattering.point import Directions
 
 UNSEEN: Final = 0.002
@@ -41,11 +50,11 @@ class RefineRoom(NamedTuple):
         What nodes may be wrong by.
     row : RowRoom
         Room for a row.
-    change : float64 (SUMS,)
+    change : float64 (POINT_SUMS,)
         Change of the sums.
     variance : float64 (4,)
         Squared error of the numerators.
-    first, second : float64 (SUMS,), float64 (4,)
+    first, second : float64 (POINT_SUMS,), float64 (4,)
         Sums over a node's rows, and of the squares of their residuals.
     """
 
@@ -60,13 +69,15 @@ class RefineRoom(NamedTuple):
 @allocating_kernel
 def refine_room(nodes: int) -> RefineRoom:
     """Return room for a table of so many nodes."""
-    return RefineRoom(no_doubts(nodes), row_room(), np.zeros(SUMS), np.zeros(4), np.zeros(SUMS), np.zeros(4))
+    return RefineRoom(
+        no_doubts(nodes), row_room(), np.zeros(POINT_SUMS), np.zeros(4), np.zeros(POINT_SUMS), np.zeros(4)
+    )
 
 
 @kernel
 def refine(
     cloth: ClothSide,
-    table: Table,
+    table: ExactNodes,
     directions: Directions,
     key: np.uint64,
     rows: int,
@@ -87,16 +98,16 @@ def refine(
     variance[:] = 0.0
     tested = 0
     for p in range(len(table.pieces)):
-        start, family = table.pieces[p, START], table.pieces[p, FAMILY]
-        for k in range(start, start + table.pieces[p, COLUMNS] * table.pieces[p, ROWS]):
+        start, family = table.pieces[p, FIRST_NODE], table.pieces[p, PIECE_FAMILY]
+        for k in range(start, start + table.pieces[p, NODES_X] * table.pieces[p, NODES_Y]):
             if score[k] == _0 or score[k] < least:
                 continue
             tested += _integrate(cloth, table, p, k, directions, key, rows, shares, mean, room)
-            change[AREA] -= shares.areas[k]
+            change[AREA_SUM] -= shares.areas[k]
             if family != GAP:
                 change[family] -= np.float64(shares.speculars[k])
                 change[2 + family] -= np.float64(shares.diffuses[k]) / math.pi
-    total = below if cloth.projected else below + change[AREA]
+    total = below if cloth.projected else below + change[AREA_SUM]
     for q in range(4):
         mean[q] = max((mean[q] * below + change[q]) / total, 0.0)
         error[q] = math.sqrt(variance[q] + 0.25 * left[0] + left[1 + q] ** 2) / total + UNSEEN * mean[q]
@@ -106,7 +117,7 @@ def refine(
 @kernel
 def _integrate(
     cloth: ClothSide,
-    table: Table,
+    table: ExactNodes,
     p: int,
     k: int,
     directions: Directions,
@@ -118,12 +129,12 @@ def _integrate(
 ) -> int:
     """Add the integral over node k of piece p to the changes, and its squared error; return the places tested."""
     piece, weight = table.pieces[p], shares.weight
-    start, across, gap = piece[START], piece[COLUMNS], piece[FAMILY] == GAP
-    stop = start + across * piece[ROWS]
+    start, across, gap = piece[FIRST_NODE], piece[NODES_X], piece[PIECE_FAMILY] == GAP
+    stop = start + across * piece[NODES_Y]
     i, j = (k - start) % across, (k - start) // across
-    x_edges, y_edges = table.edges[piece[KIND_X]], table.edges[piece[KIND_Y]]
+    x_edges, y_edges = table.edges[piece[EDGES_X]], table.edges[piece[EDGES_Y]]
     tilt_x = _tilt(weight, k, 1, x_edges, i, across)
-    tilt_y = _tilt(weight, k, across, y_edges, j, piece[ROWS])
+    tilt_y = _tilt(weight, k, across, y_edges, j, piece[NODES_Y])
     x, dx = table.copies[p, 0, 0] + np.float64(x_edges[i]), np.float64(x_edges[i + 1]) - np.float64(x_edges[i])
     y, dy = table.copies[p, 0, 1] + np.float64(y_edges[j]), np.float64(y_edges[j + 1]) - np.float64(y_edges[j])
 
@@ -133,7 +144,7 @@ def _integrate(
     decided = shares.undecided[k] == _0
     seen = decided and _clear(shares.margins, k, i, across, start, stop)
     lit = decided and not gap and directions.light.z > 0.0 and _clear(shares.lit_margins, k, i, across, start, stop)
-    known = Known(seen, lit, not gap and piece[FINE] > 1)
+    known = Known(seen, lit, not gap and piece[FINE_COUNT] > 1)
     first, second, value = room.first, room.second, room.row.value
     first[:] = 0.0
     second[:] = 0.0
@@ -148,13 +159,13 @@ def _integrate(
             row = Row(x + t * dx, y, 0.0, dy, offset, share, tilt_y)
         tested += add_row(cloth, directions, row, known, room.row)
         for q in range(4):
-            second[q] += (value[q] - mean[q] * value[AREA]) ** 2
-        for q in range(SUMS):
+            second[q] += (value[q] - mean[q] * value[AREA_SUM]) ** 2
+        for q in range(POINT_SUMS):
             first[q] += value[q]
     for q in range(4):
-        spread = second[q] - (first[q] - mean[q] * first[AREA]) ** 2 / rows
+        spread = second[q] - (first[q] - mean[q] * first[AREA_SUM]) ** 2 / rows
         room.variance[q] += _SPREAD * max(spread, 0.0) / (rows * (rows - 1.0))
-    for q in range(SUMS):
+    for q in range(POINT_SUMS):
         room.change[q] += first[q] / rows
     return tested
 

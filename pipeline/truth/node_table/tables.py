@@ -15,24 +15,24 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
-from pipeline.truth.calibration import BEHIND, COARSE_TABLE, COMPONENTS, FINE_TABLE, REFINED
-from pipeline.truth.cloth import ClothSide, Columns, Raw
+from pipeline.truth.calibration import BEHIND_FACTORS, COARSE_TABLE, FINE_TABLE, FRONT_FACTORS, REFINED
+from pipeline.truth.cloth import ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.mixture import FINE_LINE, Line, axes
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField
-from pipeline.truth.geometry.symmetry import different_cells
+from pipeline.truth.geometry.pieces import different_cells
 from pipeline.truth.node_table.answer import Requested, sum_rows
-from pipeline.truth.node_table.build import Table, tabulate
+from pipeline.truth.node_table.build import ExactNodes, tabulate
 from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA
 
-NODES: Final = 32
+FINE_NODES: Final = 32
 """Nodes per yarn spacing of the fine table, across and along; for a cloth of more than `_FEW` different cells, down to
 three quarters of it."""
 
-AZIMUTHS: Final = 128
+TABLE_AZIMUTHS: Final = 128
 """Directions in which the truth's tables hold horizons."""
 
-UNBOUNDED: Final = (1.0, np.inf)
+NOT_REFINED: Final = (1.0, np.inf)
 """Relative and absolute standard error of an answer that is not refined."""
 
 _FEW: Final = 8
@@ -64,10 +64,10 @@ class NodeTable:
     def __init__(self, nodes: Callable[[int], int], azimuths: int, line: Line, stage: int = FINE_TABLE) -> None:
         self._nodes, self._azimuths, self._line, self._stage = nodes, azimuths, line, stage
         # The height field is kept beside its table: an identity is another object's once its own is gone.
-        self._tables: dict[tuple[int, bool], tuple[HeightField, Table]] = {}
+        self._tables: dict[tuple[int, bool], tuple[HeightField, ExactNodes]] = {}
         self._building = Lock()
 
-    def knows(self, cloth: ClothSide, columns: Columns) -> Mask:
+    def knows(self, cloth: ClothSide, columns: WideQueries) -> Mask:
         """Return which queries a table answers, (N,)."""
         other = cloth.choices.macro or not cloth.choices.shadows
         if other or different_cells(cloth.front) > TABLE_CELLS:
@@ -80,19 +80,25 @@ class NodeTable:
         return np.asarray(known)
 
     def answer(
-        self, cloth: ClothSide, columns: Columns, index: Index, relative_error: float, absolute_error: float, seed: int
+        self,
+        cloth: ClothSide,
+        columns: WideQueries,
+        index: Index,
+        relative_error: float,
+        absolute_error: float,
+        seed: int,
     ) -> Raw:
         """Answer queries that the table knows; nodes are refined where the standard error exceeds the requested one.
 
         `index` and `seed` name the random numbers of refined nodes.
         """
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
-        factors = (sides[stage] for sides in (COMPONENTS, BEHIND) for stage in (self._stage, REFINED))
+        factors = (sides[stage] for sides in (FRONT_FACTORS, BEHIND_FACTORS) for stage in (self._stage, REFINED))
         requested = Requested(relative_error, absolute_error, *factors)
         found = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
         return Raw(found.mean, found.error, found.count, np.where(found.refined, REFINED, self._stage))
 
-    def table(self, cloth: ClothSide, behind: bool) -> Table:
+    def table(self, cloth: ClothSide, behind: bool) -> ExactNodes:
         """Return the table of one side of a cloth, with horizons `behind` it if there is light."""
         front = cloth.front
         with self._building:
@@ -107,7 +113,7 @@ class NodeTable:
         return table
 
 
-def _axial(cloth: ClothSide, columns: Columns) -> Mask:
+def _axial(cloth: ClothSide, columns: WideQueries) -> Mask:
     """Return which footprints are round or lie along the axes."""
     along = columns.angle == 0.0
     if cloth.shape == GAUSSIAN:
@@ -117,7 +123,7 @@ def _axial(cloth: ClothSide, columns: Columns) -> Mask:
 
 def _fine_nodes(cells: int) -> int:
     """Return an even number of nodes: with more different cells, more borders average out."""
-    return max(3 * NODES // 4, min(NODES, 2 * round(0.5 * NODES * math.sqrt(_FEW / cells))))
+    return max(3 * FINE_NODES // 4, min(FINE_NODES, 2 * round(0.5 * FINE_NODES * math.sqrt(_FEW / cells))))
 
 
 def _coarse_nodes(cells: int) -> int:
@@ -125,8 +131,8 @@ def _coarse_nodes(cells: int) -> int:
     return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
 
 
-FINE: Final = NodeTable(_fine_nodes, AZIMUTHS, FINE_LINE)
+FINE: Final = NodeTable(_fine_nodes, TABLE_AZIMUTHS, FINE_LINE)
 """The truth's table for any footprint."""
 
-COARSE: Final = NodeTable(_coarse_nodes, AZIMUTHS, FINE_LINE, COARSE_TABLE)
+COARSE: Final = NodeTable(_coarse_nodes, TABLE_AZIMUTHS, FINE_LINE, COARSE_TABLE)
 """The truth's table for footprints of `cascade.WIDE`; at 1 % it costs a half to a fifth of the time."""

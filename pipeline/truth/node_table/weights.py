@@ -1,4 +1,8 @@
-"""Weights: the share of a footprint that falls on each node of a table."""
+"""Weights: the share of a footprint that falls on each node of a table.
+
+A footprint along the axes is a product of masses along x and y on intervals of the repeat, folded by periodicity; their
+kernel, centre and repeat are those of `place`, whose points have these masses as their histogram.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +12,97 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.compiled.decorators import fast_kernel, kernel
-from pipeline.truth.cloth import Columns
-from pipeline.truth.footprint.masses import interval_masses
+from pipeline.compiled.normal import normal_distribution
+from pipeline.truth.cloth import WideQueries
 from pipeline.truth.footprint.mixture import Line, along_axes, line_points
+from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN
 from pipeline.truth.geometry.march import wrap
-from pipeline.truth.node_table.build import COLUMNS, KIND_X, KIND_Y, ROWS, START, Table
+from pipeline.truth.node_table.build import EDGES_X, EDGES_Y, FIRST_NODE, NODES_X, NODES_Y, ExactNodes
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
 
 
+_SPREAD_OUT = 0.8  # in repeats: an axis of a Gaussian this wide covers the repeat evenly, to 6e-6
+_REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
+
+
+@kernel
+def interval_masses(
+    shape: int,
+    centre: float,
+    sigma: float,
+    repeat: float,
+    edges: Float32,
+    cell: float,
+    masses: Float32,
+) -> bool:
+    """Write the mass of each interval between neighbouring edges; return whether any may be above 0.
+
+    Parameters
+    ----------
+    shape, centre, sigma, repeat
+        As in `place`.
+    edges : float32 (n + 1,)
+        Rising positions in their cell, in [0, 1].
+    cell : float
+        Start of the cell.
+    masses : float32 (n,)
+        Written; over a whole repeat they sum to 1.
+    """
+    count = len(masses)
+    if shape == GAUSSIAN and sigma >= _SPREAD_OUT * repeat:
+        even = np.float32(1.0 / repeat)
+        for k in range(count):
+            masses[k] = (edges[k + 1] - edges[k]) * even
+        return True
+    side = BOX_SIDE * sigma
+    whole, even = 0.0, np.float32(0.0)
+    if shape == BOX:
+        # So many whole repeats everywhere, and the rest around the centre, or opposite it.
+        whole = math.floor(side / repeat)
+        even = np.float32(whole / side)
+        if whole % 2.0 == 1.0:
+            centre += 0.5 * repeat
+    reach = _REACH * sigma if shape == GAUSSIAN else 0.5 * (side - whole * repeat)
+    for k in range(count):
+        masses[k] = even * (edges[k + 1] - edges[k])
+    first = math.ceil((cell - centre - reach) / repeat)
+    last = math.floor((cell + 1.0 - centre + reach) / repeat)
+    for image in range(first, last + 1):
+        middle = np.float32(centre + image * repeat - cell)
+        if shape == GAUSSIAN:
+            _add_gaussian(edges, middle, np.float32(1.0 / sigma), masses)
+        else:
+            _add_box(edges, middle, np.float32(reach), np.float32(1.0 / side), masses)
+    return last >= first or whole > 0.0
+
+
+@fast_kernel
+def _add_gaussian(edges: Float32, middle: np.float32, inverse: np.float32, masses: Float32) -> None:
+    for k in range(len(masses)):
+        below = normal_distribution((edges[k] - middle) * inverse)
+        masses[k] += normal_distribution((edges[k + 1] - middle) * inverse) - below
+
+
+@fast_kernel
+def _add_box(
+    edges: Float32,
+    middle: np.float32,
+    reach: np.float32,
+    inverse: np.float32,
+    masses: Float32,
+) -> None:
+    for k in range(len(masses)):
+        low = min(max(edges[k] - middle, -reach), reach)
+        high = min(max(edges[k + 1] - middle, -reach), reach)
+        masses[k] += (high - low) * inverse
+
+
 @kernel
 def fill_weights(
-    table: Table,
+    table: ExactNodes,
     shape: int,
-    columns: Columns,
+    columns: WideQueries,
     row: int,
     scratch: Float32,
     touched: Mask,
@@ -52,7 +133,7 @@ def fill_weights(
 
 @kernel
 def _add(
-    table: Table,
+    table: ExactNodes,
     shape: int,
     u: float,
     v: float,
@@ -77,11 +158,11 @@ def _add(
                 )
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
-        start, across, lines = piece[START], piece[COLUMNS], piece[ROWS]
+        start, across, lines = piece[FIRST_NODE], piece[NODES_X], piece[NODES_Y]
         for c in range(table.copies.shape[1]):
             end, pick = table.copies[p, c, 0], table.copies[p, c, 1]
-            if touched[0, end, piece[KIND_X]] and touched[1, pick, piece[KIND_Y]]:
-                along_x, along_y = scratch[0, end, piece[KIND_X]], scratch[1, pick, piece[KIND_Y]]
+            if touched[0, end, piece[EDGES_X]] and touched[1, pick, piece[EDGES_Y]]:
+                along_x, along_y = scratch[0, end, piece[EDGES_X]], scratch[1, pick, piece[EDGES_Y]]
                 _add_product(along_x[:across], along_y[:lines], share, weight[start : start + across * lines])
 
 

@@ -23,22 +23,23 @@ import numpy as np
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.calibration import QUADRATURE, QUADRATURE_CURVED, SAMPLED
-from pipeline.truth.cloth import AREA, SUMS, ClothSide, Columns, Raw
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.place import GAUSSIAN
-from pipeline.truth.geometry.symmetry import first_cells
+from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.monte_carlo import OWEN, query_directions, sample_rows
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.quadrature.parts import (
+from pipeline.truth.quadrature.rules import (
     BOX_WEIGHT,
     KIND,
     MASS,
     PART,
-    TURN,
+    RULES,
+    TURNING,
     Axis,
     cut_parts,
+    integrate,
     rectangles,
 )
-from pipeline.truth.quadrature.rules import LEVELS, integrate
 
 SAFETY: Final = 1.5
 """Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""
@@ -57,7 +58,7 @@ _WORST: Final = 0.0625  # parts with this share of the worst one's squared error
 @allocating_kernel
 def integrate_rows(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     different: Mask,
     relative_error: float,
     absolute_error: float,
@@ -71,7 +72,7 @@ def integrate_rows(
 
     Parameters
     ----------
-    cloth, columns : ClothSide, Columns
+    cloth, columns : ClothSide, WideQueries
         The cloth and the queries.
     different : Mask (picks, ends)
         The cells that represent all others under a footprint that covers the repeat evenly: the first of each orbit.
@@ -83,13 +84,13 @@ def integrate_rows(
         First and greatest level, first < last.
     """
     rows = len(columns.u)
-    means, errors = np.zeros((rows, AREA)), np.zeros((rows, AREA))
+    means, errors = np.zeros((rows, AREA_SUM)), np.zeros((rows, AREA_SUM))
     counts, barely = np.zeros(rows, np.int64), np.zeros(rows, np.bool_)
     picks, ends = cloth.front.top.shape
     everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
     kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
     x_pieces, y_pieces = np.zeros((32, 3)), np.zeros((32, 3))
-    grid, states = np.zeros((64, 64, SUMS)), np.zeros((64, 64), np.int64)
+    grid, states = np.zeros((64, 64, POINT_SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
         directions = query_directions(columns, row)
         sigma_x, sigma_y = columns.sigma[row], columns.sigma_minor[row]
@@ -106,8 +107,8 @@ def integrate_rows(
         total = len(parts)
 
         # The first rule on every part; then the worst parts get the next, at first all of them.
-        sums, levels = np.zeros((total, SUMS)), np.full(total, first)
-        changes, earlier = np.zeros((total, SUMS)), np.zeros((total, SUMS))
+        sums, levels = np.zeros((total, POINT_SUMS)), np.full(total, first)
+        changes, earlier = np.zeros((total, POINT_SUMS)), np.zeros((total, POINT_SUMS))
         costs, badness = np.zeros(total, np.int64), np.zeros(total)
         for p in range(total):
             counts[row] += integrate(cloth, directions, parts[p], x_axis, y_axis, first, split, grid, states, sums[p])
@@ -149,7 +150,7 @@ def integrate_rows(
             cut = _WORST * worst
         share = 0.0
         for p in range(total):
-            share += sums[p, AREA] / directions.viewer.z
+            share += sums[p, AREA_SUM] / directions.viewer.z
         barely[row] = share < _BARELY
     return means, errors, counts, barely
 
@@ -190,26 +191,26 @@ def _estimate_errors(
     area, worst, size = 0.0, 0.0, 0.0
     badness[:] = 0.0
     for p in range(len(sums)):
-        area += sums[p, AREA]
+        area += sums[p, AREA_SUM]
     mean[:], error[:] = 0.0, 0.0
     if area <= 0.0:
         return 0.0, 0.0
-    for c in range(AREA):
+    for c in range(AREA_SUM):
         for p in range(len(sums)):
             mean[c] += sums[p, c] / area
         if c < 4:
             size += mean[c] * mean[c]
-    for c in range(AREA):
+    for c in range(AREA_SUM):
         signed, unsigned = 0.0, 0.0
         for p in range(len(sums)):
-            residual = (changes[p, c] - mean[c] * changes[p, AREA]) / area
+            residual = (changes[p, c] - mean[c] * changes[p, AREA_SUM]) / area
             signed += residual
             n = float(2 << levels[p])
             missed = _SLIVER / (n * n * n) * parts[p, MASS] * cosine / area * mean[c]
-            before = _FADING * (earlier[p, c] - mean[c] * earlier[p, AREA]) / area
+            before = _FADING * (earlier[p, c] - mean[c] * earlier[p, AREA_SUM]) / area
             square = max(residual * residual, before * before) + missed * missed
-            if c == parts[p, KIND] and parts[p, TURN] > 0.0:
-                missed = 2.0 * math.exp(-_HIGHLIGHT * n / parts[p, TURN]) * sums[p, AREA] / area
+            if c == parts[p, KIND] and parts[p, TURNING] > 0.0:
+                missed = 2.0 * math.exp(-_HIGHLIGHT * n / parts[p, TURNING]) * sums[p, AREA_SUM] / area
                 square += missed * missed * size
             unsigned += square
             if c < 4:
@@ -219,7 +220,7 @@ def _estimate_errors(
     return worst, size
 
 
-def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: TruthOptions, seed: int) -> Raw:
+def quadrature_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every row: means and error bounds (N, 5), and points used.
 
     Rotated footprints are no product in x and y. Of patches that are almost hidden, rules may step over all that is
@@ -227,7 +228,7 @@ def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: T
 
     Parameters
     ----------
-    cloth, columns : ClothSide, Columns
+    cloth, columns : ClothSide, WideQueries
         The cloth and the queries.
     index : int (N,)
         Name of each row.
@@ -242,7 +243,7 @@ def quadrature_rows(cloth: ClothSide, columns: Columns, index: Index, options: T
     limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
     if aligned.any():
         mean, error, count, barely = integrate_rows(
-            cloth, columns.take(aligned), first_cells(cloth.front), *limits, _SPLIT, _FIRST, LEVELS - 1
+            cloth, columns.take(aligned), first_cells(cloth.front), *limits, _SPLIT, _FIRST, RULES - 1
         )
         curved = columns.curvature[aligned] > 0.0
         answers.put(aligned, mean, error, count, np.where(curved, QUADRATURE_CURVED, QUADRATURE))

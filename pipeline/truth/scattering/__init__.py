@@ -1,4 +1,4 @@
-"""Scattering at one point of a yarn: microflake (flakes), slab (a layer of flakes), point (with visibility).
+"""Scattering at one point of a yarn: slab (a layer of microflakes), point (with visibility).
 
 thread_colours sums points by the colours of their threads.
 """

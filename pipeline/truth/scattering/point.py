@@ -15,8 +15,7 @@ from typing import NamedTuple
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
 from pipeline.truth.geometry.visibility import Ray, ray, visible
-from pipeline.truth.scattering.microflake import density, sigma
-from pipeline.truth.scattering.slab import reflection, transmission, unscattered
+from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 
 class Choices(NamedTuple):

@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.cloth import ClothSide, Columns, cloth_side, columns_of
+from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, WARP
@@ -46,7 +46,7 @@ class ComponentColours(NamedTuple):
     standard_error: Float64
 
 
-class Threads(NamedTuple):
+class ThreadTable(NamedTuple):
     """Colours of the threads as kernels read them.
 
     Attributes
@@ -63,7 +63,7 @@ class Threads(NamedTuple):
     picks: int
 
 
-def threads_of(fabric: Fabric, transmitted: bool) -> Threads:
+def threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:
     """Return the colours of a fabric's threads; those of the diffuse components for light from one side or both."""
 
     def stacked(colours: ThreadColours) -> Float64:
@@ -71,7 +71,7 @@ def threads_of(fabric: Fabric, transmitted: bool) -> Threads:
         return np.ascontiguousarray(np.stack([colours.specular, diffuse], axis=1))
 
     warp, weft = fabric.thread_colours()
-    return Threads(stacked(warp), stacked(weft), *fabric.repeat)
+    return ThreadTable(stacked(warp), stacked(weft), *fabric.repeat)
 
 
 def component_colours(
@@ -111,9 +111,9 @@ def component_colours(
 @allocating_kernel
 def sample_colours(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     index: Index,
-    threads: Threads,
+    threads: ThreadTable,
     relative_error: float,
     min_count: int,
     max_count: int,
@@ -143,9 +143,9 @@ def sample_colours(
 @kernel
 def _add_points(
     cloth: ClothSide,
-    columns: Columns,
+    columns: WideQueries,
     row: int,
-    threads: Threads,
+    threads: ThreadTable,
     randomisation: np.uint64,
     first: int,
     last: int,
@@ -188,7 +188,7 @@ def _add_points(
 
 @kernel
 def _colours(
-    threads: Threads, plain: Float64, coloured: Float64, area: Float64, mean: Float64, error: Float64
+    threads: ThreadTable, plain: Float64, coloured: Float64, area: Float64, mean: Float64, error: Float64
 ) -> tuple[float, float]:
     """Write the colours of the components and the standard error; return the norms of the patch's colour and of it."""
     whole = area.sum()

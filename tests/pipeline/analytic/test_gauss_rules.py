@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.stats import norm
 
-from pipeline.analytic.gauss_rules import gauss_rule, grid_edges, grid_middles, overlap
+from pipeline.analytic.gauss_rules import gauss_rule, grid_edges, grid_middles, overlap, taps
 
 
 @pytest.mark.parametrize(("low", "high", "radius"), [(0.0, 1.0, 0.5), (0.2, 0.8, 0.3), (0.0, 0.25, 0.0)])
@@ -28,3 +29,18 @@ def test_overlaps_are_shares(radius):
     np.testing.assert_allclose(np.diff(borders) @ share, np.diff(edges), rtol=1e-9)
     middles = grid_middles(0.2, 0.8, 12, radius)
     assert ((middles > edges[:-1]) & (middles < edges[1:])).all()
+
+
+def test_readings_have_the_moments_of_a_gaussian():
+    table = taps(16)
+    assert not table[1].any()
+    for count in range(2, 17):
+        places = table[count, :count]
+        assert places.mean() == pytest.approx(0.0, abs=1e-12) and (places**2).mean() == pytest.approx(1.0)
+
+
+def test_many_readings_damp_a_wave_as_a_gaussian_does():
+    places = taps(256)[256]
+    for wave in (0.5, 1.0, 2.0):
+        expected = norm.expect(lambda z, wave=wave: np.cos(wave * z))
+        assert np.cos(wave * places).mean() == pytest.approx(expected, abs=0.01)

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.gauss_rules import overlap
-from pipeline.analytic.soft_horizons import above, azimuths_apart, over_boxes, ramp, seen_and_lit
+from pipeline.analytic.soft_horizons import (
+    AZIMUTHS,
+    above,
+    around,
+    azimuths_apart,
+    from_even,
+    over_boxes,
+    ramp,
+    seen_and_lit,
+)
 
 
 def test_boxes_of_whole_cells_have_the_moments_of_these():
@@ -37,3 +46,18 @@ def test_a_ramp_is_the_share_of_a_spread_horizon():
     for rise in np.float32([0.2, 0.32, 0.4, 0.49, 0.6]):
         found = ramp(above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
         assert found == pytest.approx((horizons < rise).mean(), abs=2e-3)
+
+
+def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
+    """Linear interpolation of a second derivative of 1 errs by at most h^2 / 8, twice, with h up to 0.25."""
+    even = np.sin(2.0 * np.pi * np.arange(2 * AZIMUTHS) / (2 * AZIMUTHS) + 0.3)[:, None]
+    table = from_even(even)[:, 0]
+    for angle in np.linspace(0.0, 2.0 * np.pi, 97):
+        low, high, turn = around(np.float32(0.7 * np.cos(angle)), np.float32(0.7 * np.sin(angle)))
+        assert 0 <= low < AZIMUTHS and high == (low + 1) % AZIMUTHS and 0.0 <= turn <= 1.0
+        assert abs((1.0 - turn) * table[low] + turn * table[high] - np.sin(angle + 0.3)) < 0.015
+
+
+def test_no_azimuth_is_an_azimuth_too():
+    low, _, turn = around(np.float32(0.0), np.float32(0.0))
+    assert 0 <= low < AZIMUTHS and 0.0 <= turn <= 1.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pipeline.materials.lobes import charlie, even_sky, ggx, ggx_density
-from pipeline.truth.scattering.microflake import density
+from pipeline.truth.scattering.slab import density
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.3, 0.8])

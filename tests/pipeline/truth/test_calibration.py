@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.calibration import BEHIND, COMPONENTS, SAMPLED, THROUGH, calibrate
+from pipeline.truth.calibration import BEHIND_FACTORS, FRONT_FACTORS, SAMPLED, TRANSPARENCY_FACTORS, calibrate
 from pipeline.truth.cloth import Raw
 from pipeline.truth.estimator import ESTIMATORS, estimate, uncalibrated
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("stage", list(COMPONENTS))
+@pytest.mark.parametrize("stage", list(FRONT_FACTORS))
 @pytest.mark.parametrize("behind", [False, True])
 def test_errors_are_factors_of_the_reported_ones(stage, behind):
     mean, reported = np.array([[0.3, 0.0, 0.4, 0.0, 0.2]]), np.array([[0.01, 0.0, 0.02, 0.03, 0.04]])
     error, bound = calibrate(Raw(mean, reported, np.array([64]), np.array([stage])), np.array([behind]))
-    own = (BEHIND if behind else COMPONENTS)[stage]
-    for factors, columns, size in ((own, slice(4), 0.5), (THROUGH[stage], slice(4, 5), 1.0)):
+    own = (BEHIND_FACTORS if behind else FRONT_FACTORS)[stage]
+    for factors, columns, size in ((own, slice(4), 0.5), (TRANSPARENCY_FACTORS[stage], slice(4, 5), 1.0)):
         scaled = factors.reported * reported[:, columns]
         limited = scaled / (1.0 + scaled / (factors.largest * size))
         expected = np.sqrt(limited**2 + (factors.missed * size) ** 2)
@@ -37,7 +37,7 @@ def test_every_answer_has_a_stage_and_both_errors(estimator):
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 40)
     raw = uncalibrated(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
     answers = estimate(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
-    assert np.isin(raw.stage, list(COMPONENTS)).all()
+    assert np.isin(raw.stage, list(FRONT_FACTORS)).all()
     np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))
     assert (answers.bound >= answers.standard_error).all()
     assert (answers.transparency_bound >= answers.transparency_standard_error).all()

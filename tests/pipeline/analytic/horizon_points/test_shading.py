@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.horizon_points.horizon_map import horizon_map, locate
-from pipeline.analytic.horizon_points.rows import (
+from pipeline.analytic.horizon_points.horizon_map import (
     AREA,
     DIFFUSE,
     INTEGERS,
-    ROWS,
+    SCRATCH_ROWS,
     SINE,
     SPECULAR,
     WARPNESS,
@@ -16,6 +15,8 @@ from pipeline.analytic.horizon_points.rows import (
     WEIGHT,
     X,
     Y,
+    horizon_map,
+    locate,
 )
 from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade_all
 from pipeline.truth.geometry.heightfield import height_field
@@ -48,7 +49,7 @@ def test_every_point_is_the_point_model(point_shares, fabric, wi, wo):
     field = height_field(fabric)
     table = horizon_map(field, field, 4, 8)
     random = np.random.default_rng(6)
-    points, places = np.zeros((ROWS, COUNT), np.float32), np.zeros((INTEGERS, COUNT), np.int32)
+    points, places = np.zeros((SCRATCH_ROWS, COUNT), np.float32), np.zeros((INTEGERS, COUNT), np.int32)
     points[X], points[Y], points[WEIGHT] = random.random(COUNT) * ends, random.random(COUNT) * picks, 1.0
     values, rows = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     query_rows(wi, wo, table.azimuths, table.grid**2, values, rows, 0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.importance.lobes import (
+    FLAKE_ROWS,
     NEAR,
     POINT_ROWS,
-    ROWS,
     SHARE,
     STRAIGHT,
     TX,
@@ -17,8 +17,7 @@ from pipeline.analytic.importance.lobes import (
     find_rows,
     point_places,
 )
-from pipeline.analytic.importance.mixture import THROUGH, density_rows
-from pipeline.analytic.importance.point import flake_scatter_pdf
+from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows, flake_scatter_pdf
 from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
@@ -46,7 +45,7 @@ def points_of(name):
 def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
     """Tangents to 1e-3, gaps and densities; points within a deviation of an edge may lie beyond it."""
     fabric, front, queries = points_of(name)
-    lobes = Lobes(np.empty((COUNT, ROWS, 3), np.float32), np.empty((COUNT, STRAIGHT + 1), np.float32))
+    lobes = Lobes(np.empty((COUNT, FLAKE_ROWS, 3), np.float32), np.empty((COUNT, STRAIGHT + 1), np.float32))
     footprints = (queries.u, queries.v, queries.sigma, queries.sigma, np.zeros_like(queries.sigma))
     scratch, pdf = np.empty((POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
     find_rows(tabulate_surface(fabric), footprints, queries.wo, point_places(1), np.float32(2.0), scratch, lobes)
@@ -67,7 +66,7 @@ def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
         wi, alpha = queries.wi[n].astype(float), front.yarn[family, ALPHA]
         own, mirrored = (flake_scatter_pdf(*wo, *light, *found, alpha) for light in (wi, wi * (1.0, 1.0, -1.0)))
         near = wi[2] > 0.0
-        wanted = share * (own + (1.0 - THROUGH) * mirrored if near else THROUGH * own)
+        wanted = share * (own + (1.0 - STRAIGHT_ON) * mirrored if near else STRAIGHT_ON * own)
         wanted += lobes.rest[n, NEAR if near else NEAR + 1] * abs(wi[2]) / math.pi
         assert pdf[n] == pytest.approx(wanted, rel=2e-3)
     assert right >= 0.98 * COUNT

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums, sum_queries
-from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries

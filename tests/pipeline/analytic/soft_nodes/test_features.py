@@ -1,5 +1,7 @@
 """Symmetries of the features: what a network need not learn, and what exchanging warp and weft does."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,13 @@ from pipeline.analytic.soft_nodes.features import (
     FEATURES,
     OF_QUERY,
     cloth_features,
+    read_behind,
     read_queries,
 )
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -62,3 +67,62 @@ def test_yarns_that_never_change_side(rows):
         asked = draw_queries(QueryOptions(), fabric.weave.repeat, 4, 0, 200)
         for found in read_queries(tabulate(fabric), asked):
             assert np.isfinite(found).all()
+
+
+COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
+
+
+def asked(fabric, count=200, **options):
+    queries = draw_queries(QueryOptions(behind=1.0, max_angle=75.0, **options), fabric.weave.repeat, 3, 0, count)
+    assert (queries.wi[:, 2] < 0).all()
+    return queries
+
+
+@pytest.mark.parametrize("name", ["voile", "wool_gabardine", "satin_8"])
+@pytest.mark.parametrize(
+    ("sigma", "bound", "clear"), [((0.05, 0.25), 0.18, 0.03), ((0.25, 1.0), 0.06, 0.006), ((1.0, 8.0), 0.035, 0.005)]
+)
+def test_it_is_near_the_truth(name, sigma, bound, clear):
+    """RMSE of a grey cloth's colour over its mean, and of the transparency."""
+    fabric = load_fabric(name)
+    queries = asked(fabric, sigma=sigma)
+    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1)
+    found = read_behind(tabulate(fabric, behind=True), queries)
+    wrong = (found[:, :4] - truth.mean) @ COLOUR
+    assert math.sqrt(np.mean(wrong**2)) < bound * np.mean(truth.mean @ COLOUR)
+    assert math.sqrt(np.mean((found[:, 4] - truth.transparency) ** 2)) < clear
+
+
+def test_no_light_changes_the_transparency():
+    fabric = load_fabric("organza")
+    table, queries = tabulate(fabric, behind=True), asked(fabric)
+    found = read_behind(table, queries)[:, 4]
+    np.testing.assert_allclose(found, read_behind(table, queries._replace(wi=-queries.wo))[:, 4], rtol=1e-5)
+    assert (found >= 0).all() and (found <= 1).all()
+
+
+def test_a_thick_cloth_without_gaps_is_opaque_to_unscattered_light_and_a_thin_one_is_clear():
+    thick, thin = (load_fabric("denim").model_copy(update={"optical_thickness": depth}) for depth in (100.0, 1e-3))
+    queries = asked(thick)
+    assert read_behind(tabulate(thick, behind=True), queries)[:, 4].max() < 1e-3
+    assert read_behind(tabulate(thin, behind=True), queries)[:, 4].min() > 0.95
+
+
+def test_a_sky_behind_lends_no_more_light_than_it_has():
+    """Unit diffuse colours: the mean of pi f / cos over an even sky is at most 1, for every viewer."""
+    fabric = load_fabric("gauze")
+    table = tabulate(fabric, behind=True)
+    for viewer in ([0.0, 0.0, 1.0], [0.8, 0.0, 0.6]):
+        queries = asked(fabric, 4096, sigma=(0.3, 0.3))
+        queries = queries._replace(wo=np.tile(np.float32(viewer), (4096, 1)))
+        diffuse = read_behind(table, queries)[:, 2:4].sum(axis=1)
+        # Directions are drawn in proportion to their cosine, within 75 degrees; the incident cosine is inside.
+        assert math.sin(math.radians(75.0)) ** 2 * math.pi * np.mean(diffuse / -queries.wi[:, 2]) < 1.0
+
+
+def test_the_front_does_not_change():
+    fabric = load_fabric("cotton_twill")
+    front, both = tabulate(fabric), tabulate(fabric, behind=True)
+    for name in ("nodes", "mean", "sharpness", "grid", "evenly"):
+        np.testing.assert_array_equal(getattr(front, name), getattr(both, name))
+    assert not front.behind_mean.size and both.behind_grid.shape == both.grid.shape

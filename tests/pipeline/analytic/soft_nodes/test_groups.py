@@ -1,11 +1,13 @@
 """Kinds hold every piece once, and stay few."""
 
+import math
+
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.detail import DETAILS, USUAL
-from pipeline.analytic.soft_nodes.groups import gather
-from pipeline.truth.geometry.heightfield import TOP, height_field
+from pipeline.analytic.gauss_rules import gauss_rule
+from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL, gather, piece_rows
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, height_field, surface_at
 from pipeline.truth.geometry.pieces import cell_pieces
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
@@ -47,3 +49,57 @@ def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
         found = sum(len(group.cells) * group.piece.offset * group.piece.curve for group in merged)
         found /= detail.parts * len(own)
         assert found == pytest.approx(expected, abs=1e-9)
+
+
+def cloth(name, width):
+    fabric = load_fabric(name)
+    changes = {"width": width, "relief": 1.3, "twist": 25.0}
+    return fabric.model_copy(
+        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
+    )
+
+
+def from_fabric(family, vector):
+    """Turn a fabric vector into the frame of its yarn."""
+    x, y, z = vector
+    return np.array([x, y, z]) if family == WARP else np.array([y, -x, z])
+
+
+@pytest.mark.parametrize(("name", "width"), [("cotton_twill", 1.0), ("cotton_twill", 0.7), ("silk_charmeuse", 0.8)])
+def test_nodes_lie_on_the_cloth(name, width):
+    field = height_field(cloth(name, width))
+    checked = set()
+    for pick, end in np.ndindex(2, 3):
+        for piece in cell_pieces(field, pick, end):
+            if piece.family == GAP:
+                continue
+            radius = field.yarn[piece.family, RADIUS]
+            across, along = gauss_rule(*piece.across, 8, radius), gauss_rule(*piece.along, 3, 0.0)
+            rows = piece_rows(field.yarn, piece, across, along)
+            for node in range(0, 24, 5):
+                a, b = across.places[node % 8], along.places[node // 8]
+                x, y = (a, b) if piece.family == WARP else (b, a)
+                family, side, _, *vectors = surface_at(field, end + x, pick + y, end, pick)
+                assert (family, side) == (piece.family, piece.side)
+                np.testing.assert_allclose(rows[:3, node], from_fabric(family, vectors[:3]), atol=1e-6)
+                np.testing.assert_allclose(rows[4:7, node], from_fabric(family, vectors[3:]), atol=1e-6)
+            checked.add(piece.side)
+    assert len(checked) == (2 if width < 1.0 else 1)
+
+
+def test_the_tangents_change_is_its_derivative():
+    """Central differences over a hundredth of a box; their error is of second order."""
+    field = height_field(cloth("cotton_twill", 1.0))
+    piece = cell_pieces(field, 0, 0)[0]
+    across, along = gauss_rule(*piece.across, 8, field.yarn[piece.family, RADIUS]), gauss_rule(*piece.along, 4, 0.0)
+    rows = piece_rows(field.yarn, piece, across, along)
+    step = 0.005
+    boxes = np.diff(along.borders)
+    ahead, behind = (
+        piece_rows(field.yarn, piece, across, along._replace(places=along.places + sign * step * boxes))[4:7]
+        for sign in (1, -1)
+    )
+    # Along a weft the yarn's own y runs against the cell's axis.
+    sense = 1.0 if piece.family == WARP else -1.0
+    expected = sense * (ahead - behind) / (2 * step) * 0.5 / math.sqrt(3.0)
+    np.testing.assert_allclose(rows[7:10], expected, atol=2e-3 * np.abs(expected).max())

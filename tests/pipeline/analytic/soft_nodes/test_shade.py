@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import sum_queries
-from pipeline.analytic.soft_nodes.footprint_nodes import Footprint, Part, fill_block, place_nodes
+from pipeline.analytic.soft_nodes.footprint_nodes import CoveredPart, Footprint, fill_block, place_nodes
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, CURVE, X_HIGH, X_LOW, Y_HIGH, Y_LOW, tabulate
 from pipeline.analytic.soft_nodes.scratch import scratch_for
 from pipeline.analytic.soft_nodes.shade import (
@@ -16,14 +16,14 @@ from pipeline.analytic.soft_nodes.shade import (
     BARE_SPECULAR,
     HALF_ALONG,
     HALF_V,
+    NODE_SUMS,
     SIN,
-    SUMS,
     WEIGHT,
     directions,
     shade_footprint,
 )
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
-from pipeline.truth.scattering import microflake, slab
+from pipeline.truth.scattering import slab
 from weaves.fabric import load_fabric
 
 DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5), (0.2, -0.3))]
@@ -74,8 +74,8 @@ def test_fixed_nodes(table, pair):
             area = weight[k] * cos_o / n[2]
             sums[0] += area
             if cos_i > 0:
-                flakes = microflake.density(*(i + o), *t, yarn[ALPHA])
-                areas = (microflake.sigma(*w, *t, yarn[ALPHA]) for w in (i, o))
+                flakes = slab.density(*(i + o), *t, yarn[ALPHA])
+                areas = (slab.sigma(*w, *t, yarn[ALPHA]) for w in (i, o))
                 sums[1] += area * (yarn[BLEND] * cos_i + (1.0 - yarn[BLEND]) * i[2])
                 sums[2] += area * cos_i * slab.reflection(flakes, *areas, cos_i, cos_o, float(table.thickness))
         np.testing.assert_allclose(found[0, family, [BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR]], sums, rtol=RTOL)
@@ -96,7 +96,7 @@ def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviat
         nodes, cells = scratch.nodes[family], scratch.cells[family]
         corners = [bounds[column] for column in (X_LOW, X_HIGH, Y_LOW, Y_HIGH)]
         # Away from the edges of the yarn, where a point's own rounding turns the normal.
-        part = Part(*(np.float32(0.5 + 0.9 * (x - 0.5)) for x in corners))
+        part = CoveredPart(*(np.float32(0.5 + 0.9 * (x - 0.5)) for x in corners))
         footprint = Footprint(*(np.float32(x) for x in (0.55, 0.4, *deviations)))
         place_nodes(table, scratch, piece, 0, footprint, part, family)
         stop = scratch.stops[family]
@@ -108,7 +108,7 @@ def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviat
             nodes, np.zeros(count, np.uint32), np.zeros(1, np.uint8), *none, *none, np.float32(1.0), given,
             yarn, table.thickness,
         )  # fmt: skip
-        assert len(found) == SUMS
+        assert len(found) == NODE_SUMS
 
         rows = nodes[:, :stop].astype(np.float64)
         across = 0.5 + float(yarn[RADIUS]) * rows[SIN]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.summed_area.answer import TAPS, answer, rounds
+from pipeline.analytic.summed_area.answer import MOST_TAPS, answer, rounds
 from pipeline.analytic.summed_area.tables import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -74,7 +74,7 @@ def test_round_ones_stand_for_a_long_footprint():
         np.hypot(found.sigma, found.spread)[found.readings > 1], queries.sigma[found.readings > 1], rtol=1e-5
     )
     np.testing.assert_allclose(found.sigma[found.readings > 1], queries.sigma_minor[found.readings > 1], rtol=1e-5)
-    assert found.readings.min() == 1 and 2 < found.readings.max() <= TAPS
+    assert found.readings.min() == 1 and 2 < found.readings.max() <= MOST_TAPS
     swapped = queries._replace(
         sigma=queries.sigma_minor, sigma_minor=queries.sigma, angle=queries.angle - np.float32(np.pi / 2)
     )

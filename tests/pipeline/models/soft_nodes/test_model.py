@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.detail import DETAILS
 from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.method import Method
 from pipeline.models.registry import load_methods

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from pipeline.truth.checks import invariants
-from pipeline.truth.checks.check_result import LEVEL, exact, quotient, worst
+from pipeline.truth.checks.invariants import SIGNIFICANCE, exact, quotient, worst
 from pipeline.truth.estimator import estimate
 from weaves.fabric import load_fabric, preset_names
 
@@ -99,12 +99,12 @@ def test_colour_that_does_not_add_up_is_found(brief, monkeypatch):
 
 
 def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():
-    """Under Student's t with 15 degrees of freedom, 4,000 families of 24 numbers: Poisson with mean 4,000 LEVEL."""
+    """Under Student's t with 15 degrees of freedom, 4,000 families of 24 numbers: Poisson, mean 4,000 SIGNIFICANCE."""
     families = 4000
     numbers = np.random.default_rng(1).standard_t(15, (families, 24))
     for relation in ("=", "<="):
         count = sum(worst("t", row, 0.0, np.ones(24), 15, relation).status == "broken" for row in numbers)
-        assert count <= stats.poisson.isf(1e-3, families * LEVEL)
+        assert count <= stats.poisson.isf(1e-3, families * SIGNIFICANCE)
         # And not much more rarely: numbers twice as far off are called broken many times.
         wide = sum(worst("t", 2 * row, 0.0, np.ones(24), 15, relation).status == "broken" for row in numbers)
         assert wide > 20

@@ -11,7 +11,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import GAP, surface_at
 from pipeline.truth.geometry.horizon import horizon
 from pipeline.truth.geometry.visibility import ray, visible
-from pipeline.truth.node_table.build import FAMILY, tabulate
+from pipeline.truth.node_table.build import PIECE_FAMILY, tabulate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -47,7 +47,7 @@ def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
     areas = dict.fromkeys(range(3), 0.0)
     for number, piece in enumerate(table.pieces):
         stop = table.pieces[number + 1, 0] if number + 1 < len(table.pieces) else table.evenly.size
-        areas[int(piece[FAMILY])] += float(table.evenly[piece[0] : stop].sum())
+        areas[int(piece[PIECE_FAMILY])] += float(table.evenly[piece[0] : stop].sum())
     assert areas[GAP] == pytest.approx(0.3**2, rel=1e-4)
     assert areas[0] == pytest.approx(0.5 * (0.7 + 0.7 * 0.3), rel=1e-4)
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, height_field
-from pipeline.truth.node_table.build import COLUMNS, FAMILY, FINE_START, ROWS, START, tabulate
-from pipeline.truth.node_table.directions import Direction
+from pipeline.truth.node_table.build import FIRST_FINE, FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, tabulate
 from pipeline.truth.node_table.kernels import (
-    Horizons,
-    Layer,
+    Direction,
+    FlakeLayer,
+    HorizonSlopes,
     Normals,
     Tangents,
     crossing,
+    no_shares,
     reflected,
     transmitted,
     weigh,
 )
-from pipeline.truth.node_table.shares import no_shares
-from pipeline.truth.scattering import microflake, slab
+from pipeline.truth.scattering import slab
 from weaves.fabric import load_fabric
 
 WI = [(0.3, -0.4), (-0.7, 0.3), (0.05, 0.02)]
@@ -43,7 +43,7 @@ def direction(w):
 
 def layer(field, family):
     alpha = float(field.yarn[family, ALPHA])
-    return Layer(*(np.float32(x) for x in (alpha**2, field.thickness, alpha**3 / (4 * math.pi))))
+    return FlakeLayer(*(np.float32(x) for x in (alpha**2, field.thickness, alpha**3 / (4 * math.pi))))
 
 
 @pytest.fixture(scope="module")
@@ -58,12 +58,12 @@ def cloth():
 def pieces(table):
     """Yield family, and the nodes' and the first fine nodes' slices, of every piece of yarn."""
     for piece in table.pieces:
-        count = piece[COLUMNS] * piece[ROWS]
-        if piece[FAMILY] != GAP:
+        count = piece[NODES_X] * piece[NODES_Y]
+        if piece[PIECE_FAMILY] != GAP:
             yield (
-                piece[FAMILY],
-                slice(piece[START], piece[START] + count),
-                slice(piece[FINE_START], piece[FINE_START] + count),
+                piece[PIECE_FAMILY],
+                slice(piece[FIRST_NODE], piece[FIRST_NODE] + count),
+                slice(piece[FIRST_FINE], piece[FIRST_FINE] + count),
             )
 
 
@@ -82,9 +82,9 @@ def scattered(field, family, wi, wo, normal, tangent, inverse, **factors):
             cos_i = -cos_i
         if cos_i > 0 and cos_o > 0:
             t = tangent[:, k]
-            flakes = microflake.density(*(wi + wo), *t, alpha)
-            sigma_i = microflake.sigma(*wi, *t, alpha) * factors.get("sigma_i", 1.0)
-            sigma_o = microflake.sigma(*wo, *t, alpha) * factors.get("sigma_o", 1.0)
+            flakes = slab.density(*(wi + wo), *t, alpha)
+            sigma_i = slab.sigma(*wi, *t, alpha) * factors.get("sigma_i", 1.0)
+            sigma_o = slab.sigma(*wo, *t, alpha) * factors.get("sigma_o", 1.0)
             value = function(flakes * factors.get("density", 1.0), sigma_i, sigma_o, cos_i, cos_o, thickness)
             found[k] = value * cos_i * cos_o * inverse[k]
     return found
@@ -136,7 +136,7 @@ def test_area_diffuse_and_unscattered(cloth, case):
         count = len(normal.x)
         shares, low = no_shares(count), np.full(count, -1e3, np.float32)
         shares.weight[:] = 1.0
-        flat, blend = Horizons(low, low), np.float32(field.yarn[family, BLEND])
+        flat, blend = HorizonSlopes(low, low), np.float32(field.yarn[family, BLEND])
         found = weigh(normal, direction(wi), flat, direction(wo), flat, blend, shares)
         n, i, o = np.stack(normal[:3]).astype(np.float64), wi.astype(np.float64), wo.astype(np.float64)
         cos_i, area = i @ n, np.maximum(o @ n, 0.0) / n[2]
@@ -151,7 +151,7 @@ def test_area_diffuse_and_unscattered(cloth, case):
         crossed = crossing(normal, tangent, direction(wo), layer(field, family), shares.areas)
         t = np.stack(tangent).astype(np.float64)
         through = [
-            slab.unscattered(microflake.sigma(*o, *t[:, k], alpha), float(o @ n[:, k]), field.thickness)
+            slab.unscattered(slab.sigma(*o, *t[:, k], alpha), float(o @ n[:, k]), field.thickness)
             if area[k] > 0
             else 0.0
             for k in range(count)

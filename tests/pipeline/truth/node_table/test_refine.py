@@ -7,12 +7,12 @@ import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import REFINED
-from pipeline.truth.cloth import AREA, SUMS, cloth_side, columns_of
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, cloth_side, columns_of
 from pipeline.truth.estimator import uncalibrated
 from pipeline.truth.monte_carlo import add_point, query_directions
 from pipeline.truth.node_table.cut import Known, Row, add_row, row_room
 from pipeline.truth.node_table.doubts import doubtful_from, no_doubts
-from pipeline.truth.node_table.shares import no_shares
+from pipeline.truth.node_table.kernels import no_shares
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
@@ -23,7 +23,7 @@ EVERY_PLACE = Known(False, False, True)
 
 def mean_of_points(cloth, directions, x, y, size, tilt):
     """Return the mean of the sums over a square of 60 by 60 points."""
-    sums = np.zeros((1, SUMS))
+    sums = np.zeros((1, POINT_SUMS))
     for u in (np.arange(60) + 0.5) / 60:
         for v in (np.arange(60) + 0.5) / 60:
             add_point(cloth, x + u * size, y + v * size, 1.0 + tilt * (u - 0.5), directions, sums, 0)
@@ -49,7 +49,7 @@ def test_cut_rows_are_unbiased(name, behind, known):
             add_row(cloth, directions, Row(x, y + height * size, size, 0.0, offset, 1.0, tilt), known, room)
             values.append(room.value.copy())
         found, spread = np.mean(values, axis=0), np.std(values, axis=0) / 8
-        for q in (0, 1, 2, 3, AREA):
+        for q in (0, 1, 2, 3, AREA_SUM):
             crossed += spread[q] > 0.01 * abs(found[q])
             # A point more or less on either side of a border: the squares of points are no closer.
             allowed = 4 * spread[q] + 0.02 * abs(exact[q])

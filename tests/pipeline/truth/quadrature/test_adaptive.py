@@ -10,10 +10,10 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX_SIDE
-from pipeline.truth.geometry.symmetry import first_cells
+from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
-from pipeline.truth.quadrature.parts import rectangles
+from pipeline.truth.quadrature.rules import rectangles
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.truth.scattering.microflake import density, sigma
-from pipeline.truth.scattering.slab import reflection, transmission, unscattered
+from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 LEVEL = 2.7e-3  # 3 sigma, for all comparisons of one kind together
 BINS = 4  # of |cos_o| in each hemisphere

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from pipeline.truth.scattering.microflake import density, sigma
-from pipeline.truth.scattering.slab import reflection, transmission, unscattered
+from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 RNG = np.random.default_rng(1)
 

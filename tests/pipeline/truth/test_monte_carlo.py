@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.truth.footprint.hidden import conceal
+from pipeline.truth.monte_carlo import conceal
 from pipeline.truth.query import HIDDEN_SHARE
 
 

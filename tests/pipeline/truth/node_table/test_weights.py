@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.truth.footprint.masses import interval_masses
 from pipeline.truth.footprint.place import BOX, GAUSSIAN, place
+from pipeline.truth.node_table.weights import interval_masses
 
 
 @pytest.mark.parametrize("shape", [GAUSSIAN, BOX])

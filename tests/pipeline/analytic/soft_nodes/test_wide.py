@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.axis_densities import axis_densities
 from pipeline.analytic.soft_nodes.footprint_nodes import REACH
-from pipeline.analytic.soft_nodes.look import Look
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.scratch import scratch_for
-from pipeline.analytic.soft_nodes.weights import product_weights, wave_weights, waves_kept
+from pipeline.analytic.soft_nodes.scratch import SoftQuery, scratch_for
+from pipeline.analytic.soft_nodes.wide import axis_densities, product_weights, wave_weights, waves_kept
 from pipeline.truth.footprint.mixture import narrow_axis
 from weaves.fabric import load_fabric
 
@@ -45,7 +43,7 @@ def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
     narrowest = np.float32(narrow_axis(deviation_x, deviation_y, correlation))
     footprint = (np.float32(n) for n in (deviation_x, deviation_y, correlation))
     above, turn = (np.float32(n) for n in (0, 0, 1, 0, 0, 1)), np.float32(0)
-    look = Look(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn, turn, turn)
+    look = SoftQuery(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn, turn, turn)
     waves = table.waves, table.wave_nodes, table.evenly
     count = waves_kept(table.wave_size, narrowest)
     wave_weights(*waves, look, count, table.repeat, scratch.turns, scratch.phases, scratch.weight)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance.point import flake_scatter_pdf, flake_scatter_weight, sample_flake_scatter
+from pipeline.analytic.importance.mixture import flake_scatter_pdf, flake_scatter_weight, sample_flake_scatter
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.sequences import independent_pair, owen_pair
-from pipeline.truth.scattering.microflake import density, sigma
-from pipeline.truth.scattering.slab import reflection, transmission
+from pipeline.truth.scattering.slab import density, reflection, sigma, transmission
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
 ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell
