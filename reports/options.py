@@ -72,20 +72,6 @@ class EdgeOptions(_Options):
 class ImageOptions(_Options):
     """How a picture is compared with the truth's (`reports.measure.scene.image_error`)."""
 
-    exposure: float = Field(default=1.6, gt=0)
-    """Factor on linear values before they are shown, as on the page (`tiles`); HDR-FLIP chooses its own."""
-    relative_epsilon: float = Field(default=0.01, gt=0)
-    """Constant that keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
-    ssim_sigma: float = Field(default=1.5, ge=0.5, le=8)
-    """Standard deviation of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them."""
-    pixels_per_degree: float = Field(default=67.0, ge=1, le=200)
-    """At which FLIP sees pictures; 67 is a 4K display .7 m wide from .7 m."""
-    tone_mapper: Literal["aces", "hable", "reinhard"] = "aces"
-    """By which HDR-FLIP shows its exposures."""
-    floor_channels: Literal["together", "independent"] = "together"
-    """Noise of the noised copy of the truth in the channels of a pixel. Their noise is that of the same points in a few
-    colours: drawn independently it would be coloured, and the noise floor of colour differences several times that of
-    a perfect method."""
     block: int = Field(default=16, ge=1, le=4096)
     """Side of the blocks of pixels that intervals draw anew; at most a quarter of the picture's shorter side. It
     should exceed the distance over which errors resemble each other."""
@@ -93,25 +79,6 @@ class ImageOptions(_Options):
     """Bootstrap resamples."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Of the resamples and of the noised copy of the truth."""
-
-
-class DisplayOptions(_Options):
-    """The display and the place from which FovVideoVDP looks at frames (`reports.measure.scene.scene_errors`)."""
-
-    resolution: tuple[Annotated[int, Field(ge=1, le=2**16)], Annotated[int, Field(ge=1, le=2**16)]] = (3840, 2160)
-    """Width and height in pixels."""
-    diagonal: float = Field(default=30.0, gt=0)
-    """In inches."""
-    distance: float = Field(default=0.7472, gt=0)
-    """Of the eye, in metres."""
-    peak: float = Field(default=200.0, gt=0)
-    """Luminance of white, in candela per square metre."""
-    contrast: float = Field(default=1000.0, gt=1)
-    """Luminance of white over that of black."""
-    frames_per_second: float = Field(default=30.0, gt=0)
-    """At which the frames are shown."""
-    exposure: float = Field(default=1.6, gt=0)
-    """Factor on linear values before they are shown."""
 
 
 class _SceneSeed(_Options):
@@ -141,8 +108,6 @@ class SceneErrorOptions(_SceneSeed):
     """Round footprint that replaces an ellipse where a method answers round footprints only."""
     image: ImageOptions = ImageOptions()
     """How pictures are compared."""
-    display: DisplayOptions = DisplayOptions()
-    """Display of FovVideoVDP, which is measured where it is installed."""
 
 
 class SceneBenchOptions(SceneErrorOptions, ShotOptions):

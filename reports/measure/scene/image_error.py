@@ -7,10 +7,11 @@ linear light    MSE and relative MSE as in `reports.error`, noise subtracted. Co
 display light   PSNR, SSIM, FLIP, HDR-FLIP and CIEDE2000, means of maps. PSNR is infinite where pictures are equal.
 
 Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
-subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel (option
-`floor_channels`), fixed seed: about the score of a perfect method. Intervals are 95 % percentile bootstraps over
-square blocks of pixels, since errors of neighbours are correlated (`reports.measure.block_bootstrap`); they say how
-much the choice of pixels matters, not the noise floor.
+subtracted; their floor is the measure of a noised copy, t + s z, against t, z standard normal, one a pixel for all
+channels, fixed seed: about the score of a perfect method. Noise of the truth is that of the same points in a few
+colours: drawn apart for each channel it would be coloured, and the floor of colour differences several times too high.
+Intervals are 95 % percentile bootstraps over square blocks of pixels, since errors of neighbours are correlated
+(`reports.measure.block_bootstrap`); they say how much the choice of pixels matters, not the noise floor.
 
 Maps of the perceived difference on a display. Outside the mask both pictures are set to one grey, the median luminance
 of the truth's lit pixels: nothing there enters, not even by the windows of SSIM and FLIP, and it shifts no exposure of
@@ -49,6 +50,16 @@ Mask = npt.NDArray[np.bool_]
 
 PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e")
 """Perceptual measures; the metric of the noise floor is `<metric>_floor`."""
+
+RELATIVE_EPSILON: Final = 0.01
+"""Constant that keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
+
+DISPLAY_EXPOSURE: Final = 1.6
+"""Factor on linear values before they are shown, as on the page."""
+
+_SSIM_SIGMA: Final = 1.5  # of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them
+_PIXELS_PER_DEGREE: Final = 67.0  # at which FLIP sees pictures: a 4K display .7 m wide from .7 m
+_TONE_MAPPER: Final = "aces"  # by which HDR-FLIP shows its exposures
 
 
 class Measure(NamedTuple):
@@ -119,11 +130,11 @@ def image_errors(
     """
     options = options or ImageOptions()
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
-    window = 2 * int(3.5 * options.ssim_sigma + 0.5) + 1
+    window = 2 * int(3.5 * _SSIM_SIGMA + 0.5) + 1
     if t.shape[2] != 3 or min(lit.shape) < window:
         raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
     mse, relative = light_errors(m, t, s, lit, options)
-    maps = perceived_maps(m, t, lit, options)
+    maps = perceived_maps(m, t, lit)
     floors = floor or noise_floor(t, s, lit, options)
     perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
     return ImageErrors(mse, relative, perceived, maps, lit)
@@ -135,9 +146,8 @@ def noise_floor(
     """Return the scores of a noised copy of the truth, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
     options = options or ImageOptions()
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
-    channels = 1 if options.floor_channels == "together" else 3
-    noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], channels))
-    maps = perceived_maps(noised, t, lit, options)
+    noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], 1))
+    maps = perceived_maps(noised, t, lit)
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
@@ -155,9 +165,9 @@ def light_errors(
     options = options or ImageOptions()
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
     m, t, s = m[lit], t[lit], s[lit]
-    w = relative_weight(t, options.relative_epsilon)
+    w = relative_weight(t, RELATIVE_EPSILON)
     squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
-    errors = squared_error(m, t, s, 0), relative_squared_error(m, t, s, options.relative_epsilon, 0)
+    errors = squared_error(m, t, s, 0), relative_squared_error(m, t, s, RELATIVE_EPSILON, 0)
     spreads = [block_interval(rows, lit, options.block, options.resamples, options.seed) for rows in squares]
     mse, relative = (
         replace(error, standard_error=spread, low=low, high=high)
@@ -206,13 +216,13 @@ def _checked(
     return m, t, s, lit
 
 
-def perceived_maps(picture: Floats, truth: Floats, lit: Mask, options: ImageOptions) -> dict[str, Floats]:
+def perceived_maps(picture: Floats, truth: Floats, lit: Mask) -> dict[str, Floats]:
     """Return the maps above by name, (H, W); pictures (H, W, 3), `lit` (H, W) the pixels that count."""
     grey = float(np.median(truth[lit] @ LUMINANCE))
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
-    light, light_truth = (np.clip(options.exposure * values, 0.0, 1.0) for values in (picture, truth))
+    light, light_truth = (np.clip(DISPLAY_EXPOSURE * values, 0.0, 1.0) for values in (picture, truth))
     shown, shown_truth = encoded(light), encoded(light_truth)
-    window = {"gaussian_weights": True, "sigma": options.ssim_sigma, "use_sample_covariance": False}
+    window = {"gaussian_weights": True, "sigma": _SSIM_SIGMA, "use_sample_covariance": False}
     compare: Any = structural_similarity  # has no types
     similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
     # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
@@ -220,18 +230,18 @@ def perceived_maps(picture: Floats, truth: Floats, lit: Mask, options: ImageOpti
     return {
         "square": ((shown - shown_truth) ** 2).mean(axis=-1),
         "ssim": similarity.mean(axis=-1),
-        "flip_ldr": _flip(shown, shown_truth, "LDR", options),
-        "flip_hdr": _flip(np.maximum(unit * picture, 0.0), unit * truth, "HDR", options),
+        "flip_ldr": _flip(shown, shown_truth, "LDR"),
+        "flip_hdr": _flip(np.maximum(unit * picture, 0.0), unit * truth, "HDR"),
         "delta_e": delta_e(light, light_truth),
     }
 
 
-def _flip(picture: Floats, truth: Floats, kind: str, options: ImageOptions) -> Floats:
+def _flip(picture: Floats, truth: Floats, kind: str) -> Floats:
     """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
     values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
-    parameters: dict[str, Any] = {"ppd": options.pixels_per_degree}
+    parameters: dict[str, Any] = {"ppd": _PIXELS_PER_DEGREE}
     if kind == "HDR":
-        parameters["tonemapper"] = options.tone_mapper
+        parameters["tonemapper"] = _TONE_MAPPER
     errors, _, _ = flip_evaluator.evaluate(
         *values, kind, applyMagma=False, computeMeanError=False, parameters=parameters
     )

@@ -9,7 +9,7 @@ numbers.
 
 FovVideoVDP [Mantiuk2021FovVideoVDP] is the visibility of the difference of two films in JOD: 10 where they look the
 same, one less where 3 of 4 people prefer the truth. Sustained and transient contrast count, so flicker does. Films are
-luminance on a display (`DisplayOptions`): Y = peak min(max(exposure L, 0), 1) + peak / contrast. Frames are fewer than
+luminance on a display: Y = peak min(max(exposure L, 0), 1) + peak / contrast. Frames are fewer than
 the quarter of a second that the metric looks back: the first one is taken to have stood still before. `pyfvvdp` may
 not be used commercially and is therefore no dependency.
 """
@@ -30,7 +30,7 @@ from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import image_errors, noise_floor
+from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON, image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
@@ -43,7 +43,6 @@ from typing import Any
 
 from reports.error import relative_weight
 from reports.measure.scene.image_error import ImageErrors
-from reports.options import DisplayOptions
 from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
@@ -53,6 +52,14 @@ LONGEST: Final = 0.01
 
 FEWEST: Final = 128
 """Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""
+
+# The display and the place from which FovVideoVDP looks at it.
+_RESOLUTION: Final = (3840, 2160)  # pixels
+_DIAGONAL: Final = 30.0  # inches
+_DISTANCE: Final = 0.7472  # of the eye, in metres
+_PEAK: Final = 200.0  # candela per square metre
+_CONTRAST: Final = 1000.0  # luminance of white over that of black
+_FRAMES_PER_SECOND: Final = 30.0
 
 
 class _Reference(NamedTuple):
@@ -105,7 +112,7 @@ def measure_scene(
         errors = image_errors(shown[0], truth, noise, lit, image, reference.floor)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            layers = frame_layers(shown) | difference_maps(shown[0], truth, errors, image.relative_epsilon)
+            layers = frame_layers(shown) | difference_maps(shown[0], truth, errors, RELATIVE_EPSILON)
             write_picture(pictures[method.setting], shown[0], np.ones(lit.shape, np.bool_), about, layers=layers)
         subject = _subject(method, shot, provenance)
         records += errors.records(subject)
@@ -135,7 +142,7 @@ def _over_time(subject: Record, shown: Floats, reference: _Reference, options: S
     return [
         *records,
         subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)),
-        *fovvideovdp_records(subject, own, truth, options.display),
+        *fovvideovdp_records(subject, own, truth),
     ]
 
 
@@ -235,7 +242,7 @@ def absence() -> str:
     return ""
 
 
-def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOptions | None = None) -> float | None:
+def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike) -> float | None:
     """Return the quality of a film in JOD; None where pyfvvdp is not installed.
 
     Parameters
@@ -249,7 +256,6 @@ def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOpt
     BadInput
         If sizes differ, there are fewer than two frames, or a value is not finite.
     """
-    options = options or DisplayOptions()
     film, reference = (np.asarray(values, np.float64) for values in (frames, truth))
     if film.shape != reference.shape or film.ndim != 3 or len(film) < 2:
         raise BadInput(
@@ -259,25 +265,23 @@ def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOpt
         raise BadInput("FovVideoVDP", "frames", "not finite", "every pixel needs a number")
     if absence():
         return None
-    metric = _metric(options)
-    light = [(options.peak * np.clip(options.exposure * a, 0.0, 1.0)).astype(np.float32) for a in (film, reference)]
-    return float(metric.predict(*light, dim_order="FHW", frames_per_second=options.frames_per_second)[0])
+    metric = _metric()
+    light = [(_PEAK * np.clip(DISPLAY_EXPOSURE * a, 0.0, 1.0)).astype(np.float32) for a in (film, reference)]
+    return float(metric.predict(*light, dim_order="FHW", frames_per_second=_FRAMES_PER_SECOND)[0])
 
 
-def fovvideovdp_records(
-    subject: Record, frames: npt.ArrayLike, truth: npt.ArrayLike, options: DisplayOptions | None = None
-) -> list[Record]:
+def fovvideovdp_records(subject: Record, frames: npt.ArrayLike, truth: npt.ArrayLike) -> list[Record]:
     """Return the score as a Record of `subject`; none where pyfvvdp is not installed."""
-    score = fovvideovdp(frames, truth, options)
+    score = fovvideovdp(frames, truth)
     return [] if score is None else [subject.of("fovvideovdp", score, len(np.asarray(truth)))]
 
 
-def _metric(options: DisplayOptions) -> Any:
+def _metric() -> Any:
     library = _library()
     return library.fvvdp(
-        display_photometry=library.fvvdp_display_photo_eotf(options.peak, contrast=options.contrast, EOTF="linear"),
+        display_photometry=library.fvvdp_display_photo_eotf(_PEAK, contrast=_CONTRAST, EOTF="linear"),
         display_geometry=library.fvvdp_display_geometry(
-            options.resolution, distance_m=options.distance, diagonal_size_inches=options.diagonal
+            _RESOLUTION, distance_m=_DISTANCE, diagonal_size_inches=_DIAGONAL
         ),
         device="cpu",
         quiet=True,

@@ -320,3 +320,9 @@ def test_any_bytes_raise_bad_input(files, content):
     files.path.write_bytes(content)
     with pytest.raises(BadInput):
         load_recipe(files.path)
+
+
+@pytest.mark.parametrize("name", ["stability", "sampler"])
+def test_what_was_measured_without_a_recipe_names_the_recipe_that_measures_it(name):
+    with pytest.raises(BadInput, match=r"is measured by the recipe truth: `twillight run truth`"):
+        load_recipe(name)

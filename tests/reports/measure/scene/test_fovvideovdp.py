@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from reports.measure.scene.scene_errors import absence, fovvideovdp, fovvideovdp_records
-from reports.options import DisplayOptions
 from reports.record import Record
 from weaves.errors import BadInput
 
@@ -49,10 +48,6 @@ class TestInstalled:
 
         smooth = 0.3 * ndimage.gaussian_filter(NOISE, (0, 6, 6))
         assert fovvideovdp(TRUTH + smooth, TRUTH) < fovvideovdp(TRUTH + smooth[:1], TRUTH)
-
-    def test_an_error_is_less_visible_from_afar(self):
-        near, far = (fovvideovdp(TRUTH + 0.03 * NOISE, TRUTH, DisplayOptions(distance=d)) for d in (0.5, 3.0))
-        assert near < far
 
     def test_record_is_in_jod(self):
         (record,) = fovvideovdp_records(Record(method="woven"), TRUTH + 0.03 * NOISE, TRUTH)
