@@ -16,7 +16,7 @@ from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from reports.added_metric import AddedMetric
 from reports.catalogue import enter
 from reports.options import BenchOptions, Role

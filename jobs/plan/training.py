@@ -10,7 +10,7 @@ from jobs.plan.dataset import Shard, folder_of
 from jobs.plan.task import Made, Place, Progress, Stage, Task
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline import versions
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.extra_rows import set_name
 from pipeline.training.options import TrainingOptions

@@ -11,8 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import entry_points
 from typing import Any, Final
 
-from pipeline.models.added.added_code import AddedFunction
-from pipeline.models.added.added_method import ADDED, GROUP, AddedMethod
+from pipeline.models.added.added_code import ADDED, GROUP, AddedFunction, AddedMethod
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import WHERE
 from pipeline.models.catalogue import CLASSES, REPLACED

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from pipeline.models.added.added_method import ADDED
+from pipeline.models.added.added_code import ADDED
 from pipeline.models.domain import PHYSICS, Domain
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name

@@ -120,7 +120,7 @@ def _one_thread_each(other: Answerer | None) -> AbstractContextManager[None]:
     """Return what keeps a model's torch on the threads that call it; the truth needs no torch."""
     if other is None:
         return nullcontext()
-    from pipeline.models.method import one_thread
+    from pipeline.models.network import one_thread
 
     return one_thread()
 

@@ -22,8 +22,9 @@ from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.recipe.validation import table_refusal
 from pipeline.atomic import atomic_write
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.domain import PHYSICS
+from pipeline.models.options import setting_of
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
@@ -98,7 +99,7 @@ def write_recipe(
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
         "models": [
-            {"model": named} | _model(model, setting, effort, _bent(model, queries) | dict(options)),
+            {"model": named} | _model(model, _setting(model, setting), effort, _bent(model, queries) | dict(options)),
             *_baseline(general, method),
         ],
         "bench": _bench(general, _beside(path, scene)),
@@ -177,11 +178,16 @@ def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
     """Return point sampling with 2 points, the baseline, if the general recipe has it."""
     found = [model for model in general.models if model.options.name == _BASELINE != method]
-    return [{"model": _BASELINE} | _model(model, "k = 2", 1.0) for model in found]
+    return [{"model": _BASELINE} | _model(model, 2, 1.0) for model in found]
+
+
+def _setting(model: ModelRecipe, setting: str) -> int | None:
+    """Return the setting k that tables show as `setting`."""
+    return next((k for k in model.options.settings if setting_of(k) == setting), None)
 
 
 def _model(
-    model: ModelRecipe, setting: str, effort: float, other: Mapping[str, Any] = MappingProxyType({})
+    model: ModelRecipe, k: int | None, effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Return a model's table without `model`, with one setting, if given, and a shortened training."""
     if isinstance(model.options, AddedMethod):
@@ -191,8 +197,8 @@ def _model(
         options["name"] = model.options.name
         validated(type(model.options), options, "--set")
         options.pop("model", None)
-    if setting.startswith("k = ") and model.options.parameter:
-        options[model.options.parameter] = [int(setting.removeprefix("k = "))]
+    if k is not None and model.options.parameter:
+        options[model.options.parameter] = [k]
     if model.learns:
         training = model.training
         # The running average of the weights spans the same share of the training.

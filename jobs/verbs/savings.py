@@ -31,6 +31,7 @@ from jobs.run.ledger import Ledger
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from jobs.verbs.require_recipe import alone
 from pipeline.models.card import read_card
+from pipeline.models.options import setting_of
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
@@ -231,7 +232,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
 
 def _setting(model: ModelRecipe) -> str:
     """Return the first of a model's settings, of which a scene's recipe has one."""
-    return f"k = {model.options.settings[0]}" if model.options.settings else ""
+    return setting_of(next(iter(model.options.settings), None))
 
 
 def _elsewhere(

@@ -41,8 +41,9 @@ class PointSampler:
         """Return the share of light from straight behind that passes at the same points, (N,)."""
         return _sample(self.model, columns_of(looks), count, np.uint64(seed), r2, 4, 5)[:, 0]
 
-    def bytes_stored(self) -> int:
-        """Return the bytes of the tables that the point model reads."""
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the tables that the point model reads."""
         return sum(array.nbytes for array in self.model.front if isinstance(array, np.ndarray))
 
 

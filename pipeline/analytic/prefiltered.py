@@ -86,8 +86,9 @@ class PrefilteredMaps:
         u, v, sigma, wi, wo = (np.ascontiguousarray(column, np.float32) for column in queries[:5])
         return _answer(self.pyramid, u, v, sigma, wi, wo, widening)
 
-    def bytes_stored(self) -> int:
-        """Return the bytes of all levels."""
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all levels."""
         return self.pyramid.texels.nbytes
 
 

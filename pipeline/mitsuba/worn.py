@@ -30,8 +30,8 @@ from pipeline.analytic.importance.lobes import Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.cores import cores
 from pipeline.models.fallback import Fallback
-from pipeline.models.method import one_thread
 from pipeline.models.named import TRUTH, named_method
+from pipeline.models.network import one_thread
 from pipeline.models.patch_bsdf import USUAL, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
-from pipeline.models.method import CHUNK, Method, one_thread
+from pipeline.models.method import CHUNK, Method
+from pipeline.models.network import one_thread
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

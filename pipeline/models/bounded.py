@@ -22,9 +22,8 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.method import CHUNK, Method
+from pipeline.models.method import CHUNK, Method, refuse_other
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.plain import refuse_other
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -60,7 +59,7 @@ class Bounded:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
-        refuse_other(queries, self.name, stretch=True)
+        refuse_other(queries, self.name, ("stretch",))
         result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
         for start in range(0, len(result), CHUNK):
             rows = slice(start, start + CHUNK)

@@ -1,36 +1,21 @@
-"""Interfaces: `Method`, which a benchmark measures, and `Network`, which the training loop trains.
-
-A Method evaluates queries on a fabric; arrays are NumPy. A Network is the trainable part of a method; its batches are
-torch tensors.
-"""
+"""The interface of a method, which a benchmark measures: it evaluates queries on a fabric; arrays are NumPy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from collections.abc import Collection
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
-import torch
-from torch import Tensor, nn
 
 from pipeline.truth.query import Queries
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 CHUNK = 4096
 """Rows of one inference on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
 
-GPU_CHUNK = 2**18
-"""Rows of one inference on a GPU."""
-
-KNOWN = ("u", "v", "sigma", "wi", "wo")
-"""Columns of round footprints of flat cloth, the inputs of the published networks."""
-
-Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
-"""Cards and weights of trained models."""
-
-Net = TypeVar("Net", bound=nn.Module)
+_ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ
 
 
 @runtime_checkable
@@ -66,113 +51,28 @@ class EstimatesErrors(Method, Protocol):
         """Return the method at a wished relative error, above 0 and below 1: other answers where it is exceeded."""
 
 
-class Batch(NamedTuple):
-    """Queries and targets of a training step: F fabrics, n queries each.
+def refuse_other(queries: Queries, method: str, kinds: Collection[str] = ()) -> None:
+    """Refuse queries that are neither plain nor of some `kinds`: a BadInput that names row and column.
 
-    Attributes
-    ----------
-    fabric : int64 (F,)
-        Index into the fabrics the network was built for.
-    u, v, sigma : float32 (F, n)
-        Footprint, in yarn spacings.
-    wi, wo : float32 (F, n, 3)
-        Directions.
-    sigma_minor, angle, curvature : float32 (F, n)
-        The rest of the query, as in `Queries`.
-    target : float32 (F, n, 4)
-        Components.
-    transparency : float32 (F, n)
-        Share of light from straight behind that passes unscattered.
+    Plain queries are of flat cloth, round footprints, and lit from the front; others are of the kinds ``stretch``,
+    ``behind`` and ``curvature``.
     """
-
-    fabric: Tensor
-    u: Tensor
-    v: Tensor
-    sigma: Tensor
-    wi: Tensor
-    wo: Tensor
-    sigma_minor: Tensor
-    angle: Tensor
-    curvature: Tensor
-    target: Tensor
-    transparency: Tensor
-
-
-class Network(Protocol):
-    """A torch module that the training loop can train; the module's file describes what it learns.
-
-    A network from outside needs `loss` alone (`pipeline.models.added.network`).
-    """
-
-    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
-        """Return the loss of a batch; `random` is a pure function of seed and step."""
-
-    def start_at(self, target: Tensor) -> None:
-        """Set the last bias to the mean of targets (M, 4): a leaky ReLU can stall far from it."""
-
-    def schedule(self, progress: float) -> None:
-        """Adjust scheduled parameters at `progress` in [0, 1)."""
-
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return the optimiser's parameter groups with their peak learning rates."""
-
-    def architecture(self) -> dict[str, Any]:
-        """Describe layers and parameter counts for the model card."""
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let torch compute on the thread that calls it, for callers that have one thread a core themselves."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-def loaded(network: Net, weights: dict[str, Tensor]) -> Net:
-    """Return a network with these weights; RuntimeError if they do not fit."""
-    network.load_state_dict(weights)
-    return network
-
-
-def in_chunks(
-    queries: Queries,
-    answer: Callable[..., Tensor],
-    device: torch.device,
-    columns: Sequence[str] = KNOWN,
-    width: int = 4,
-) -> npt.NDArray[np.float32]:
-    """Evaluate queries in chunks, without gradients.
-
-    Parameters
-    ----------
-    queries : Queries
-        N queries.
-    answer : callable
-        Takes the columns as float32 tensors (rows,) or (rows, 3) on `device`; returns (rows, width).
-    device : torch.device
-        Device of `answer`.
-    columns : sequence of str
-        Columns that `answer` takes.
-    width : int
-        Values per query.
-
-    Returns
-    -------
-    float32 (N, width)
-    """
-    result = np.empty((len(queries.u), width), np.float32)
-    arrays = [getattr(queries, name) for name in columns]
-    chunk = CHUNK if device.type == "cpu" else GPU_CHUNK
-    with torch.inference_mode():
-        for start in range(0, len(result), chunk):
-            rows = slice(start, start + chunk)
-            # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
-            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in arrays]
-            result[rows] = answer(*tensors).numpy(force=True)
-    return result
+    stretch, behind, curvature = (kind in kinds for kind in ("stretch", "behind", "curvature"))
+    for name, rows, allowed in (
+        ("wo", queries.wo[:, 2] < 0, "viewers in front of the cloth"),
+        ("wi", (queries.wi[:, 2] < 0) & (not behind), "light from the viewer's side"),
+        (
+            "sigma_minor",
+            (np.abs(queries.sigma_minor - queries.sigma) > _ROUND * queries.sigma) & (not stretch),
+            "round footprints (sigma_minor = sigma)",
+        ),
+        ("curvature", (queries.curvature > 0) & (not curvature), "flat cloth (curvature = 0)"),
+    ):
+        if rows.any():
+            row = int(np.flatnonzero(rows)[0])
+            value = getattr(queries, name)[row].tolist()
+            where = f"{int(rows.sum())} rows; first row {row}: {name}"
+            raise BadInput("queries", where, value, f"the method {method} answers {allowed} only")
 
 
 def in_repeat(queries: Queries, repeat: tuple[int, int]) -> Queries:

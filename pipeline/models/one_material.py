@@ -9,7 +9,7 @@ import torch
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain, joined_domain
-from pipeline.models.method import Net, Trained, loaded
+from pipeline.models.network import Net, Trained, loaded
 from pipeline.models.per_fabric import PerFabric
 from weaves.fabric import Fabric
 

@@ -1,15 +1,21 @@
-"""Base class of the options of all models, and the types of fields that several models have.
-
-Fields are declared by each model, in its own order: a base would move them to the front of every card.
-"""
+"""Options that several models have: of all, of networks whose loss is that of components, of textures."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from pipeline import versions
+from pipeline.fingerprint import IDENTITY
 from pipeline.shards.extra_rows import ExtraRows
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
@@ -19,7 +25,7 @@ Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; mu
 """The footprint of a method that knows one kernel."""
 
 LogK = Annotated[float, Field(gt=0, le=1e4, description="k of the specular space g(x) = ln(k x + 1).")]
-"""Strength of the logarithmic compression of highlights in the loss (`pipeline.models.networks.losses`)."""
+"""Strength of the logarithmic compression of highlights in the loss (`pipeline.models.networks.layers`)."""
 
 Weight = Annotated[float, Field(ge=0, le=1e4)]
 """A factor of one term of a loss."""
@@ -29,21 +35,25 @@ RoundFootprint = Literal["geometric_mean", "major"]
 """Round footprint in place of an ellipse: of equal area, or with its major axis."""
 
 
+def setting_of(k: int | None) -> str:
+    """Return the text of a setting k in Records, tables and names of files; empty if there is none."""
+    return "" if k is None else f"k = {k}"
+
+
 class Options(BaseModel):
-    """Options of a model; each has the fields ``model``, the name of its folder, and ``name``, its name in tables."""
+    """Options of a model."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
-    if TYPE_CHECKING:
+    model: str = ""
+    """Name of its folder or file in `pipeline.models`."""
+    name: Name = Field(default_factory=lambda options: options["model"])
+    """Name in tables and files, and of the trained model."""
 
-        @property
-        def model(self) -> str:
-            """Name of the model's folder."""
-
-        @property
-        def name(self) -> str:
-            """Name in tables and files."""
-
+    fixed: ClassVar[tuple[str, ...]] = ()
+    """Names of the choices of its design that are no options; identities and cards state them beside the options."""
+    newer: ClassVar[tuple[str, ...]] = ()
+    """Options that identities leave out at their defaults: trainings of earlier versions keep theirs."""
     learns: ClassVar[bool] = True
     """True if the model is trained."""
     of_one_material: ClassVar[bool] = False
@@ -91,7 +101,7 @@ class Options(BaseModel):
 
     @property
     def settings(self) -> tuple[int, ...]:
-        """Settings k, each a method of its own named ``k = ...``; empty for a model without them.
+        """Settings k, each a method of its own; empty for a model without them.
 
         The seconds of a prediction are those of k = 1.
         """
@@ -107,3 +117,64 @@ class Options(BaseModel):
         if not self.parameter:
             return [self]
         return [self.model_copy(update={self.parameter: [k]}) for k in self.settings]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_fixed(cls, given: Any) -> Any:
+        """Accept choices that a card states, if they are those of this version."""
+        if not isinstance(given, dict):
+            return given
+        return {key: value for key, value in given.items() if key not in cls.fixed or value != getattr(cls, key)}
+
+    @model_serializer(mode="wrap")
+    def _identified(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        """Return the options; as an identity with all choices of the design."""
+        content: dict[str, Any] = dump(self)
+        if info.context != IDENTITY:
+            return content
+        usual = [key for key in self.newer if getattr(self, key) == type(self).model_fields[key].default]
+        content |= {key: getattr(self, key) for key in self.fixed}
+        return {key: value for key, value in content.items() if key not in usual}
+
+
+class ComponentLossOptions(Options):
+    """Options of a network that learns the four components in log space (`pipeline.models.networks.layers`)."""
+
+    log_k: LogK = 3.0
+    specular_weight: Weight = 1.0
+    """Weight of the specular squared error, taken in log space."""
+    diffuse_weight: Weight = 2.0
+    """Weight of the diffuse squared error; equal weights starve it."""
+
+    @model_validator(mode="after")
+    def _something_to_learn(self) -> Self:
+        if self.specular_weight == 0 and self.diffuse_weight == 0:
+            raise ValueError("specular_weight and diffuse_weight must not both be 0")
+        return self
+
+
+class TextureOptions(ComponentLossOptions):
+    """Options of textures and perceptrons of one fabric, and of how they are trained."""
+
+    of_one_material: ClassVar[bool] = True
+    fixed: ClassVar[tuple[str, ...]] = ("channels", "texture_rate")
+
+    texels_per_yarn: int = Field(default=16, ge=1, le=256)
+    """Texels of the finest level along one yarn spacing; textures hold one repeat and wrap."""
+    levels: int = Field(default=0, ge=0, le=12)
+    """Levels of the pyramids, each half as fine as the one before; 0 means down to one texel."""
+    hidden: int = Field(default=25, ge=4, le=256)
+    """Width of the three hidden layers of all perceptrons."""
+    offset: bool = True
+    """Shift the centre along the view by a learnt depth before the look-up."""
+    blur: float = Field(default=8.0, ge=0, le=64)
+    """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
+    blur_halving: float = Field(default=0.11, gt=0, le=1)
+    """Share of the training after which the blur has halved (`neumip`: 3,333 of 30,000 iterations)."""
+    offset_frozen: float = Field(default=0.33, ge=0, le=1)
+    """Share of the training after which the offset texture is held fixed (`neumip`: 10,000 of 30,000 iterations)."""
+
+    channels: ClassVar[int] = 7
+    """Channels of every texture; `curved` does not say."""
+    texture_rate: ClassVar[float] = 3.0
+    """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""

@@ -1,8 +1,9 @@
 """Models by name and from folders; a model's file is imported when it is needed.
 
-The file ``pipeline/models/NAME/model.py`` offers ``restore(options, trained) -> list of Method`` and, if it learns,
-``build(options, fabrics, *extra) -> Network``, where `trained` pairs each model card with its weights. `extra` is one
-list for each set that ``options.extra_rows`` declares: the columns of its rows, fabric by fabric.
+The options of a model that learns nothing make its methods. For one that learns ``pipeline/models/NAME/model.py``
+offers ``restore(options, trained) -> list of Method`` and ``build(options, fabrics, *extra) -> Trainable``, where
+`trained` pairs each model card with its weights. `extra` is one list for each set that ``options.extra_rows`` declares:
+the columns of its rows, fabric by fabric.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from safetensors import SafetensorError
 from torch import Tensor
 
 from pipeline.fingerprint import IDENTITY
-from pipeline.models.added.added_method import ADDED, AddedMethod
+from pipeline.models.added.added_code import ADDED, AddedMethod
+from pipeline.models.analytic.adapter import AnalyticOptions
 from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
-from pipeline.models.method import Method, Trained
+from pipeline.models.method import Method
+from pipeline.models.network import Trained
 from pipeline.storage import place
 from weaves.errors import BadInput, WorkFailed, nearest
 from weaves.fabric import Fabric
@@ -75,7 +78,7 @@ def model_folder(model: str, where: str, key: str) -> Path:
 
 
 def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Sequence[Any] = ()) -> Any:
-    """Return an untrained `pipeline.models.method.Network`.
+    """Return an untrained `pipeline.models.network.Trainable`.
 
     Parameters
     ----------
@@ -108,6 +111,8 @@ def restore_methods(options: ModelOptions, trained: Trained) -> list[Method]:
         from pipeline.models.added.guarded import load_added
 
         return [load_added(options)]
+    if isinstance(options, AnalyticOptions):
+        return list(options.methods())
     methods: list[Method] = module_of(options.model).restore(options, trained)
     return methods
 

@@ -30,8 +30,8 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.models.method import CHUNK, Method
+from pipeline.models.network import PerQuery, Portable
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.per_query import PerQuery, Portable
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.errors import WorkFailed

@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.analytic.soft_nodes import features
 from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
-from pipeline.models.networks import perceptron as linear
+from pipeline.models.networks.layers import LinearLayer
 from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST
 from pipeline.models.neumip.model import LAYERS, Neumip, Parts
 from pipeline.models.runtimes import as_onnx
@@ -88,7 +88,7 @@ class Weights:
         return place
 
     def add_perceptron(
-        self, network: str, layers: Sequence[linear.Layer], activation: str, last: str
+        self, network: str, layers: Sequence[LinearLayer], activation: str, last: str
     ) -> list[PlacedLayer]:
         """Append the layers of a network; inputs of the first one are filled up to whole elements.
 
@@ -96,7 +96,7 @@ class Weights:
         ----------
         network : str
             Name of the network.
-        layers : sequence of Layer
+        layers : sequence of LinearLayer
             From the first to the last one.
         activation, last : str
             Functions of the outputs of all layers but the last, and of the last.
@@ -334,7 +334,7 @@ def _pack(
     for network, layers in (("offset", parts.offset), ("decoder", parts.decoder)):
         places[network] = weights.count
         if layers:
-            first = linear.Layer(_after_elements(layers[0].weights, options.channels), layers[0].biases)
+            first = LinearLayer(_after_elements(layers[0].weights, options.channels), layers[0].biases)
             described += weights.add_perceptron(network, [first, *layers[1:]], "ReLU", "none")
     places["pyramid"] = weights.count
     for index, texture in enumerate(parts.levels):

@@ -22,7 +22,7 @@ from torch import Tensor
 from torch.utils.data import IterableDataset, get_worker_info
 
 from pipeline.atomic import atomic_path
-from pipeline.models.method import Batch
+from pipeline.models.network import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import RowPiece
 from pipeline.shards.schema import QUERY_COLUMNS

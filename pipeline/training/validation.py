@@ -16,7 +16,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from pipeline.models.method import Batch
+from pipeline.models.network import Batch
 from pipeline.models.registry import restore_methods
 from pipeline.shards.manifest import Manifest
 from pipeline.truth.conventions import COMPONENTS

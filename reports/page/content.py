@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.models.added.added_method import ADDED
+from pipeline.models.added.added_code import ADDED
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.options import Options
 from reports.tables.number_format import display

@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.compiled.decorators import allocating_kernel
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK, Method
 from pipeline.models.registry import load_model, pretrained_folder
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import estimate

@@ -1,4 +1,4 @@
-"""Methods and a network from outside, entered as pipeline/models/README.md says, from the text alone; then faults."""
+"""Methods and a network from outside, entered as docs/own_method.md says, from the text alone; then faults."""
 
 import json
 import os
@@ -15,9 +15,9 @@ from reports.record import read_records
 pytestmark = pytest.mark.external  # a cluster of dask
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "pipeline" / "models" / "README.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "own_method.md").read_text(encoding="utf-8")
 (METRIC,) = re.findall(r"^`largest_error.py`:\n\n```python\n(.*?)^```$", TEXT, re.M | re.S)
-SECTION = TEXT.partition("\n## A method of your own\n")[2].partition("\n## ")[0]
+SECTION = TEXT.partition("# A method of your own\n")[2].partition("\n## ")[0]
 NETWORK = TEXT.partition("\n## A network of your own\n")[2].partition("\n## ")[0]
 
 LATE = """

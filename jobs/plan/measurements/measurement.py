@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Progress, Stage, Task, held
 from pipeline import versions
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from reports.added_metric import AddedMetric
 from reports.options import RunOptions
 from weaves.fabric import Fabric

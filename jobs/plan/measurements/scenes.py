@@ -11,7 +11,7 @@ from jobs.plan.measurements.measurement import Measurement, Picture, Reference
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Place, Progress, TaskPart
 from pipeline.fingerprint import file_sha256
-from pipeline.models.options import RoundFootprint
+from pipeline.models.options import RoundFootprint, setting_of
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.scene import Cloth
 from pipeline.scenes.sources import files, worn
@@ -148,7 +148,7 @@ class OnScene(Measurement):
     @property
     def subjects(self) -> tuple[str, ...]:
         """Model, scene and setting."""
-        return (*super().subjects, *(f"k = {k}" for k in self.model.options.settings))
+        return (*super().subjects, *(setting_of(k) for k in self.model.options.settings))
 
     @property
     def pictures(self) -> tuple[Picture, ...]:

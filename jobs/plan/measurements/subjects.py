@@ -13,7 +13,7 @@ from jobs.plan.task import PLACE, Made, Place, TaskPart
 from jobs.plan.training import Training, seed_title
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.catalogue import ModelOptions
-from pipeline.models.options import RoundFootprint
+from pipeline.models.options import RoundFootprint, setting_of
 from reports.options import BenchOptions, Role, RunOptions, select
 from weaves.fabric import Fabric
 
@@ -71,7 +71,7 @@ class Trained(TaskPart):
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
         """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
         settings = self.options.settings
-        return tuple(f"k = {k}" for k in settings if k in counts) if settings else (self.options.variant,)
+        return tuple(setting_of(k) for k in settings if k in counts) if settings else (self.options.variant,)
 
     def seconds(self, queries: float) -> float:
         """Return the estimated seconds in which one core answers so many queries with every setting."""

@@ -15,8 +15,8 @@ from jobs.verbs.render.look import Look
 from pipeline import versions
 from pipeline.atomic import atomic_write
 from pipeline.cores import cores
-from pipeline.models.method import one_thread
 from pipeline.models.named import TRUTH
+from pipeline.models.network import one_thread
 from pipeline.scenes.loading import Loaded
 from pipeline.scenes.picture import PictureMethod, PicturePart, Plane, picture
 from pipeline.truth.conventions import COMPONENTS

@@ -83,8 +83,9 @@ class HorizonMap(NamedTuple):
     yarn: Float32
     thickness: np.float32
 
-    def bytes_stored(self) -> int:
-        """Return the bytes of all arrays."""
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
         return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
 
 

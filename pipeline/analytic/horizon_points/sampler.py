@@ -84,9 +84,10 @@ class HorizonSampler:
         footprints = (u, v, *deviations(queries))
         return _sample(self.map, footprints, wi, wo, count, r2, self._soft, np.uint64(seed))
 
-    def bytes_stored(self) -> int:
-        """Return the bytes of the map."""
-        return self.map.bytes_stored()
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the map."""
+        return self.map.nbytes
 
 
 class _Batch(NamedTuple):

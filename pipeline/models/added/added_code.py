@@ -1,4 +1,4 @@
-"""Code from outside the package: where it is, its hash, its version.
+"""Options of a method or metric from outside: its code, with place, hash and version, and a method's own options.
 
 No recipe holds these fields. They are made from `--add` or from an installed package (`jobs.recipe.added`), so a recipe
 alone never runs code. Where the code lies and how long a call may take are no part of an identity.
@@ -7,7 +7,7 @@ alone never runs code. Where the code lies and how long a call may take are no p
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import (
     BaseModel,
@@ -19,6 +19,16 @@ from pydantic import (
 )
 
 from pipeline.fingerprint import IDENTITY
+from pipeline.models.options import Name, Options
+
+ADDED: Final = "added"
+"""The value of `model` of all methods from outside."""
+
+GROUP: Final = "twillight.methods"
+"""Group of the entry points by which an installed package offers methods."""
+
+Kind = Literal["behind", "stretch", "curvature"]
+"""Kind of queries beyond flat cloth, round footprints and light from the front."""
 
 Limit = Annotated[float, Field(gt=0, le=86_400)]
 """Seconds."""
@@ -57,7 +67,7 @@ class AddedCode(BaseModel):
         return f"{where}, version {self.stated}, SHA-256 {self.sha256}"
 
     @model_serializer(mode="wrap")
-    def _without_places(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+    def _identified(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
         content: dict[str, Any] = dump(self)
         if info.context != IDENTITY:
             return content
@@ -79,3 +89,44 @@ class AddedFunction(AddedCode):
     """Direction of a better value."""
     format: str
     """How tables print a value."""
+
+
+class AddedMethod(AddedCode, Options):
+    """A method from outside the package."""
+
+    seconds: ClassVar[tuple[float, float]] = (2e-5, 1e-5)
+
+    model: Literal["added"] = "added"
+    """Mark of a method from outside."""
+    name: Name
+    """Name in tables."""
+    own: dict[str, Any] = Field(default={})
+    """Its own options: the keywords that it is made with."""
+    setting: str = ""
+    """Variant that the method states."""
+    answers: tuple[Kind, ...] = ()
+    """Kinds of queries that it answers beside the plain ones."""
+    has_network: bool = False
+    """True if it has a network, which the benchmark trains."""
+    has_one_fabric: bool = False
+    """True if a trained network knows a single fabric."""
+
+    @property
+    def learns(self) -> bool:  # type: ignore[override]
+        """True if it is trained."""
+        return self.has_network
+
+    @property
+    def of_one_material(self) -> bool:  # type: ignore[override]
+        """True if a trained network knows a single fabric."""
+        return self.has_one_fabric
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds of queries that it evaluates."""
+        return frozenset(self.answers)
+
+    @property
+    def variant(self) -> str:
+        """Setting of its only method."""
+        return self.setting

@@ -8,8 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final, get_args
 
-from pipeline.models.added.added_code import AddedFunction
-from pipeline.models.added.added_method import AddedMethod, Kind
+from pipeline.models.added.added_code import AddedFunction, AddedMethod, Kind
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed, faults_of
 from pipeline.models.added.source import WHERE, locate

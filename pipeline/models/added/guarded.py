@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from pipeline.models.added.added_code import AddedFunction
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedFunction, AddedMethod
 from pipeline.models.added.source import locate
 from weaves.errors import WorkFailed, one_line
 

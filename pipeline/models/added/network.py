@@ -19,10 +19,11 @@ from torch import Tensor, nn
 
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported
 from pipeline.models.domain import joined_domain
-from pipeline.models.method import Batch, Method, Trained
+from pipeline.models.method import Method
+from pipeline.models.network import Batch, Trained
 from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
@@ -33,7 +34,7 @@ Calls = Callable[[str], AbstractContextManager[None]]
 
 
 class GuardedNetwork(nn.Module):
-    """A network from outside with the interface of `pipeline.models.method.Network`.
+    """A network from outside with the interface of `pipeline.models.network.Trainable`.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ MOST_BYTES: Final = 512 * 2**20
 _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")
 
 
-class Source(NamedTuple):
+class CodeSource(NamedTuple):
     """Code that was found.
 
     Attributes
@@ -107,7 +107,7 @@ class Source(NamedTuple):
         return module
 
 
-def locate(text: str, folder: str = "") -> Source:
+def locate(text: str, folder: str = "") -> CodeSource:
     """Find code by ``module:name`` or ``file.py:name``.
 
     Parameters
@@ -129,7 +129,7 @@ def locate(text: str, folder: str = "") -> Source:
         path = Path(place).resolve()
         if not path.is_file():
             raise BadInput(WHERE, "", text, f"there is no file {place}")
-        return Source(str(path), name, "", path)
+        return CodeSource(str(path), name, "", path)
     parts = place.split(".")
     if not all(part.isidentifier() for part in parts):
         raise BadInput(WHERE, "", text, f"{place} is no name of a module; a file needs its path, ending in .py")
@@ -143,11 +143,11 @@ def locate(text: str, folder: str = "") -> Source:
     if spec is None:
         raise BadInput(WHERE, "", text, f"there is no module {parts[0]}, installed or in the folder {here}")
     if locations := list(spec.submodule_search_locations or ()):
-        return Source(place, name, here, Path(locations[0]))
+        return CodeSource(place, name, here, Path(locations[0]))
     root = Path(spec.origin or "")
     if not root.is_file():
         raise BadInput(WHERE, "", text, f"{parts[0]} is part of Python")
-    return Source(str(root), name, "", root) if here else Source(place, name, "", root)
+    return CodeSource(str(root), name, "", root) if here else CodeSource(place, name, "", root)
 
 
 def _files(root: Path) -> Iterator[Path]:

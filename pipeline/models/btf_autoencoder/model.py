@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.btf_autoencoder.options import BtfAutoencoderOptions
+from pipeline.models.btf_autoencoder import BtfAutoencoderOptions
 from pipeline.models.domain import Domain, joined_domain
-from pipeline.models.method import Trained
+from pipeline.models.network import PerQuery, Trained
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.per_query import PerQuery
 from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork, restored
 from pipeline.models.unified_btf.model import build as unified_btf
 from pipeline.truth.query import Queries

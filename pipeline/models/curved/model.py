@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,15 +31,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.curved.options import CurvedOptions
-from pipeline.models.curved.silhouettes import Silhouettes, View, silhouettes_of
-from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
-from pipeline.models.networks.losses import to_components, to_network, weighted_error
-from pipeline.models.networks.perceptron import perceptron
-from pipeline.models.networks.texture import level_shapes, random_pyramid, read_pyramid, shifted
-from pipeline.models.networks.texture_network import TextureNetwork
+from pipeline.models.curved import CurvedOptions
+from pipeline.models.method import in_repeat
+from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks
+from pipeline.models.networks.layers import perceptron, to_components, to_network, weighted_error
+from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid, read_pyramid, shifted
 from pipeline.models.one_material import OneMaterial, restored
-from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.opacity import has_gaps
 from pipeline.truth.options import TruthOptions
@@ -52,6 +49,65 @@ _SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kapp
 _NO_FALL = -1.0  # finite, because weights are averaged
 
 
+class View(NamedTuple):
+    """Footprints, viewers and curvatures of n queries.
+
+    Attributes
+    ----------
+    u, v : Tensor (n,)
+        Centres, in repeats.
+    sigma : Tensor (n,)
+        Footprints, in yarn spacings.
+    wo : Tensor (n, 3)
+        To the viewer.
+    curvature : Tensor (n,)
+        In the viewer's plane, 1/yarn spacings.
+    """
+
+    u: Tensor
+    v: Tensor
+    sigma: Tensor
+    wo: Tensor
+    curvature: Tensor
+
+
+class SilhouetteData(nn.Module):
+    """Queries about the silhouette and their answers; no part of a trained model.
+
+    Parameters
+    ----------
+    view : View
+        The queries.
+    target : Tensor (n, 2)
+        Opacity and 0; or mean and variance of the grazing cosine, in units of sqrt(kappa) and kappa.
+    """
+
+    def __init__(self, view: View, target: Tensor) -> None:
+        super().__init__()
+        for name, column in zip(View._fields, view, strict=True):
+            self.register_buffer(name, column, persistent=False)
+        self.register_buffer("target", target, persistent=False)
+
+    def draw(self, count: int, random: np.random.Generator) -> tuple[View, Tensor]:
+        """Return `count` random queries and their answers."""
+        rows = torch.from_numpy(random.integers(0, len(self.get_buffer("u")), count)).to(self.get_buffer("u").device)
+        return View(*(self.get_buffer(name)[rows] for name in View._fields)), self.get_buffer("target")[rows]
+
+
+def silhouettes_of(columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> SilhouetteData:
+    """Return rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`) for a training."""
+    ends, picks = repeat
+    wo = np.stack([columns["wo_x"], columns["wo_y"], columns["wo_z"]], axis=-1)
+    view = (columns["u"] / ends, columns["v"] / picks, columns["sigma"], wo, columns["curvature"])
+    if "opacity" in columns:
+        target = [columns["opacity"], np.zeros_like(columns["opacity"])]
+    else:
+        target = [columns["grazing_mean"], columns["grazing_variance"]]
+    tensors = (torch.from_numpy(np.array(column, np.float32)) for column in (*view, np.stack(target, axis=-1)))
+    *read, answers = tensors
+    return SilhouetteData(View(*read), answers)
+
+
 class CurvedNetwork(TextureNetwork):
     """Textures and perceptrons of one fabric.
 
@@ -61,7 +117,7 @@ class CurvedNetwork(TextureNetwork):
         The design.
     repeat : tuple of int
         Extent of the fabric's repeat in x and y, in yarn spacings.
-    silhouettes : Silhouettes, optional
+    silhouettes : SilhouetteData, optional
         Training rows of the opacity; needed for training only.
     fall : float
         Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
@@ -75,7 +131,7 @@ class CurvedNetwork(TextureNetwork):
         self,
         options: CurvedOptions,
         repeat: tuple[int, int],
-        silhouettes: Silhouettes | None = None,
+        silhouettes: SilhouetteData | None = None,
         fall: float = _NO_FALL,
     ) -> None:
         super().__init__()

@@ -1,1 +1,31 @@
-"""`neumip`: a neural texture of one fabric at all scales [Kuznetsov2021NeuMIP]."""
+"""`neumip`: a neural texture of one fabric [Kuznetsov2021NeuMIP]; its options."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pipeline.models.options import TextureOptions
+
+
+class NeumipOptions(TextureOptions):
+    """One offset texture, one feature pyramid and one small decoder for each fabric [Kuznetsov2021NeuMIP]."""
+
+    newer: ClassVar[tuple[str, ...]] = ("ignore_curvature",)
+    any_physics: ClassVar[bool] = True
+    seconds: ClassVar[tuple[float, float]] = (1.2e-5, 1.5e-6)
+
+    model: Literal["neumip"] = "neumip"
+    ignore_curvature: bool = False
+    """Accept queries on curved cloth, as a flat material: train on rows lit from the front, ignore the curvature, and
+    answer 0 where the light is behind the tangent plane."""
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """Deviations from the published method, for the page."""
+        changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
+        return ("four components in place of RGB", *(change for change, made in changes.items() if made))
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Curved cloth lit from all around, answered as if it were flat, with `ignore_curvature`."""
+        return frozenset({"behind", "curvature"} if self.ignore_curvature else ())

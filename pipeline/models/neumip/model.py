@@ -25,14 +25,19 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import Batch, Trained, in_chunks, in_repeat
-from pipeline.models.networks.losses import to_components, to_network, weighted_error
-from pipeline.models.networks.perceptron import Layer, layers_of, perceptron
-from pipeline.models.networks.texture import level_shapes, random_pyramid, read_pyramid, shifted
-from pipeline.models.networks.texture_network import TextureNetwork
-from pipeline.models.neumip.options import NeumipOptions
+from pipeline.models.method import in_repeat
+from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks
+from pipeline.models.networks.layers import (
+    LinearLayer,
+    layers_of,
+    perceptron,
+    to_components,
+    to_network,
+    weighted_error,
+)
+from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid, read_pyramid, shifted
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.one_material import OneMaterial, restored
-from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -106,17 +111,17 @@ class Parts(NamedTuple):
         Textures of the pyramid, finest first; texel (0, 0) is at the smallest v and u.
     depth : float32 (rows, columns, channels) or None
         Offset texture, if the design has one.
-    offset : list of Layer
+    offset : list of LinearLayer
         From texture and wo.xy to the depth; none without it.
-    decoder : list of Layer
+    decoder : list of LinearLayer
         From features, wi.xy and wo.xy to the components in network space.
     """
 
     options: NeumipOptions
     levels: list[npt.NDArray[np.float32]]
     depth: npt.NDArray[np.float32] | None
-    offset: list[Layer]
-    decoder: list[Layer]
+    offset: list[LinearLayer]
+    decoder: list[LinearLayer]
 
 
 class Neumip(OneMaterial[NeumipNetwork]):

@@ -16,13 +16,12 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.models.analytic.soft_nodes import Level, SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import Method
+from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.error_network import FINEST, OWN
-from pipeline.models.selvage.options import SelvageOptions
-from pipeline.models.soft_nodes.model import SoftNodes
-from pipeline.models.soft_nodes.options import Level
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.selvage.options import SelvageOptions
+from pipeline.models.selvage import SelvageOptions
 
 FLOOR: Final = 0.05
 """Colour added to the colour that errors are relative to: a third of that of a usual cloth."""

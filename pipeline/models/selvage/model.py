@@ -38,16 +38,15 @@ from pipeline.analytic.soft_nodes.features import (
     read_queries,
 )
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import CHUNK, Batch
-from pipeline.models.networks.perceptron import Layer
+from pipeline.models.method import CHUNK, refuse_other
+from pipeline.models.network import Answering, Batch, Columns, PerQuery
+from pipeline.models.networks.layers import LinearLayer
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.per_query import Answering, Columns, PerQuery
-from pipeline.models.plain import refuse_other
+from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.adaptive import Adaptive
 from pipeline.models.selvage.error_network import FLOOR, SLOPE, ErrorNetwork, colour_weights
-from pipeline.models.selvage.options import SelvageOptions
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -239,7 +238,7 @@ class Selvage:
         Light from behind is answered by the soft nodes alone.
         """
         behind = queries.wi[:, 2] < 0.0
-        refuse_other(queries, self.name, stretch=True, behind=True, curvature=True)
+        refuse_other(queries, self.name, ("stretch", "behind", "curvature"))
         if not behind.any():
             return self._corrected(fabric, queries)
         result = np.empty((len(behind), 4), np.float32)
@@ -265,13 +264,13 @@ class Selvage:
 
         return PerQuery(self._refuse, inputs, self._answering, (cloth.bias,))
 
-    def layers(self, fabric: Fabric) -> list[Layer]:
+    def layers(self, fabric: Fabric) -> list[LinearLayer]:
         """Return the correction, from OF_QUERY features to the arguments of four sigmoids.
 
         The first weights include the normalisation, the first biases all that the fabric alone decides.
         """
         first = (self._of_query, self._cloths.of(fabric).bias)
-        return [Layer(weight.numpy(), bias.numpy()) for weight, bias in (first, *self._others)]
+        return [LinearLayer(weight.numpy(), bias.numpy()) for weight, bias in (first, *self._others)]
 
     @property
     def options(self) -> SelvageOptions:
@@ -294,7 +293,7 @@ class Selvage:
 
     def _refuse(self, queries: Queries) -> None:
         """Refuse queries of kinds that the network does not know."""
-        refuse_other(queries, self.name, stretch=True)
+        refuse_other(queries, self.name, ("stretch",))
 
     def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Answer N queries lit from the front, and estimate errors as those of flat cloth.
@@ -305,7 +304,7 @@ class Selvage:
             Components; relative errors of a grey cloth's colour, root mean squares, of these components and of those by
             the finest soft nodes (`error_network`).
         """
-        refuse_other(queries, self.name, stretch=True, curvature=True)
+        refuse_other(queries, self.name, ("stretch", "curvature"))
         errors = np.empty((len(queries.u), 2), np.float32)
         return self._corrected(fabric, queries, errors), errors
 

@@ -1,1 +1,87 @@
-"""`unified_btf`: one encoding of bidirectional textures for all fabrics [Rainer2020Unified]."""
+"""`unified_btf`: one encoding of bidirectional textures [Rainer2020Unified]; its options."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.models.options import ComponentLossOptions
+from pipeline.shards.angular_samples import AngularSamples
+from pipeline.shards.extra_rows import ExtraRows
+from pipeline.truth.options import TruthOptions
+
+
+class BtfOptions(ComponentLossOptions):
+    """Options of both encodings of bidirectional textures."""
+
+    fixed: ClassVar[tuple[str, ...]] = ("log_samples",)
+
+    texels_per_yarn: int = Field(default=8, ge=1, le=64)
+    """Texels along one yarn spacing."""
+    texel_sigma: float = Field(default=0.5, gt=0, le=4)
+    """Standard deviation of a texel's footprint, in texels."""
+    samples: int = Field(default=128, ge=1, le=65_536)
+    """Angular samples of every texel; shards hold those of trained fabrics, any other fabric's are computed when it is
+    added."""
+    fewest_samples: int = Field(default=50, ge=1, le=65_536)
+    """A training step encodes a fabric from a random number of its samples, from this one to all."""
+    directions: Literal["projected_disc", "hemisphere"] = "projected_disc"
+    """Density of the samples' directions, as in the queries."""
+    max_angle: float = Field(default=89.0, gt=0, le=89.9)
+    """Largest angle of the samples' directions to the macro normal, in degrees."""
+    truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
+    """Options of the truth for the samples. Its physics must be that of the data set; its errors may be large, because
+    a latent averages over all samples of a texel."""
+    angles: Literal["stereographic", "disc"] = "stereographic"
+    """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
+    weights: int = Field(default=32, ge=1, le=512)
+    """Weights m of every sample; not published."""
+    encoder_hidden: int = Field(default=64, ge=4, le=1024)
+    """Width of the encoder's two hidden layers; not published."""
+    hidden: int = Field(default=106, ge=4, le=1024)
+    """Width of the decoder's four hidden layers."""
+
+    latent: int
+    """Numbers that a texel is known by."""
+
+    log_samples: ClassVar[bool] = False
+    """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
+    those in log space."""
+
+    @property
+    def angular_samples(self) -> AngularSamples:
+        """The samples of a fabric's texels."""
+        return AngularSamples(
+            texels_per_yarn=self.texels_per_yarn,
+            texel_sigma=self.texel_sigma,
+            samples=self.samples,
+            directions=self.directions,
+            max_angle=self.max_angle,
+            truth=self.truth,
+        )
+
+    @property
+    def extra_rows(self) -> tuple[ExtraRows, ...]:
+        """The samples of the trained fabrics' texels."""
+        return (self.angular_samples,)
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        if self.fewest_samples > self.samples:
+            raise ValueError(f"fewest_samples ({self.fewest_samples}) must not be above samples ({self.samples})")
+        return self
+
+
+class UnifiedBtfOptions(BtfOptions):
+    """One encoder and decoder of angular samples for all fabrics [Rainer2020Unified]."""
+
+    seconds: ClassVar[tuple[float, float]] = (4e-5, 1.5e-6)
+
+    model: Literal["unified_btf"] = "unified_btf"
+    latent: int = Field(default=32, ge=1, le=512)
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """Deviations from the published method, for the page."""
+        return ("four components in place of RGB, in samples and answers",)

@@ -30,16 +30,22 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import Batch, Trained, in_chunks, in_repeat, loaded
-from pipeline.models.networks.encoder_decoder import EncoderDecoder
-from pipeline.models.networks.losses import to_components, to_network, weighted_error
-from pipeline.models.networks.perceptron import perceptron
+from pipeline.models.method import in_repeat
+from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks, loaded
+from pipeline.models.networks.layers import EncoderDecoder, perceptron, to_components, to_network, weighted_error
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.models.unified_btf.angular_samples import TexelSamples, angular_samples, read_samples
-from pipeline.models.unified_btf.options import BtfOptions, UnifiedBtfOptions
-from pipeline.models.unified_btf.set_encoder import ANGLES, SetEncoder, Texels, angles_of, read_texels
+from pipeline.models.unified_btf import BtfOptions, UnifiedBtfOptions
+from pipeline.models.unified_btf.set_encoder import (
+    DIRECTION_NUMBERS,
+    SetEncoder,
+    Texels,
+    TexelSamples,
+    angles_of,
+    angular_samples,
+    read_samples,
+    read_texels,
+)
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -50,7 +56,7 @@ _LAYERS = 4  # hidden ones of the decoder
 
 def decoder(latent: int, hidden: int, outputs: int = 4) -> nn.Sequential:
     """Return the published decoder: latent and angles to `outputs` numbers."""
-    return perceptron(latent + ANGLES, hidden, _LAYERS, outputs)
+    return perceptron(latent + DIRECTION_NUMBERS, hidden, _LAYERS, outputs)
 
 
 class UnifiedBtfNetwork(EncoderDecoder):
@@ -118,15 +124,13 @@ class UnifiedBtfNetwork(EncoderDecoder):
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, the last weights small, and the scale of samples to that of targets."""
-        options = self.options
-        output = to_network(target, options.log_k)
-        seen = output if options.log_samples else target
+        output = to_network(target, self.options.log_k)
         with torch.no_grad():
             last = self.decoder[-1]
             assert isinstance(last, nn.Linear)
             last.bias.copy_(output.mean(dim=0))
             last.weight.mul_(0.1)
-            self.encoder.scale.copy_(1.0 / seen.square().mean(dim=0).sqrt().clamp_min(1e-6))
+            self.encoder.scale.copy_(1.0 / target.square().mean(dim=0).sqrt().clamp_min(1e-6))
 
 
 def averaged(latents: Tensor) -> list[Tensor]:

@@ -3,26 +3,84 @@
 A perceptron turns the angles of a sample into m weights; weights times sample are averaged over the samples, and one
 layer takes the mean to the latent. All texels of a fabric are seen under the same directions, so that the weights are
 computed once for all of them.
+
+A training reads the samples of its fabrics from shards. A fabric that is added to a trained model brings its samples
+with it, as in the paper: computing them is part of the method, and of the time that adding a fabric takes.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+from weakref import WeakValueDictionary
 
+import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.networks.losses import to_network
-from pipeline.models.networks.perceptron import perceptron
-from pipeline.models.unified_btf.angular_samples import TexelSamples
-from pipeline.models.unified_btf.options import BtfOptions
+from pipeline.fingerprint import fingerprint
+from pipeline.models.networks.layers import perceptron
+from pipeline.models.unified_btf import BtfOptions
+from pipeline.shards.store import columns_of
+from pipeline.truth.conventions import COMPONENTS
+from weaves.fabric import Fabric
 
-ANGLES = 4
+DIRECTION_NUMBERS = 4
 """Numbers that a pair of directions is given as."""
 
 _LAYERS = 2  # hidden ones, before the weights
 _COMPONENTS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class TexelSamples:
+    """T texels of one repeat, each seen under the same n pairs of directions.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of texels; texel t lies in row t // columns, column t % columns.
+    wi, wo : float32 (n, 3)
+        Directions.
+    values : float16 (n, T, 4)
+        Components; their own noise is far above the rounding.
+    """
+
+    shape: tuple[int, int]
+    wi: npt.NDArray[np.float32]
+    wo: npt.NDArray[np.float32]
+    values: npt.NDArray[np.float16]
+
+
+_held: Final[WeakValueDictionary[str, TexelSamples]] = WeakValueDictionary()
+
+
+def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> TexelSamples:
+    """Return a fabric's samples from their columns; as long as they are in use, `angular_samples` finds them."""
+    shape = options.angular_samples.grid(fabric)
+    texels = shape[0] * shape[1]
+    wi, wo = (np.stack([columns[f"{name}_{axis}"][::texels] for axis in "xyz"], axis=-1) for name in ("wi", "wo"))
+    values = np.empty((len(wi), texels, 4), np.float16)
+    for index, name in enumerate(COMPONENTS):
+        values[..., index] = columns[name].reshape(len(wi), texels)
+    samples = _held[_key(fabric, options)] = TexelSamples(shape, wi, wo, values)
+    return samples
+
+
+def angular_samples(fabric: Fabric, options: BtfOptions) -> TexelSamples:
+    """Return a fabric's samples: those in use in this process, such as a training's, else computed now."""
+    samples = _held.get(_key(fabric, options))
+    if samples is not None:
+        return samples
+    wanted = options.angular_samples
+    return read_samples(fabric, options, columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))))
+
+
+def _key(fabric: Fabric, options: BtfOptions) -> str:
+    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json")])
 
 
 def angles_of(wi: Tensor, wo: Tensor, kind: str) -> Tensor:
@@ -40,7 +98,7 @@ class SetEncoder(nn.Module):
 
     def __init__(self, options: BtfOptions) -> None:
         super().__init__()
-        self.weigh = perceptron(ANGLES, options.encoder_hidden, _LAYERS, options.weights)
+        self.weigh = perceptron(DIRECTION_NUMBERS, options.encoder_hidden, _LAYERS, options.weights)
         self.join = nn.Linear(_COMPONENTS * options.weights, options.latent)
         self.register_buffer("scale", torch.ones(_COMPONENTS))
         self.scale: Tensor
@@ -76,7 +134,7 @@ class Texels(NamedTuple):
     angles : float32 Tensor (n, 4)
         Directions.
     values : float16 Tensor (n, rows x columns, 4)
-        Samples in the encoder's space.
+        Samples.
     """
 
     shape: tuple[int, int]
@@ -89,8 +147,6 @@ class Texels(NamedTuple):
 
 
 def read_texels(samples: TexelSamples, options: BtfOptions) -> Texels:
-    """Bring samples into the encoder's space, once: half of a training step otherwise."""
+    """Return the inputs of the encoder from samples."""
     wi, wo, values = (torch.from_numpy(part) for part in (samples.wi, samples.wo, samples.values))
-    if options.log_samples:
-        values = to_network(values.to(torch.float32), options.log_k).to(torch.float16)
     return Texels(samples.shape, angles_of(wi, wo, options.angles), values)

@@ -1,1 +1,73 @@
-"""`woven`: one network for many fabrics at many scales [Chen2024Woven]."""
+"""`woven`: one network for many fabrics at many scales [Chen2024Woven]; its options."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.models.options import ComponentLossOptions
+
+
+class WovenOptions(ComponentLossOptions):
+    """One network for many fabrics and scales [Chen2024Woven]."""
+
+    fixed: ClassVar[tuple[str, ...]] = ("smallest_size", "largest_size", "transparency_weight")
+    any_physics: ClassVar[bool] = True
+    blends: ClassVar[bool] = True
+
+    model: Literal["woven"] = "woven"
+    latent: int = Field(default=64, ge=4, le=512)
+    """Length of the material latent."""
+    hidden: int = Field(default=128, ge=8, le=1024)
+    """Width of the decoder's hidden layers; with latent 64 and 8 bins, 128 gives the published 86,660 parameters."""
+    map_texels: Literal[16, 32, 64, 128] = 32
+    """Side of the square normal and tangent maps, which hold one repeat; the paper does not say."""
+    encoder_channels: int = Field(default=16, ge=4, le=128)
+    """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
+    one_blob: Literal["none", "plain", "periodic", "local"] = "local"
+    """Encoding of centres: `none` as the bare numbers u, v and size; `plain` as published; `periodic` wraps u and v at
+    the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the queried place
+    (an own change: see the model)."""
+    bins: int = Field(default=8, ge=2, le=64)
+    """One-blob bins for each of u, v and size; the published 24 values are 3 x 8."""
+    spatial_fusion: bool = True
+    """Merge latent and patch before the directions (the published design); otherwise all enter together."""
+    transmission: bool = False
+    """Learn cloth with gaps and light from behind: widths and optical thickness join the fabric's parameters (the paper
+    reads four and shows one transmissive cloth), and the transparency is a fifth output."""
+    standard: bool = True
+    """Bring every fabric into standard position first, so that mirror images need not be learnt."""
+    roll: bool = True
+    """Begin the repeat at a random yarn in every training step: cloth has no origin, and no ground truth is spent."""
+
+    smallest_size: ClassVar[float] = 0.005
+    """Footprint, in repeats, at which the encoded size is 0."""
+    largest_size: ClassVar[float] = 1.0
+    """Footprint, in repeats, at which the encoded size is 1; a Gaussian of one repeat already averages all of it."""
+    transparency_weight: ClassVar[float] = 1.0
+    """Weight of the transparency's squared error, with `transmission`."""
+
+    @model_validator(mode="after")
+    def _local_is_fused(self) -> WovenOptions:
+        if self.one_blob == "local" and not self.spatial_fusion:
+            raise ValueError("one_blob = 'local' needs spatial_fusion")
+        return self
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """Deviations from the published method, for the page."""
+        changes = {
+            "a picture of the repeat seen from the queried place": self.one_blob == "local",
+            "bare numbers in place of one-blobs": self.one_blob == "none",
+            "one-blobs that wrap": self.one_blob == "periodic",
+            "every cloth in standard position": self.standard,
+            "a random origin in every training step": self.roll,
+            "no spatial fusion": not self.spatial_fusion,
+        }
+        return tuple(change for change, made in changes.items() if made)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Light from behind, with `transmission`."""
+        return frozenset({"behind"} if self.transmission else ())

@@ -15,8 +15,8 @@ parameters is met exactly by one more layer 128 -> 128, placed here in the fusio
 encoder of the maps (smaller than theirs, to be trained in minutes), the scale of the size, the training on all mirror
 images.
 
-Maps and parameters are read in pipeline.models.woven.cloth. OWN CHANGE, `one_blob = "local"`: the encoder also gives a
-picture of the repeat, and the decoder sees it from the queried place (pipeline.models.woven.decoder).
+Maps and parameters are read in pipeline.models.woven.encoder. OWN CHANGE, `one_blob = "local"`: the encoder also gives
+a picture of the repeat, and the decoder sees it from the queried place (pipeline.models.woven.decoder).
 """
 
 from __future__ import annotations
@@ -29,16 +29,13 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import Batch, Trained, in_chunks, in_repeat, loaded
-from pipeline.models.networks.encoder_decoder import EncoderDecoder
-from pipeline.models.networks.losses import to_components, to_network, weighted_error
-from pipeline.models.networks.residual import SLOPE
+from pipeline.models.method import in_repeat
+from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks, loaded
+from pipeline.models.networks.layers import SLOPE, EncoderDecoder, to_components, to_network, weighted_error
 from pipeline.models.per_fabric import PerFabric
-from pipeline.models.per_query import Answering, PerQuery, columns_of
-from pipeline.models.woven.cloth import WovenInputs, read_cloth
+from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.decoder import Decoder, encode_patch
-from pipeline.models.woven.encoder import Encoder
-from pipeline.models.woven.options import WovenOptions
+from pipeline.models.woven.encoder import Encoder, WovenInputs, read_cloth
 from pipeline.models.woven.standard_position import Placement
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput

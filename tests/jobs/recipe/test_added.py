@@ -9,7 +9,7 @@ from jobs.plan.plan import plan
 from jobs.plan.training import Training
 from jobs.recipe import added
 from jobs.recipe.load import load_recipe
-from pipeline.models.added.added_method import GROUP
+from pipeline.models.added.added_code import GROUP
 from weaves.errors import BadInput
 
 METHOD = """

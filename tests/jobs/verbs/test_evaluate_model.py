@@ -10,10 +10,11 @@ import safetensors.torch
 import torch
 
 from jobs.cli import main
+from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import read_card, read_weights, write_model
 from pipeline.models.domain import Domain
+from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric
 
@@ -33,7 +34,7 @@ def folder(network, tmp_path):
     card = {
         "model": "woven",
         "version": {"model": 1},
-        "options": SMALL.model_dump(mode="json"),
+        "options": SMALL.model_dump(mode="json", context=IDENTITY),
         "domain": domain.model_dump(mode="json"),
     }
     write_model(tmp_path / "model", safetensors.torch.save(network.state_dict()), card)

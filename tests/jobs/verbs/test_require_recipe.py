@@ -7,7 +7,7 @@ import pytest
 
 from jobs.recipe.load import load_recipe
 from jobs.verbs.require_recipe import SAMPLED, alone, effort_of, savings, write_recipe
-from pipeline.models.curved.options import CurvedOptions
+from pipeline.models.curved import CurvedOptions
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions

@@ -86,7 +86,7 @@ REAL = """
 import hashlib
 import sys
 import numpy as np
-from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.analytic.horizon_points.sampler import HorizonSampler

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded, counterpart, limited
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric

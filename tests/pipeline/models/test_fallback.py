@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT, Fallback, fallback_answers
-from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from pipeline.fingerprint import fingerprint
+from pipeline.models.curved import CurvedOptions
 from pipeline.models.curved.model import Curved, CurvedNetwork
-from pipeline.models.curved.options import CurvedOptions
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback, fallback_answers
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork, restore
-from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.one_material import restored
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric

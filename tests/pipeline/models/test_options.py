@@ -5,10 +5,11 @@ from importlib.util import find_spec
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+from pipeline.fingerprint import IDENTITY
+from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.catalogue import CLASSES, ModelOptions
-from pipeline.models.neumip.options import NeumipOptions
-from pipeline.models.point_sampled.options import PointSampledOptions
-from pipeline.models.woven.options import WovenOptions
+from pipeline.models.neumip import NeumipOptions
+from pipeline.models.woven import WovenOptions
 
 MODEL = TypeAdapter(ModelOptions)
 
@@ -20,9 +21,22 @@ def test_model_tells_the_options_apart():
 
 
 @pytest.mark.parametrize("model", CLASSES)
-def test_options_lie_in_the_file_of_their_model(model):
-    assert CLASSES[model].__module__ == f"pipeline.models.{model}.options"
-    assert find_spec(f"pipeline.models.{model}.model") is not None
+def test_options_lie_in_the_file_or_folder_of_their_model(model):
+    options = CLASSES[model]
+    assert options.__module__ == f"pipeline.models.{'' if options.learns else 'analytic.'}{model}"
+    assert options().name == model
+    assert not options.learns or find_spec(f"pipeline.models.{model}.model") is not None
+
+
+@pytest.mark.parametrize("model", CLASSES)
+def test_identities_state_all_choices_of_the_design(model):
+    options = CLASSES[model]()
+    identity = options.model_dump(mode="json", context=IDENTITY)
+    assert set(options.fixed) <= set(identity) and set(options.newer).isdisjoint(identity)
+    assert MODEL.validate_python(identity) == options
+    for key in options.fixed:
+        with pytest.raises(ValidationError, match=key):
+            MODEL.validate_python(identity | {key: 0.75})
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,14 @@ from torch import nn
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK
+from pipeline.models.network import Answering, PerQuery, columns_of
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
-from pipeline.models.neumip.options import NeumipOptions
-from pipeline.models.per_query import Answering, PerQuery, columns_of
 from pipeline.models.runtimes import RUNTIMES, TOLERANCE, RunBy, Runtime, not_run, runs
-from pipeline.models.soft_nodes.model import SoftNodes
+from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.soft_nodes import SoftNodesOptions
+from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.fallback import Fallback
-from pipeline.models.point_sampled.options import PointSampledOptions
 from pipeline.models.registry import load_methods
-from pipeline.models.soft_nodes.options import SoftNodesOptions
-from pipeline.models.summed_area.options import SummedAreaOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

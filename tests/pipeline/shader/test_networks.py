@@ -10,11 +10,11 @@ import torch
 
 from pipeline.analytic.soft_nodes.features import OF_QUERY, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.fingerprint import fingerprint
+from pipeline.fingerprint import IDENTITY, fingerprint
 from pipeline.models.card import write_model
 from pipeline.models.method import in_repeat
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork
-from pipeline.models.neumip.options import NeumipOptions
 from pipeline.models.registry import load_model, model_folder
 from pipeline.shader.golden import rows_of
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -55,7 +55,11 @@ def neumip_folder(folder, fabric, version=1, **options):
         }
     weights["decoder.6.bias"] = torch.tensor([0.5, 0.2, 1.0, -0.2])
     about = {"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
-    card = {"options": design.model_dump(mode="json"), "version": {"model": version}, "fabrics": [about]}
+    card = {
+        "options": design.model_dump(mode="json", context=IDENTITY),
+        "version": {"model": version},
+        "fabrics": [about],
+    }
     write_model(folder, safetensors.torch.save(weights), card)
     return str(folder)
 

@@ -6,14 +6,14 @@ import pytest
 import safetensors.torch
 import torch
 
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.source import locate
 from pipeline.models.method import Method
-from pipeline.models.neumip.options import NeumipOptions
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
-from pipeline.models.selvage.options import SelvageOptions
-from pipeline.models.woven.options import WovenOptions
+from pipeline.models.selvage import SelvageOptions
+from pipeline.models.woven import WovenOptions
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
 from pipeline.training.loop import rate_factor, train

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.prefiltered.options import PrefilteredOptions
+from pipeline.models.analytic.prefiltered import PrefilteredOptions
+from pipeline.models.analytic.soft_nodes import SoftNodesOptions
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
 from pipeline.models.runtimes import runs
-from pipeline.models.soft_nodes.options import SoftNodesOptions
+from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.options import WovenOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.query import faults
 from reports.measure.extremes import (

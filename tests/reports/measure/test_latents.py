@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.options import WovenOptions
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

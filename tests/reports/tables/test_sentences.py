@@ -6,8 +6,8 @@ import time
 import pandas as pd
 import pytest
 
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded
-from pipeline.models.soft_nodes.model import SoftNodes
 from reports.measure.timing import Contender, time_side_by_side
 from reports.record import Record
 from reports.tables.sentences import (

@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
+from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
-from pipeline.models.woven.options import WovenOptions
+from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
 from tests.pipeline.shader.test_networks import CLOTH, neumip_folder
@@ -75,7 +76,8 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, tmp
     assert "has no soft nodes" in refused(twillight, CLOTH, *shader, neumip, "--level", "4")
     assert "soft_nodes has no network" in refused(twillight, CLOTH, "--shader", "x", "--language", "onnx")
     assert "is not for mesh" in refused(twillight, CLOTH, "--mesh", "x.ply", "--model", "selvage")
-    write_model(tmp_path / "woven", b"", {"options": WovenOptions().model_dump(mode="json"), "version": {"model": 1}})
+    options = WovenOptions().model_dump(mode="json", context=IDENTITY)
+    write_model(tmp_path / "woven", b"", {"options": options, "version": {"model": 1}})
     refused(twillight, CLOTH, *shader, str(tmp_path / "woven"))
     assert not (tmp_path / "x").exists()
 

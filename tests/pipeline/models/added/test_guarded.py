@@ -4,8 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.models.added.added_code import AddedFunction
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedFunction, AddedMethod
 from pipeline.models.added.guarded import Guarded, MethodFailed, load_added, load_function, unchecked
 from pipeline.models.added.source import locate
 from pipeline.models.method import Method

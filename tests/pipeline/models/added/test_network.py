@@ -5,11 +5,11 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.added.added_method import AddedMethod
+from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.network import build_added, restore_added
 from pipeline.models.added.source import locate
-from pipeline.models.method import Batch
+from pipeline.models.network import Batch
 from pipeline.truth.query import Queries
 from weaves.errors import WorkFailed
 from weaves.fabric import load_fabric

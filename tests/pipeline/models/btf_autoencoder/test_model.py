@@ -3,8 +3,8 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
+from pipeline.models.btf_autoencoder import BtfAutoencoderOptions
 from pipeline.models.btf_autoencoder.model import build, restore
-from pipeline.models.btf_autoencoder.options import BtfAutoencoderOptions
 from pipeline.models.unified_btf.model import UnifiedBtf
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import columns_of

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.fingerprint import fingerprint
-from pipeline.models.curved.model import Curved, CurvedNetwork, build
-from pipeline.models.curved.options import CurvedOptions
-from pipeline.models.curved.silhouettes import View, silhouettes_of
+from pipeline.fingerprint import IDENTITY, fingerprint
+from pipeline.models.curved import CurvedOptions
+from pipeline.models.curved.model import Curved, CurvedNetwork, View, build, silhouettes_of
 from pipeline.models.domain import Domain
-from pipeline.models.method import Batch
+from pipeline.models.network import Batch
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
-from pipeline.models.neumip.options import NeumipOptions
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -214,8 +213,8 @@ def test_a_flat_material_may_take_part():
     assert (method.predict(DENIM, behind) == 0).all()
     assert (method.predict(DENIM, front) > 0).any()
     # Options as they were leave no trace, so that trained models keep their fingerprints.
-    assert "ignore_curvature" not in NeumipOptions().model_dump(mode="json")
-    assert NeumipOptions.model_validate(options.model_dump(mode="json")) == options
+    assert "ignore_curvature" not in NeumipOptions().model_dump(mode="json", context=IDENTITY)
+    assert NeumipOptions.model_validate(options.model_dump(mode="json", context=IDENTITY)) == options
 
     random = np.random.default_rng(0)
     columns = [torch.from_numpy(random.random((1, 60)).astype(np.float32)) for _ in range(7)]

@@ -3,8 +3,8 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
+from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
-from pipeline.models.neumip.options import NeumipOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 

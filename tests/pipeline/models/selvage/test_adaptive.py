@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.registry import load_model, pretrained_folder
+from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.error_network import FINEST, FLOOR, OWN, ErrorNetwork, colour_weights
-from pipeline.models.selvage.options import SelvageOptions
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

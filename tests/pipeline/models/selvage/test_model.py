@@ -4,12 +4,13 @@ import torch
 
 from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
-from pipeline.models.method import Batch, Method
+from pipeline.models.method import Method
+from pipeline.models.network import Batch
 from pipeline.models.registry import module_of
+from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
-from pipeline.models.selvage.options import SelvageOptions
-from pipeline.models.soft_nodes.model import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions

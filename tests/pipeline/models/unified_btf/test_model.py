@@ -6,9 +6,9 @@ import torch
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain
-from pipeline.models.method import Batch
+from pipeline.models.network import Batch
+from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork, averaged, build, decoder, restore
-from pipeline.models.unified_btf.options import UnifiedBtfOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import columns_of
 from pipeline.truth.query import Queries

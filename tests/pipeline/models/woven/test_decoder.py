@@ -1,9 +1,14 @@
+"""The decoder: published counts, one-blobs."""
+
+import math
+
 import numpy as np
 import pytest
 import torch
+from scipy.stats import norm
 
-from pipeline.models.woven.decoder import Decoder
-from pipeline.models.woven.options import WovenOptions
+from pipeline.models.woven import WovenOptions
+from pipeline.models.woven.decoder import Decoder, encoded_size, one_blob, periodic_blob
 
 
 def parameters(options: WovenOptions) -> int:
@@ -34,3 +39,69 @@ def test_the_picture_is_seen_from_the_place_asked_about():
     weights = decoder.filters.weight.detach().reshape(-1, 8, 8).numpy()
     around = np.roll(picture.reshape(8, 8).numpy(), (-2, -7), axis=(0, 1))  # entry (2, 7) comes to (0, 0)
     np.testing.assert_allclose(responses[2 * 8 + 7].detach(), (weights * around).sum(axis=(1, 2)), rtol=1e-5, atol=1e-6)
+
+
+def numbers(seed):
+    return torch.rand(256, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+
+
+@pytest.mark.parametrize("deviation", [0.05, 0.125, 0.4, 5.0, 1e20])
+def test_periodic_blob_always_sums_to_one(deviation):
+    x = torch.linspace(-2.0, 3.0, 1001)
+    torch.testing.assert_close(periodic_blob(x, deviation, 8).sum(dim=-1), torch.ones(1001), rtol=0, atol=2e-6)
+
+
+def test_periodic_blob_does_not_see_whole_turns():
+    x = numbers(1)
+    for turns in (-3, 1, 7):
+        torch.testing.assert_close(periodic_blob(x + turns, 0.1, 8), periodic_blob(x, 0.1, 8), rtol=0, atol=1e-12)
+
+
+def test_periodic_blob_turns_with_its_argument():
+    """Moving x by one bin moves the code by one bin, around the edge too."""
+    x = numbers(2)
+    moved = periodic_blob(x + 1 / 8, 0.1, 8)
+    torch.testing.assert_close(moved, periodic_blob(x, 0.1, 8).roll(1, dims=-1), rtol=0, atol=1e-12)
+
+
+def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
+    """The series ends at m = 7; at the deviation 1/8 what is left out is e^{-2 pi^2} = 3e-9."""
+    x, deviation = numbers(3)[:16], 1 / 8
+    edges = np.linspace(0, 1, 9)
+    images = [np.diff(norm.cdf(edges + k, loc=x[:, None], scale=deviation), axis=-1) for k in range(-3, 4)]
+    np.testing.assert_allclose(periodic_blob(x, deviation, 8), np.sum(images, axis=0), atol=1e-8)
+
+
+def test_every_number_has_its_own_width():
+    x, deviations = numbers(4)[:3], torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
+    together = periodic_blob(x, deviations, 8)
+    for index in range(3):
+        torch.testing.assert_close(together[index], periodic_blob(x[index], float(deviations[index]), 8))
+
+
+def test_wide_blobs_fill_all_bins_alike():
+    torch.testing.assert_close(periodic_blob(numbers(5), 3.0, 8), torch.full((256, 8), 1 / 8, dtype=torch.float64))
+
+
+def test_plain_blob_holds_the_integral_of_a_gaussian_over_each_bin():
+    expected = np.diff(norm.cdf(np.linspace(0, 1, 9), loc=0.3, scale=1 / 8))
+    np.testing.assert_allclose(one_blob(torch.tensor([0.3]), 8)[0], expected, atol=1e-6)
+
+
+def test_plain_blob_loses_half_at_an_edge():
+    torch.testing.assert_close(one_blob(torch.tensor([0.0, 1.0]), 8).sum(-1), torch.full((2,), 0.5))
+
+
+def test_plain_and_periodic_agree_far_from_the_edges():
+    x = torch.tensor([0.5])
+    torch.testing.assert_close(one_blob(x, 8), periodic_blob(x, 1 / 8, 8), rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(("sigma", "expected"), [(1e-9, 0.0), (0.01, 0.0), (0.1, 0.5), (1.0, 1.0), (1e9, 1.0)])
+def test_size_is_the_clamped_logarithm(sigma, expected):
+    assert encoded_size(torch.tensor(sigma), 0.01, 1.0).item() == pytest.approx(expected, abs=1e-6)
+
+
+def test_size_grows_by_equal_steps_for_equal_ratios():
+    sizes = encoded_size(torch.tensor([0.02, 0.04, 0.08]), 0.01, 1.0)
+    assert sizes.diff().numpy() == pytest.approx(math.log10(2) / 2, abs=1e-6)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.method import Batch, Method
-from pipeline.models.woven.cloth import read_cloth
+from pipeline.models.method import Method
+from pipeline.models.network import Batch
+from pipeline.models.woven import WovenOptions
+from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.options import WovenOptions
 from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries

@@ -1,0 +1,78 @@
+"""A method that learns nothing: tables of a fabric, made once, and a function that reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import ClassVar, Generic, TypeVar
+
+from pipeline.compiled.arrays import Float32
+from pipeline.models.method import Method, refuse_other
+from pipeline.models.options import Gaussian, Options, setting_of
+from pipeline.models.per_fabric import PerFabric
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+Table = TypeVar("Table")
+
+
+class AnalyticOptions(Options):
+    """Options of a method that learns nothing."""
+
+    learns: ClassVar[bool] = False
+
+    footprint: Gaussian = "gaussian"
+
+    def methods(self) -> Sequence[Method]:
+        """Return one method for each setting."""
+        raise NotImplementedError
+
+
+class Analytic(Generic[Table]):
+    """A method that answers for any fabric.
+
+    Parameters
+    ----------
+    options : AnalyticOptions
+        Its name, and the kinds of queries that it knows.
+    k : int or None
+        Its setting, if it has settings.
+    tables : PerFabric
+        Tables of each fabric; methods of different settings may share them.
+    read : callable
+        Answers N queries, float32 (N, 4), from the tables of a fabric; the third argument names random numbers.
+    stored : callable
+        Bytes of the tables that a renderer stores.
+    """
+
+    def __init__(
+        self,
+        options: AnalyticOptions,
+        k: int | None,
+        tables: PerFabric[Table],
+        read: Callable[[Table, Queries, int], Float32],
+        stored: Callable[[Table], int] = attrgetter("nbytes"),
+    ) -> None:
+        self.name, self.setting = options.name, setting_of(k)
+        self._kinds, self._tables, self._read, self._stored = options.kinds, tables, read, stored
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return True: any fabric has tables."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Make the tables of the fabric, once."""
+        self._tables.of(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Answer N queries, float32 (N, 4). BadInput for kinds of queries that it does not know."""
+        refuse_other(queries, self.name, self._kinds)
+        return self._answer(fabric, queries, seed)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of the tables."""
+        return self._stored(self._tables.of(fabric))
+
+    def _answer(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Answer queries of kinds that it knows."""
+        return self._read(self._tables.of(fabric), queries, seed)

@@ -1,0 +1,95 @@
+"""A material of texture maps: what a program that knows no yarns shows of a fabric.
+
+The maps are those of `twillight export --maps` (pipeline.materials), for unit colours: red is the warp's, green the
+weft's, so that one evaluation gives the four components. pipeline.materials.lookup reads and
+evaluates them. The method ignores that yarns hide one another, and that the mean of a product is not the
+product of the means.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
+from pipeline.models.per_fabric import PerFabric
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.materials.lookup import MipLevels
+
+_Colour = tuple[float, float, float]
+_RED: Final[_Colour] = (1.0, 0.0, 0.0)
+_GREEN: Final[_Colour] = (0.0, 1.0, 0.0)
+_WHITE: Final[_Colour] = (1.0, 1.0, 1.0)
+
+
+def _power_of_two(size: int) -> int:
+    """Check that mip levels of this size are exact."""
+    if size & (size - 1):
+        raise ValueError("must be a power of two")
+    return size
+
+
+class MapMaterialOptions(AnalyticOptions):
+    """Texture maps of base colour, normal, tangent, specular colour and two roughnesses; nothing is trained."""
+
+    seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
+
+    model: Literal["map_material"] = "map_material"
+    size: Annotated[int, AfterValidator(_power_of_two)] = Field(default=512, ge=64, le=4096)
+    """Texels of the longer side of the maps, a power of two."""
+    specular: float = Field(default=0.3, gt=0, le=1)
+    """Specular colour of the yarns in terms that are not linear in it: what highlights take from the diffuse light."""
+    sheen: bool = True
+    """True for a material with a sheen, as that of glTF."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Light from behind, and footprints of any shape by taps along their longer axis."""
+        return frozenset({"behind", "stretch"})
+
+    def methods(self) -> list[Analytic[MipLevels]]:
+        """Return the one method; its bytes are those of all levels at 8 bits a number, as programs store them."""
+        from pipeline.materials.lookup import TEXEL_CHANNELS, answer
+
+        maps = PerFabric(lambda fabric: _maps(fabric, self))
+        return [
+            Analytic(
+                self,
+                None,
+                maps,
+                lambda levels, queries, _: answer(levels, queries),
+                lambda levels: len(levels.texels) * TEXEL_CHANNELS,
+            )
+        ]
+
+
+def _maps(fabric: Fabric, options: MapMaterialOptions) -> MipLevels:
+    """Return the mip levels of a fabric in unit colours."""
+    from pipeline.materials.lobes import reflectance
+    from pipeline.materials.lookup import mip_levels
+    from pipeline.materials.planes import layout, planes
+    from pipeline.materials.textures import constants
+
+    share, sheen = reflectance(fabric), np.zeros(4)
+    if options.sheen:
+        # What a white cloth lacks at grazing views goes to the components that have light there.
+        grazing = np.concatenate([options.specular * share.grazing_specular, share.grazing_diffuse])
+        white = _painted(fabric, options.specular, (_WHITE, _WHITE))
+        sheen = constants(white, share).sheen[0] * grazing / grazing.sum()
+    painted = _painted(fabric, options.specular, (_RED, _GREEN))
+    chosen = layout(painted, options.size)
+    return mip_levels(planes(painted, chosen, share), constants(painted, share), chosen, sheen, options.specular)
+
+
+def _painted(fabric: Fabric, specular: float, colours: tuple[_Colour, _Colour]) -> Fabric:
+    """Return the fabric with all ends of one colour and all picks of one; `specular` scales their highlights."""
+    yarns = {}
+    for name, colour in zip(("warp", "weft"), colours, strict=True):
+        glossy = tuple(specular * channel for channel in colour)
+        every = {"diffuse": colour, "diffuse_transmission": colour, "specular": glossy}
+        yarns[name] = getattr(fabric, name).model_copy(update=every)
+    return fabric.model_copy(update=yarns | {"colours": None})

@@ -1,0 +1,113 @@
+"""Sums over few nodes with soft shadows: `selvage` without its network.
+
+A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
+(pipeline.analytic.soft_nodes); a query becomes one sum over them and costs from half a microsecond to two, by the level
+of detail. The error is one to three per cent of the answer for a wide footprint, and more for a narrow one. Light from
+behind and transparency need the horizons of the back too, and curved cloth those of some curvatures: they are
+tabulated at the first such query.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from pipeline.compiled.arrays import Float32
+from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
+from pipeline.models.method import CHUNK
+from pipeline.models.per_fabric import PerFabric
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+if TYPE_CHECKING:
+    from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
+
+Level = Literal[1, 2, 4, 8]
+"""A level of detail."""
+
+
+class SoftNodesOptions(AnalyticOptions):
+    """Soft nodes, as in `selvage`, without a network; nothing is trained."""
+
+    turns: ClassVar[bool] = True
+    parameter: ClassVar[str] = "levels"
+    seconds: ClassVar[tuple[float, float]] = (0.0, 2.5e-7)
+
+    model: Literal["soft_nodes"] = "soft_nodes"
+    levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
+    """Levels of detail k, from few nodes to many; each is a row of the tables."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Footprints of any shape, light from behind, and curved cloth."""
+        return frozenset({"stretch", "behind", "curvature"})
+
+    def methods(self) -> list[SoftNodes]:
+        """Return one method for each level."""
+        return [SoftNodes(level, self.name) for level in self.levels]
+
+
+class SoftNodes(Analytic["SoftNodeTable"]):
+    """Soft nodes without a network.
+
+    Parameters
+    ----------
+    level : int
+        Level of detail, one of `pipeline.analytic.soft_nodes.groups.DETAILS`.
+    name : str
+        Name of the method.
+    """
+
+    turns: ClassVar[bool] = SoftNodesOptions.turns
+
+    def __init__(self, level: int = 2, name: str = "soft_nodes") -> None:
+        from pipeline.analytic.soft_nodes.features import read_queries
+        from pipeline.analytic.soft_nodes.nodes import tabulate
+
+        def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
+            return _in_chunks(lambda part: read_queries(table, part).components, queries, 4)
+
+        super().__init__(
+            SoftNodesOptions(name=name), level, PerFabric(lambda fabric: tabulate(fabric, level=level)), read
+        )
+        self._both_sides = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level))
+        self._curved = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level, curved=True))
+
+    def behind(self, fabric: Fabric, queries: Queries) -> Float32:
+        """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""
+        from pipeline.analytic.soft_nodes.features import read_behind
+
+        table = self.table_for(fabric, queries)
+        return _in_chunks(lambda part: read_behind(table, part), queries, 5)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
+        return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
+
+    def table_for(self, fabric: Fabric, queries: Queries) -> SoftNodeTable:
+        """Return the smallest table that knows all queries; every table answers what it knows by the same bits."""
+        if (queries.curvature > 0.0).any():
+            return self._curved.of(fabric)
+        return (self._both_sides if (queries.wi[:, 2] < 0.0).any() else self._tables).of(fabric)
+
+    def _answer(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Answer queries lit from either side."""
+        behind = queries.wi[:, 2] < 0.0
+        if not behind.any():
+            return self._read(self.table_for(fabric, queries), queries, seed)
+        result = np.empty((len(behind), 4), np.float32)
+        result[behind] = self.behind(fabric, queries.take(behind))[:, :4]
+        result[~behind] = self._answer(fabric, queries.take(~behind), seed)
+        return result
+
+
+def _in_chunks(read: Callable[[Queries], Float32], queries: Queries, width: int) -> Float32:
+    """Read `width` numbers a query, `CHUNK` rows at a time."""
+    result = np.empty((len(queries.u), width), np.float32)
+    for start in range(0, len(result), CHUNK):
+        rows = slice(start, start + CHUNK)
+        result[rows] = read(queries.take(rows))
+    return result

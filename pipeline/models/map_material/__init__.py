@@ -1,1 +1,0 @@
-"""`map_material`: texture maps of `twillight export --maps`, evaluated as a renderer does."""

@@ -1,0 +1,118 @@
+"""Layers that several networks share, the space they learn in, and their loss [Chen2024Woven].
+
+Networks put out (g(S_warp), g(S_weft), C_warp, C_weft) with g(x) = ln(k x + 1): highlights span decades, and g
+squeezes them. The loss is the mean squared error in that space, with one weight for the specular pair and one for the
+diffuse pair.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+SPECULAR = slice(0, 2)
+DIFFUSE = slice(2, 4)
+
+SLOPE = 0.01
+"""Slope of the leaky ReLU below 0."""
+
+
+class LinearLayer(NamedTuple):
+    """A layer for programs without torch: float32 weights (inputs, outputs) and biases (outputs,)."""
+
+    weights: npt.NDArray[np.float32]
+    biases: npt.NDArray[np.float32]
+
+
+def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequential:
+    """Return a perceptron with `layers` hidden layers of `hidden` numbers; weights are random, biases 0."""
+    parts: list[nn.Module] = []
+    for a, b in itertools.pairwise([inputs, *[hidden] * layers, outputs]):
+        parts += [nn.Linear(a, b), nn.ReLU()]
+    network = nn.Sequential(*parts[:-1])
+    for layer in network:
+        if isinstance(layer, nn.Linear):
+            nn.init.kaiming_normal_(layer.weight)
+            nn.init.zeros_(layer.bias)
+    return network
+
+
+def layers_of(network: nn.Sequential) -> list[LinearLayer]:
+    """Return copies of the layers of a perceptron."""
+    linear = (layer for layer in network if isinstance(layer, nn.Linear))
+    return [
+        LinearLayer(layer.weight.t().numpy(force=True).copy(), layer.bias.numpy(force=True).copy()) for layer in linear
+    ]
+
+
+def activate(x: Tensor) -> Tensor:
+    """Apply the leaky ReLU."""
+    return functional.leaky_relu(x, SLOPE)
+
+
+class Residual(nn.Module):
+    """Two fully connected layers; the skip is added before the last activation."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.first, self.second = nn.Linear(width, width), nn.Linear(width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Return numbers (..., width) from as many."""
+        return activate(x + self.second(activate(self.first(x))))
+
+
+class EncoderDecoder(nn.Module):
+    """A network of two parts, which subclasses create.
+
+    Attributes
+    ----------
+    encoder : nn.Module
+        Runs once a fabric.
+    decoder : nn.Module
+        Runs for every query; all that a renderer keeps beside what was encoded.
+    """
+
+    encoder: nn.Module
+    decoder: nn.Module
+
+    def schedule(self, progress: float) -> None:
+        """Change nothing over the training."""
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return one group: all weights learn at the same rate."""
+        return [{"params": list(self.parameters()), "lr": rate}]
+
+    def architecture(self) -> dict[str, Any]:
+        """Count parameters and name the layers."""
+        counts = {
+            part: sum(weight.numel() for weight in module.parameters())
+            for part, module in (("encoder", self.encoder), ("decoder", self.decoder))
+        }
+        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
+        return {"parameters": counts | {"total": sum(counts.values())}, "layers": layers}
+
+
+def to_network(components: Tensor, log_k: float) -> Tensor:
+    """Take components (..., 4) to network space: g(S) = ln(k S + 1), C unchanged."""
+    return torch.cat([torch.log1p(log_k * components[..., SPECULAR]), components[..., DIFFUSE]], dim=-1)
+
+
+def to_components(output: Tensor, log_k: float) -> Tensor:
+    """Take network space (..., 4) to components: S = (e^x - 1)/k, C unchanged, both at least 0."""
+    # Half precision would overflow at x = 11.
+    output = output.to(torch.promote_types(output.dtype, torch.float32))
+    specular = torch.expm1(output[..., SPECULAR]) / log_k
+    return torch.cat([specular, output[..., DIFFUSE]], dim=-1).clamp_min_(0.0)
+
+
+def weighted_error(output: Tensor, target: Tensor, specular_weight: float, diffuse_weight: float) -> Tensor:
+    """Return the weighted mean squared error of outputs (..., 4), both in network space."""
+    squared = (output - target).square()
+    return specular_weight * squared[..., SPECULAR].mean() + diffuse_weight * squared[..., DIFFUSE].mean()

@@ -1,1 +1,0 @@
-"""`point_sampled`: the point model at k points of the footprint."""

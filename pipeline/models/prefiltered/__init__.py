@@ -1,1 +1,0 @@
-"""`prefiltered`: averaged normals and one evaluation of the point model, without shadows."""

@@ -1,1 +1,0 @@
-"""`soft_nodes`: sums over few nodes with softened horizons; nothing is learnt."""

@@ -1,1 +1,0 @@
-"""`summed_area`: tables of the visible area of clusters of yarn, each shaded once; nothing is learnt."""

@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.groups import DETAILS
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.analytic.soft_nodes import SoftNodes, SoftNodesOptions
+from pipeline.models.method import Method
+from pipeline.models.registry import load_methods
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+
+def test_each_level_is_its_sums_in_chunks():
+    fabric = load_fabric("polyester_lining")
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 5000)
+    methods = load_methods(SoftNodesOptions())
+    assert [method.setting for method in methods] == [f"k = {level}" for level in DETAILS]
+    for method, level in zip(methods, DETAILS, strict=True):
+        assert isinstance(method, Method)
+        assert method.covers(fabric)
+        table = tabulate(fabric, level=level)
+        np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
+        assert method.bytes_stored(fabric) == table.nbytes
+
+
+COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("sigma", [(0.06, 0.3), (0.3, 1.5)])
+@pytest.mark.parametrize("name", ["cotton_twill", "wool_gabardine"])
+def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
+    """Views or lights beyond 70 degrees; left out, curvature would be more than a tenth of the squared error."""
+    fabric, method = load_fabric(name), SoftNodes()
+    options = QueryOptions(curvature=(0.05, 0.6), sigma=sigma, max_angle=85.0)
+    curved = draw_queries(options, fabric.weave.repeat, 2, 0, 2000)
+    steep = np.minimum(curved.wi[:, 2], curved.wo[:, 2]) < np.cos(np.radians(70.0))
+    curved = curved.take(np.flatnonzero(steep)[:400])
+    flat = curved._replace(curvature=np.zeros_like(curved.curvature))
+    options = TruthOptions(estimator="owen", relative_error=0.01)
+    of_curved, of_flat = (estimate(fabric, queries, options, 1).mean @ COLOUR for queries in (curved, flat))
+
+    def error(queries, truth):
+        return np.sqrt(np.mean((method.predict(fabric, queries) @ COLOUR - truth) ** 2)) / truth.mean()
+
+    wrong = error(curved, of_curved)
+    assert wrong < 1.2 * error(flat, of_flat)
+    assert wrong**2 < 0.9 * error(flat, of_curved) ** 2
+
+
+def test_flat_rows_do_not_depend_on_curved_ones():
+    fabric, method = load_fabric("voile"), SoftNodes()
+    asked = draw_queries(QueryOptions(behind=0.3), fabric.weave.repeat, 2, 0, 300)
+    curvature = np.where(np.arange(300) % 2 == 0, np.float32(0.2), np.float32(0.0))
+    alone, mixed = method.predict(fabric, asked), method.predict(fabric, asked._replace(curvature=curvature))
+    np.testing.assert_array_equal(mixed[1::2], alone[1::2])
+    assert (mixed[::2] != alone[::2]).any(axis=1).mean() > 0.5
+
+
+def test_a_little_curvature_changes_little():
+    """Falls grow in proportion below the first curvature, so that a hundredth of it is almost flat cloth."""
+    fabric, method = load_fabric("denim"), SoftNodes()
+    asked = draw_queries(QueryOptions(max_angle=75.0), fabric.weave.repeat, 3, 0, 500)
+    flat = method.predict(fabric, asked)
+    curved = method.predict(fabric, asked._replace(curvature=np.full(500, 5e-4, np.float32)))
+    assert np.abs(curved - flat).max() < 0.02 * flat.max() and (curved != flat).any()
+
+
+def test_lights_on_both_sides_are_answered_row_by_row():
+    fabric, method = load_fabric("voile"), SoftNodes()
+    asked = draw_queries(QueryOptions(behind=0.5), fabric.weave.repeat, 2, 0, 300)
+    behind = asked.wi[:, 2] < 0
+    found = method.predict(fabric, asked)
+    np.testing.assert_array_equal(found[~behind], method.predict(fabric, asked.take(~behind)))
+    np.testing.assert_array_equal(found[behind], method.behind(fabric, asked.take(behind))[:, :4])
+
+
+def test_viewers_behind_are_refused():
+    fabric = load_fabric("polyester_lining")
+    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 20)
+    with pytest.raises(BadInput, match="wo"):
+        SoftNodes().predict(fabric, asked._replace(wo=-asked.wo))

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.summed_area import SummedAreaOptions
+from pipeline.models.method import Method
+from pipeline.models.registry import load_methods
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+
+def test_each_number_of_clusters_is_a_method():
+    fabric, methods = load_fabric("polyester_lining"), load_methods(SummedAreaOptions(clusters=[16, 64]))
+    assert [method.setting for method in methods] == ["k = 16", "k = 64"]
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 64)
+    answers = []
+    for method in methods:
+        assert isinstance(method, Method) and method.covers(fabric)
+        answers.append(method.predict(fabric, queries, seed=1))
+        assert answers[-1].shape == (64, 4) and answers[-1].dtype == np.float32
+        np.testing.assert_array_equal(answers[-1], method.predict(fabric, queries, seed=2))
+    assert not np.array_equal(*answers)
+    assert 0 < methods[0].bytes_stored(fabric) < methods[1].bytes_stored(fabric)
+
+
+@pytest.mark.parametrize("sigma", [(0.05, 0.25), (0.25, 0.8), (0.8, 8.0)])
+def test_it_errs_less_than_points_of_the_same_time(sigma):
+    """RMSE of a grey cloth's colour: 16 R2 points take about as long as 64 clusters."""
+    fabric = load_fabric("cotton_twill")
+    queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 300)
+    colour = np.array([0.3, 0.3, 0.5, 0.5])
+    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ colour
+    errors = []
+    for options in (
+        SummedAreaOptions(clusters=[64]),
+        PointSampledOptions(counts=[16], sequence="r2", visibility="soft_horizon"),
+    ):
+        (method,) = load_methods(options)
+        errors.append(np.mean((method.predict(fabric, queries) @ colour - truth) ** 2))
+    assert errors[0] < 0.8 * errors[1]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "says"), [(QueryOptions(behind=0.5), "viewer's side"), (QueryOptions(curvature=(0.1, 0.5)), "flat cloth")]
+)
+def test_other_queries_are_refused(kinds, says):
+    fabric, (method,) = load_fabric("denim"), load_methods(SummedAreaOptions(clusters=[16]))
+    queries = draw_queries(kinds, fabric.weave.repeat, 1, 0, 16)
+    with pytest.raises(BadInput, match=says):
+        method.predict(fabric, queries)
+
+
+@pytest.mark.parametrize("clusters", [[], [8], [20], [1024], [64.5]])
+def test_numbers_of_clusters_are_checked(clusters):
+    with pytest.raises(ValidationError):
+        SummedAreaOptions(clusters=clusters)
