@@ -56,7 +56,7 @@ FEWEST: Final = 512
 _Rows = list[tuple[Fabric, Queries, Answers]]
 
 
-def measure_times_by_size(
+def measure_by_size(
     methods: Sequence[Method],
     manifest: Manifest,
     folder: Path,
@@ -64,9 +64,9 @@ def measure_times_by_size(
     provenance: Provenance | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
-    """Measure times of methods on held-out queries, one class of footprints after the other.
+    """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
-    Timed are calls on one thread about every fabric that the method covers, of as
+    Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
     many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
     edge of the class, value); its value is that over all classes. `progress` receives the finished share.
     """
@@ -75,15 +75,14 @@ def measure_times_by_size(
         one for one in methods if any(one.covers(cloth) for members in classes.values() for cloth, _, _ in members)
     ]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
-    counts = [0] * len(methods)
     for done, (low, members) in enumerate(classes.items()):
         progress(done / len(classes))
         contenders = []
-        for index, method in enumerate(methods):
-            drawn = [(cloth, queries) for cloth, queries, _ in members if method.covers(cloth)]
-            for cloth, queries in drawn:
+        for method in methods:
+            own = [one for one in members if method.covers(one[0])]
+            for cloth, _, _ in own:
                 method.prepare(cloth)
-                counts[index] += len(queries.u)
+            drawn = [(cloth, queries) for cloth, queries, _ in own]
             contenders.append(affordable(Contender(method.predict, drawn), LONGEST, FEWEST))
         timings = time_side_by_side(
             contenders,
@@ -96,18 +95,17 @@ def measure_times_by_size(
     records = []
     for index, method in enumerate(methods):
         subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
+        errors = _errors(subject, method, classes, shares, options.seed)
         mean = sum(shares[low] * ns for low, ns in times[index])
-        records.append(subject.of("size_time", mean, counts[index], curve=tuple(times[index])))
+        records.append(subject.of("size_time", mean, errors[0].count, curve=tuple(times[index])))
+        records += errors
     return records
 
 
 def measure_errors_by_size(
     methods: Sequence[Method], manifest: Manifest, folder: Path, seed: int, provenance: Provenance | None = None
 ) -> list[Record]:
-    """Measure errors of all queries of each class of footprints; `seed` is that of random methods.
-
-    A Record's curve holds (lower edge of the class, value); its value is that over all classes.
-    """
+    """Measure errors as `measure_by_size` does, without times; `seed` is that of random methods."""
     classes, shares = _classes(manifest, folder)
     records = []
     for method in methods:

@@ -1,4 +1,4 @@
-"""Times of all methods side by side, on queries of all sizes and by the size of footprints."""
+"""Times of all methods side by side, and their errors by the size of footprints."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class TimeOfMethods(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all queries, then queries by the size of their footprints."""
-        from reports.measure.by_size import measure_times_by_size
+        from reports.measure.by_size import measure_by_size
         from reports.measure.held_out import measure_timing
 
         manifest, folder, about = self.dataset.opened(out)
@@ -82,6 +82,6 @@ class TimeOfMethods(Measurement):
             methods + variants, manifest, folder, self.options, about, lambda share: progress(0.6 * share)
         )
         records += [record for model, own in loaded for record in model.not_run(own, about)]
-        return records + measure_times_by_size(
+        return records + measure_by_size(
             methods, manifest, folder, self.options, about, lambda share: progress(0.6 + 0.4 * share)
         )

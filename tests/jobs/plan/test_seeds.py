@@ -64,7 +64,7 @@ def test_each_training_of_one_material_has_every_seed(one, files):
     assert [made.task for made in by_size.model.networks] == [task.id for task in found[1]]
 
 
-@pytest.mark.parametrize("kind", [OnFabric, OnScene, AtExtremes, ErrorsBySize])
+@pytest.mark.parametrize("kind", [OnFabric, OnScene, AtExtremes])
 def test_errors_are_measured_of_every_training(one, three, kind):
     before, after = of(one, kind), of(three, kind)
     assert list(after) == [0, 1, 2] and {len(same) for same in after.values()} == {len(before[0])}
@@ -72,6 +72,10 @@ def test_errors_are_measured_of_every_training(one, three, kind):
     for seed, same in after.items():
         assert all(networks[seed] in task.needs for task in same)
     assert len({task.title for same in after.values() for task in same}) == 3 * len(before[0])
+
+
+def test_errors_by_size_of_further_trainings_have_tasks_of_their_own(one, three):
+    assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
 
 
 def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
