@@ -27,15 +27,10 @@ Integers = npt.NDArray[np.int64]
 
 
 class Mesh(NamedTuple):
-    """Triangles.
+    """Triangles: vertices, (V, 3), in yarn spacings, and corners, (F, 3).
 
-    Attributes
-    ----------
-    vertices : float64 (V, 3)
-        In yarn spacings: x along the weft, y along the warp, z up.
-    faces : int64 (F, 3)
-        Corners of each triangle, counterclockwise as seen from the open side: from above, or from the lower side of a
-        wall.
+    x runs along the weft, y along the warp, z up. Corners are counterclockwise as seen from the open side: from above,
+    or from the lower side of a wall.
     """
 
     vertices: Floats
@@ -70,22 +65,10 @@ class _Piece(NamedTuple):
 
 
 def repeat_mesh(fabric: Fabric, vertices_per_cell: int = 64, repeats: tuple[int, int] = (1, 1)) -> RepeatMesh:
-    """Cover a cloth with triangles.
+    """Cover a cloth with triangles; vertices are shared within a piece, not between pieces.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    vertices_per_cell : int
-        Steps across a yarn, and along it in every cell; >= 2. The error of heights between vertices falls as its
-        inverse square.
-    repeats : two ints
-        Copies along x and along y, >= 1.
-
-    Returns
-    -------
-    RepeatMesh
-        Vertices are shared within a piece, not between pieces.
+    A yarn has `vertices_per_cell` steps across it, and along it in every cell, >= 2: the error of heights between
+    vertices falls as its inverse square. There are `repeats` copies along x and along y, >= 1.
     """
     pieces = _pieces(fabric, vertices_per_cell)
     floor = min(float(piece.z.min()) for piece in pieces)

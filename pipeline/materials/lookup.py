@@ -77,18 +77,8 @@ class MipLevels(NamedTuple):
 def mip_levels(level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float) -> MipLevels:
     """Return the maps of a cloth at all levels, down to one texel.
 
-    Parameters
-    ----------
-    level : Planes
-        Sums of the finest level; red is the warp's, green the weft's.
-    material : Constants
-        Numbers of the material.
-    shown : Layout
-        Yarns and texels of the finest level.
-    sheen : float64 (4,)
-        Share of the sheen of each component.
-    specular : float
-        Specular colour of the yarns in the maps.
+    The sums of the finest `level` have red for the warp and green for the weft; `sheen`, (4,), is the share of the
+    sheen of each component, `specular` the specular colour of the yarns in the maps.
     """
     parts, levels, first = [], [], 0
     while True:

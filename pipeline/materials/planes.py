@@ -59,15 +59,7 @@ _Factors = tuple[Float64, Float64, Float64]
 
 
 class Layout(NamedTuple):
-    """Extent of a map.
-
-    Attributes
-    ----------
-    ends, picks : int
-        Yarns along x and along y: whole repeats.
-    width, height : int
-        Texels along x and along y: powers of two.
-    """
+    """Ends and picks that a map shows, in whole repeats, and its texels along x and y, which are powers of two."""
 
     ends: int
     picks: int
@@ -111,14 +103,7 @@ class Planes(NamedTuple):
 
 
 def layout(fabric: Fabric, size: int) -> Layout:
-    """Return the layout of a fabric's maps.
-
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    size : int
-        Texels of the longer side.
+    """Return the layout of a fabric's maps, `size` texels along the longer side.
 
     Raises
     ------
@@ -161,17 +146,7 @@ def _order(candidate: Layout) -> tuple[float, float, int]:
 
 
 def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
-    """Sum a fabric's surface over the texels of the finest level.
-
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    shown : Layout
-        Yarns and texels of the map.
-    share : Reflectance
-        Reflectance of the families.
-    """
+    """Sum a fabric's surface over the texels of the finest level."""
     per_texel = _samples(shown)
     width, height = shown.width * per_texel, shown.height * per_texel
     lowest = _lowest(fabric)

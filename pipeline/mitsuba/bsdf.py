@@ -29,15 +29,7 @@ REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
 
 
 class RayValues:
-    """Values of Mitsuba as NumPy arrays with one row a ray, and back, for scalar and for vectorised variants.
-
-    Parameters
-    ----------
-    mi : module
-        Mitsuba, its variant set.
-    count : int
-        Rays; 1 where the variant is scalar.
-    """
+    """Values of Mitsuba as NumPy arrays with one row a ray (one ray if the variant is scalar), and back."""
 
     def __init__(self, mi: Any, count: int) -> None:
         self._mi, self._count = mi, count

@@ -178,17 +178,7 @@ class _Bounce(NamedTuple):
 
 
 class _Path:
-    """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once.
-
-    Parameters
-    ----------
-    mi, dr : module
-        Mitsuba, its variant set, and Dr.Jit.
-    scene, sampler
-        What is rendered, and where random numbers come from.
-    max_depth, rr_depth, hide_emitters
-        As for Mitsuba's `path`.
-    """
+    """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once."""
 
     def __init__(
         self, mi: Any, dr: Any, scene: Any, sampler: Any, max_depth: int, rr_depth: int, hide_emitters: bool

@@ -45,15 +45,7 @@ def register() -> Any:
 
 
 def dress(loaded: Loaded, method: str = USUAL) -> Any:
-    """Let the shapes of a loaded scene wear their cloth as a BSDF, and return Mitsuba's scene.
-
-    Parameters
-    ----------
-    loaded : Loaded
-        The scene; it is changed.
-    method : str
-        The method that evaluates the cloth (`pipeline.models.named`).
-    """
+    """Let the shapes of a loaded scene, which is changed, wear their cloth as a BSDF; return Mitsuba's scene."""
     mi = register()
     worn = {}
     for key, (cloth, fabric) in loaded.cloths.items():

@@ -157,18 +157,7 @@ class RayHits(NamedTuple):
 
 
 class Worn:
-    """A cloth on a shape.
-
-    Parameters
-    ----------
-    options : ClothOptions
-        Fabric, method, and place in uv.
-
-    Raises
-    ------
-    BadInput
-        If there is no such fabric or method.
-    """
+    """A cloth on a shape; BadInput if there is no such fabric or method."""
 
     def __init__(self, options: ClothOptions) -> None:
         self.options = options

@@ -173,26 +173,10 @@ class Descriptor(_Model):
 class Shader(NamedTuple):
     """A model of one fabric, ready to be written.
 
-    Attributes
-    ----------
-    name : str
-        Name of the model, of its file in the source, and of its function there.
-    sources : tuple of str
-        Files of the source that are the same for all fabrics.
-    generated : dict
-        Texts of the other files of the source, by name.
-    files : dict
-        Contents of the files of buffers, by their paths in the folder.
-    about : Descriptor
-        The descriptor, before source and languages are written.
-    golden : Golden
-        Queries with their answers.
-    size : str
-        Words on its size, for a sentence.
-    sampled : bool
-        Whether directions can be drawn.
-    onnx : callable or None
-        Returns its network as an ONNX model; None if it has none.
+    `name` is that of its file in the source and of its function there. `sources` are files of the source that are the
+    same for all fabrics, `generated` texts of the others by name, `files` contents of buffers by path in the folder.
+    `about` has no source and languages yet. `size` are words for a sentence; `sampled` says whether directions can be
+    drawn; `onnx` returns the network as an ONNX model, if there is one.
     """
 
     name: str

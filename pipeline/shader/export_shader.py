@@ -42,10 +42,8 @@ def write_shader(
         The cloth.
     folder : Path
         Folder to write; an earlier export of the same model is replaced (`pipeline.folders`).
-    model : str, optional
-        The model (`shader_of`); the soft nodes if left out.
-    level : int, optional
-        Level of detail k of the soft nodes, one of DETAILS.
+    model, level
+        As for `shader_of`.
     language : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
     kind : sequence of str
@@ -54,8 +52,7 @@ def write_shader(
     Raises
     ------
     BadInput
-        If a language or kind is not known, slangc or a package is needed and not there, the model has no network for
-        ONNX, or as `shader_of`.
+        If a name is not known, a program or package is missing, there is no network for ONNX, or as `shader_of`.
     WorkFailed
         If slangc refuses the source.
     """
@@ -115,17 +112,8 @@ def _write_source(shader: Shader, folder: Path) -> list[str]:
 def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return a model of a fabric, ready to be written.
 
-    Parameters
-    ----------
-    model : str, optional
-        `soft_nodes`, which is meant if it is left out, a model that comes with the package, or the folder of a trained
-        `selvage` or `neumip`.
-    fabric : Fabric
-        The cloth.
-    level : int, optional
-        Level of detail of the soft nodes.
-    kinds : collection of str
-        Of QUERY_KINDS.
+    `model` is `soft_nodes`, which is meant if it is left out, a model that comes with the package, or the folder of a
+    trained `selvage` or `neumip`; `level` the level of detail of the soft nodes; `kinds` are of QUERY_KINDS.
 
     Raises
     ------

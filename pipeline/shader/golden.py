@@ -77,16 +77,9 @@ GROUPS: Final = {
 class Golden(NamedTuple):
     """Queries with their answers.
 
-    Attributes
-    ----------
-    rows : float32 (N, 12)
-        GOLDEN_COLUMNS.
-    answers : float32 (N, ANSWER_COLUMNS) or (N, 8)
-        Components; bounds; of models that know them transparency, and density of wi in the mixture of the lobes, 1/sr.
-    groups : dict
-        First row and end of the rows of each of GROUPS.
-    steady : float
-        Share of the queries tried that are steady.
+    `rows`, (N, 12), are GOLDEN_COLUMNS; `answers` are components and bounds, (N, 8), and of models that know them
+    transparency and density of wi in the mixture of the lobes, 1/sr, (N, ANSWER_COLUMNS); `groups` has first row and
+    end of each of GROUPS; `steady` is the share of the queries tried that are steady.
     """
 
     rows: Float32

@@ -110,25 +110,9 @@ def compiler_for(languages: Sequence[str]) -> Path:
 def translate(
     languages: Sequence[str], compiler: Path, source: Path, folder: Path, entries: Collection[str]
 ) -> dict[str, list[str]]:
-    """Write the files of languages, each in a folder of its name, and return their paths in `folder`.
+    """Write the files of languages, each in a folder of its name, for the entry points that the source has.
 
-    Parameters
-    ----------
-    languages : sequence of str
-        Keys of LANGUAGES.
-    compiler : Path
-        slangc.
-    source : Path
-        Folder with the Slang source and `layout.slang`.
-    folder : Path
-        Folder to write to.
-    entries : collection of str
-        Entry points that the source has.
-
-    Raises
-    ------
-    WorkFailed
-        If slangc refuses the source.
+    Returns their paths in `folder`; WorkFailed if slangc refuses the source.
     """
     written: dict[str, list[str]] = {}
     for name in languages:

@@ -92,14 +92,7 @@ class Weights:
     ) -> list[PlacedLayer]:
         """Append the layers of a network; inputs of the first one are filled up to whole elements.
 
-        Parameters
-        ----------
-        network : str
-            Name of the network.
-        layers : sequence of LinearLayer
-            From the first to the last one.
-        activation, last : str
-            Functions of the outputs of all layers but the last, and of the last.
+        `activation` is the function of the outputs of all layers but the last, `last` that of the last.
         """
         described = []
         for index, layer in enumerate(layers):
@@ -169,24 +162,7 @@ _SELVAGE_INPUTS: Final = (
 
 
 def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
-    """Return the model for a fabric.
-
-    Parameters
-    ----------
-    method : Selvage
-        The trained model.
-    fabric : Fabric
-        The cloth.
-    level : int, optional
-        Level of detail of the soft nodes: that of the training.
-    kinds : collection of str
-        Of QUERY_KINDS.
-
-    Raises
-    ------
-    BadInput
-        If another level is wished, or the cloth is too large.
-    """
+    """Return the model for a fabric; BadInput for another level than that of its training, or too large cloth."""
     trained = method.options.level
     if level not in (None, trained):
         raise BadInput("export", "level", level, f"leave it out: {method.name} was trained with level {trained}")

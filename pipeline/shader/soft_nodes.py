@@ -23,22 +23,7 @@ SOFT_NODES_SOURCES: Final = (
 
 
 def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
-    """Return the soft nodes of a fabric.
-
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    level : int, optional
-        Level of detail k, one of DETAILS; the usual one if left out.
-    kinds : collection of str
-        Of QUERY_KINDS.
-
-    Raises
-    ------
-    BadInput
-        If the level is none, or the cloth is too large.
-    """
+    """Return the soft nodes of a fabric; BadInput if the level is none of DETAILS, or the cloth is too large."""
     level = USUAL if level is None else level
     if level not in DETAILS:
         raise BadInput("export", "level", level, f"must be one of {', '.join(map(str, DETAILS))}")

@@ -44,16 +44,9 @@ EVERY: Final = "all"
 
 
 class Sides(NamedTuple):
-    """Tables of both sides of a cloth, by the kinds of queries that a shader is to answer.
+    """Tables of a cloth: its front, and its back if viewers behind it are wanted.
 
-    Attributes
-    ----------
-    front : SoftNodeTable
-        Its front, with what light from behind and curved cloth need if these are wanted.
-    back : SoftNodeTable or None
-        Its back, if viewers behind it are wanted.
-    colours : float32 (6, 3)
-        k_s, k_d and k_dt, each of warp and weft, linear RGB.
+    `colours`, (6, 3), are k_s, k_d and k_dt, each of warp and weft, linear RGB.
     """
 
     front: SoftNodeTable
@@ -71,19 +64,11 @@ class Place:
 
 
 class ClothTables(NamedTuple):
-    """Buffers of a cloth.
+    """The four buffers of a cloth.
 
-    Attributes
-    ----------
-    integers, numbers : int32, float32
-    nodes : float32 (rows, 4)
-    grid : uint8
-        The four buffers.
-    scalars, back_scalars : dict
-        Values of the table of type int, then of type float, in the order in which the buffers begin with them: of the
-        front, then of the back, if the tables know it.
-    places : dict
-        Buffer and arrays in it, by name.
+    `scalars` and `back_scalars` are values of the table of type int, then of type float, in the order in which the
+    buffers begin with them: of the front, then of the back, if the tables know it. `places` has the arrays of each
+    buffer.
     """
 
     integers: npt.NDArray[np.int32]

@@ -34,18 +34,9 @@ EXPORTS: Final = {
 
 
 def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
-    """Write a fabric, whole or not at all, and return a sentence on what was written.
+    """Write a fabric as one of `EXPORTS` to a file or folder, and return a sentence on what was written.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    kind : str
-        One of `EXPORTS`.
-    path : Path
-        File or folder to write.
-    **options
-        Options of the kind; the others have their defaults.
+    Options that are left out have the defaults of the kind.
 
     Raises
     ------

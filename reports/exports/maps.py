@@ -98,14 +98,7 @@ YARN_ID: Final[tuple[Kind, str]] = (
 def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
     """Write the maps of a fabric, whole or not at all, and return a sentence on them.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    folder : Path
-        Folder to write; maps of before are replaced (`pipeline.folders`).
-    size : int
-        Texels of the longer side.
+    Maps of before are replaced (`pipeline.folders`); `size` counts the texels of the longer side.
 
     Raises
     ------

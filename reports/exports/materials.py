@@ -54,17 +54,7 @@ def spacing_cm(fabric: Fabric) -> float:
 
 
 def write_openpbr(path: Path, name: str, material: Constants) -> None:
-    """Write the document.
-
-    Parameters
-    ----------
-    path : Path
-        File to write, in the folder of the maps.
-    name : str
-        Name of the fabric.
-    material : Constants
-        Numbers that hold for all texels.
-    """
+    """Write the MaterialX document into the folder of the maps."""
     import MaterialX
 
     document = MaterialX.createDocument()
@@ -153,21 +143,7 @@ class _Mesh(NamedTuple):
 
 
 def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, material: Constants) -> None:
-    """Write the sample.
-
-    Parameters
-    ----------
-    path : Path
-        File to write, ending in ``.glb``.
-    fabric : Fabric
-        The cloth.
-    shown : Layout
-        Yarns of a map.
-    level : Textures
-        Maps of the level to embed.
-    material : Constants
-        Numbers that hold for all texels.
-    """
+    """Write the sample as GLB, with the maps of one level embedded."""
     import pygltflib as gltf
 
     file = _File(gltf)

@@ -26,16 +26,8 @@ MOST_TRIANGLES: Final = 50_000_000
 def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1) -> str:
     """Write a cloth as one PLY file, whole or not at all, and return a sentence on it.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    path : Path
-        File to write; its folder is made.
-    vertices : int
-        Steps across a yarn, and along it in every cell of the draft, >= 2.
-    repeats : int
-        Copies of the repeat along x and along y, >= 1.
+    Every yarn has `vertices` steps across it, and along it in every cell of the draft, >= 2; there are `repeats`
+    copies of the repeat along x and along y, >= 1.
 
     Raises
     ------

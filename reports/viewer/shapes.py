@@ -38,20 +38,10 @@ _SHADOW = 0.01  # a ray to the light starts so far above the cloth
 
 
 class Viewpoint(NamedTuple):
-    """Viewer and light; angles in degrees, and a turn of 0 comes from -y.
+    """Shape that the cloth covers, and viewer and light around it, in degrees; a turn of 0 comes from -y.
 
-    Attributes
-    ----------
-    shape : str
-        What the cloth covers.
-    turn, tilt : float
-        Direction from the cloth to the viewer: around z, and above the horizon.
-    distance : float
-        From the cloth, > 0.
-    light_turn, light_tilt : float
-        Direction to the light.
-    target : two floats
-        Point in the middle of the picture, on the plane alone.
+    `turn` and `tilt` are the direction from the cloth to the viewer, around z and above the horizon, `distance` > 0 is
+    in yarn spacings; `target` is the point in the middle of the picture, on the plane alone.
     """
 
     shape: Shape
@@ -64,15 +54,7 @@ class Viewpoint(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Pixels that show lit cloth.
-
-    Attributes
-    ----------
-    cloth, lit : bool (H, W)
-        Pixels that show the cloth, and those of them with light and viewer in front; row 0 is the lowest.
-    queries : Queries
-        One for each lit pixel, row after row.
-    """
+    """Pixels that show the cloth, (H, W), row 0 the lowest; those of them that are lit; the queries of these."""
 
     cloth: npt.NDArray[np.bool_]
     lit: npt.NDArray[np.bool_]

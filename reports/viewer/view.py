@@ -92,14 +92,8 @@ _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
 def write_page(fabric: Fabric, path: Path, truth: int = 160) -> str:
     """Write the viewer of a fabric, whole or not at all, and return a sentence on it.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    path : Path
-        File to write; its folder is made.
-    truth : int
-        Pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to MOST_TILE; 0: none.
+    `truth` counts the pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to
+    MOST_TILE; 0: there are none.
 
     Raises
     ------
@@ -141,15 +135,7 @@ def _text(name: str) -> str:
 
 
 def content(fabric: Fabric, truth: int) -> dict[str, Any]:
-    """Return what the page shows of a fabric, ready for JSON.
-
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth; its repeat is not too large for the shader.
-    truth : int
-        Pixels along each side of tiles, which are pictures of the truth and of TILES; 0: there are none.
-    """
+    """Return what the page shows of a fabric, ready for JSON; `truth` as for `write_page`."""
     ends = fabric.weave.repeat[0]
     factors = bends(fabric), widths(fabric)
     of_shapes: list[dict[str, Any]] = []

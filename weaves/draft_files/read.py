@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 import numpy as np
-from dtx_to_wif import PatternData, dtx_reader, make_liftplan, read_dtx, read_wif, read_wpo
+from dtx_to_wif import PatternData, dtx_reader, make_liftplan, read_dtx, read_wpo
 from dtx_to_wif.twa_reader import WIF_FILE_NAME
 
 from weaves.colour_order import MOST_THREADS
 from weaves.draft import Bools
-from weaves.draft_files.wif_sections import MOST_USED, MOST_WIF_BYTES, checked_wif
+from weaves.draft_files.wif_sections import MOST_USED, MOST_WIF_BYTES, wif_pattern
 from weaves.errors import BadInput, one_line
 from weaves.reading import read_bytes
 
@@ -91,8 +91,8 @@ def read_draft(path: Path) -> DraftFile:
 
 
 def _read_wif(content: bytes, where: str) -> PatternData:
-    text = checked_wif(decoded(content), where)
-    return _called(lambda: read_wif(io.StringIO(text), where), where, "a WIF draft")
+    text = decoded(content)
+    return _called(lambda: wif_pattern(text, where), where, "a WIF draft")
 
 
 def _read_twa(content: bytes, where: str) -> PatternData:
@@ -174,6 +174,8 @@ def _called(call: Callable[[], Result], where: str, kind: str) -> Result:
     """Call the library; whatever it raises is a damaged file."""
     try:
         return call()
+    except BadInput:
+        raise
     except Exception as error:
         missing = f"the entry {one_line(error, 60)} is missing" if isinstance(error, LookupError) else ""
         reason = missing or one_line(error, 120) or type(error).__name__

@@ -1,17 +1,17 @@
 """The sections of a WIF text, checked one by one, so that each error names its section.
 
 WIF (Weaving Information File, version 1.1) is a text of sections and keys. The reader of dtx-to-wif never returns on
-some texts and raises bare errors on others; it gets the text that `checked_wif` returns, which has none of these.
+some texts and raises bare errors on others, so it is not used.
 """
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Mapping
 from configparser import ConfigParser, ParsingError
 from typing import Annotated, Any, Final
 
+from dtx_to_wif import PatternData, WarpWeftData
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from weaves.colour_order import MOST_THREADS
@@ -116,15 +116,8 @@ def section_name(field: str) -> str:
     return f"[{field.upper().replace('_', ' ')}]"
 
 
-def checked_wif(text: str, where: str) -> str:
-    """Return a WIF text with the sections that matter, which dtx-to-wif reads without errors of its own.
-
-    Parameters
-    ----------
-    text : str
-        The file, decoded.
-    where : str
-        The file, for messages.
+def wif_pattern(text: str, where: str) -> PatternData:
+    """Return what a WIF text says; `where` names the file in messages.
 
     Raises
     ------
@@ -150,7 +143,7 @@ def checked_wif(text: str, where: str) -> str:
     wif.weaving.treadles = max([wif.weaving.treadles or 0, *wif.tieup])
     if not wif.liftplan and (most := max(max(used) for used in wif.treadling.values())) > wif.weaving.treadles:
         raise BadInput(where, "", f"[TREADLING] uses treadle {most}", f"[TIEUP] ends at {wif.weaving.treadles}")
-    return _written(wif)
+    return _pattern(wif, where)
 
 
 def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
@@ -251,17 +244,33 @@ def _complete(wif: _Wif, axis: str, where: str) -> None:
                 lengths.clear()
 
 
-def _written(wif: _Wif) -> str:
-    """Return the sections as text."""
-    parser = ConfigParser(interpolation=None)
-    for field, content in wif.model_dump(by_alias=True, exclude_none=True).items():
-        if field == "wif" or content:
-            parser[field.replace("_", " ")] = {str(key): _value(value) for key, value in content.items()}
-    file = io.StringIO()
-    parser.write(file, space_around_delimiters=False)
-    return file.getvalue()
+def _pattern(wif: _Wif, where: str) -> PatternData:
+    """Return the sections as the data of dtx-to-wif."""
+    sets: dict[str, Any] = {
+        name: {thread: set(numbers) for thread, numbers in getattr(wif, name).items()}
+        for name in ("threading", "tieup", "treadling", "liftplan")
+    }
+    lengths: dict[str, Any] = {
+        f"{axis}_{kind}": getattr(wif, f"{axis}_{kind}")
+        for axis in ("warp", "weft")
+        for kind in ("colors", "spacing", "thickness")
+    }
+    return PatternData(
+        name=wif.text.title or where,
+        color_table=wif.color_table,
+        color_range=wif.color_palette.range,
+        is_rising_shed=wif.weaving.rising_shed is not False,
+        source_program=wif.wif.source_program or "?",
+        source_version=wif.wif.source_version or "?",
+        num_shafts=wif.weaving.shafts or 0,
+        num_treadles=wif.weaving.treadles or 0,
+        warp=_yarns_of(wif.warp),
+        weft=_yarns_of(wif.weft),
+        **sets,
+        **lengths,
+    )
 
 
-def _value(value: object) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-    return " ".join(text.replace("%", "%%").split())  # the reader interpolates
+def _yarns_of(yarns: _Yarns) -> WarpWeftData:
+    color = yarns.color[0] if yarns.color else None
+    return WarpWeftData(yarns.threads or 0, color, None, yarns.spacing, yarns.thickness, yarns.units)
