@@ -17,7 +17,9 @@ SECONDS_A_COST: Final[Mapping[Stage, float]] = MappingProxyType(
 )
 """Seconds that tasks of a stage took by their stated cost, before any is known: `quick`, two cores of 2026."""
 
-_WEIGHT: Final = 0.2  # seconds of work that count as much as what is assumed before
+# Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. Short tasks, whose
+# cost is less than what any task takes, say nothing about long ones.
+_WEIGHTS: Final = (10.0, 10.0, 0.5)
 _LEAST_SHARE: Final = 0.05  # of a task under way, from which its own speed is known
 _MOST_LOAD: Final = 0.02  # of the driver's time that goes into estimates
 _SECONDS_BETWEEN: Final = 1.0  # two estimates
@@ -43,9 +45,9 @@ class Estimate:
     def seconds(self, task: Task) -> float:
         """Return how long a task takes on one worker."""
         ratio = 1.0
-        for kind in _kinds(task):
+        for kind, weight in zip(_kinds(task), _WEIGHTS, strict=True):
             seconds, cost = self._sums.get(kind, (0.0, 0.0))
-            ratio = (seconds + ratio * _WEIGHT) / (cost + _WEIGHT)
+            ratio = (seconds + ratio * weight) / (cost + weight)
         return ratio * _cost(task)
 
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:

@@ -29,7 +29,7 @@ def out(files, tmp_path):
     ledger = Ledger(out)
     for task in plan(load_recipe(files.write())):
         if task.stage == "generate":
-            finish(ledger, task, 2 * task.cost)
+            finish(ledger, task, 200 * task.cost)
     return out
 
 
@@ -53,9 +53,9 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
     shared = [task for task in tasks if facts.why.get(task.id) == ELSEWHERE]
     assert len(shared) > len(new) > 0
     for task in new:
-        assert 1.5 * task.cost < facts.seconds[task.id] < 2.1 * task.cost
+        assert 20 * task.cost < facts.seconds[task.id] < 200 * task.cost
     training = next(task for task in tasks if task.stage == "train")
-    assert facts.seconds[training.id] > 1.5 * training.cost
+    assert facts.seconds[training.id] > 5 * training.cost
 
 
 def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys):
