@@ -23,8 +23,6 @@ class ViewOptions(BaseModel):
     """Standard deviation of the pixel's Gaussian, in pixels."""
     largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
     """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
-    sphere_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
-    """Pixels a yarn spacing takes at the centre of the sphere."""
     plane_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
     """Pixels a yarn spacing takes across the bottom row of the plane."""
     horizon: float = Field(default=0.02, ge=0, le=0.9)
@@ -32,20 +30,14 @@ class ViewOptions(BaseModel):
     largest_angle: float = Field(default=88.0, gt=0, le=89.9)
     """Views more grazing than this, in degrees to the normal, show no cloth: there the truth needs too many points. The
     plane ends with the last whole row."""
-    field_of_view: float = Field(default=50.0, gt=1, le=120)
-    """Angle the plane's picture spans from left to right, in degrees."""
     turn: float = Field(default=24.0, ge=-180, le=180)
     """Angle from the picture's horizontal to the weft, in degrees."""
     sphere_light: tuple[float, float] = (32.0, 132.0)
     """Light on the sphere, in degrees: angle to the camera's direction, azimuth in the picture from the right."""
-    plane_light: tuple[float, float] = (48.0, 62.0)
-    """Light on the plane, in degrees: angle to the plane's normal, azimuth from the right towards the horizon."""
     irradiance: float = Field(default=3.141592653589793, gt=0, le=1000)
     """Irradiance of the directional light on a surface facing it; pi shows a white diffuse surface as 1."""
     step: float = Field(default=0.375, gt=0, le=1)
     """How far the surface moves from frame to frame, in pixels (centre of the sphere, bottom row of the plane)."""
-    heading: float = Field(default=37.0, ge=-180, le=180)
-    """Direction of that motion, as an angle from the weft, in degrees."""
 
 
 class SceneOptions(BaseModel):

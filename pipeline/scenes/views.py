@@ -25,6 +25,12 @@ from pipeline.scenes.options import View, ViewOptions
 
 Floats = npt.NDArray[np.float64]
 
+HEADING: Final = 37.0
+"""Direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees."""
+
+_SPHERE_PIXELS = 6.0  # that a yarn spacing takes at the centre of the sphere
+_FIELD_OF_VIEW = 50.0  # angle that the plane's picture spans from left to right, in degrees
+_PLANE_LIGHT = (48.0, 62.0)  # degrees: angle to the normal, azimuth from the right towards the horizon
 _SPHERE_DISTANCE = 4.0  # of the camera from the centre, in radii
 _SPHERE_FILL = 0.94  # share of the picture's shorter side that the sphere takes
 
@@ -81,16 +87,16 @@ def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuf
     one = np.ones_like(x)
     along_x = np.stack([one, np.zeros_like(x), -0.5 * x], -1) - (0.5 * x)[:, None] * normal
     along_y = np.stack([np.zeros_like(x), one, -0.5 * y], -1) - (0.5 * y)[:, None] * normal
-    spacing = options.sphere_pixels_per_yarn * (_SPHERE_DISTANCE - 1.0) / focal
+    spacing = _SPHERE_PIXELS * (_SPHERE_DISTANCE - 1.0) / focal
     uv, weft, warp = _turned(np.stack([x, y], -1) / spacing, along_x, along_y, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([_unit(weft), _unit(warp), normal], axis=1), spacing * scale)
     light = _direction(options.sphere_light)
-    return _gbuffer(surface, rays, focal, light, shift / options.sphere_pixels_per_yarn, options)
+    return _gbuffer(surface, rays, focal, light, shift / _SPHERE_PIXELS, options)
 
 
 def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
     # Camera above the plane z = 0 looking towards +y, pitched so that the horizon lies at `horizon` from the top.
-    focal = 0.5 * width / math.tan(math.radians(0.5 * options.field_of_view))
+    focal = 0.5 * width / math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
     pitch = math.atan((0.5 - options.horizon) * height / focal)
     screen = _rays(width, height, focal)
     rays = np.stack(
@@ -114,7 +120,7 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
     east, north, up = (np.outer(ones, axis) for axis in np.eye(3))
     uv, weft, warp = _turned(position[:, :2], east, north, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([weft, warp, up], axis=1), ones)
-    light = _direction(options.plane_light)
+    light = _direction(_PLANE_LIGHT)
     return _gbuffer(surface, rays, focal, light, shift / options.plane_pixels_per_yarn, options)
 
 
@@ -129,8 +135,8 @@ def _gbuffer(
     mask, lit = np.zeros_like(surface.hit), np.zeros_like(surface.hit)
     mask[surface.hit], lit[surface.hit] = seen, above
 
-    # The cloth slides along `heading`: the same pixel then shows a patch further back.
-    heading = math.radians(options.heading)
+    # The cloth slides along `HEADING`: the same pixel then shows a patch further back.
+    heading = math.radians(HEADING)
     uv = surface.uv - slide * np.array([math.cos(heading), math.sin(heading)])
     sigma = _footprint(surface, rays, focal, options)[above]
     flat, places = np.zeros_like(sigma), np.arange(len(sigma))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.scenes.options import ViewOptions
-from pipeline.scenes.views import view
+from pipeline.scenes.views import HEADING, view
 
 FLAT = ViewOptions(turn=0.0)
 
@@ -127,7 +127,7 @@ def test_plane_ends_with_a_whole_row():
 def test_frames_slide_the_cloth_by_less_than_a_pixel(scene):
     still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
     slide = 2 * FLAT.step / 6
-    heading = math.radians(FLAT.heading)
+    heading = math.radians(HEADING)
     assert FLAT.step < 1
     assert still.u - moved.u == pytest.approx(np.full(still.u.shape, slide * math.cos(heading)))
     assert still.v - moved.v == pytest.approx(np.full(still.v.shape, slide * math.sin(heading)))
