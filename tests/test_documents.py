@@ -75,8 +75,7 @@ def test_the_readme_shows_the_recipe_quick():
     assert "Recipe `quick`" in block(text_of(ROOT / "README.md"), BLOCK, "README.md")
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
-def test_links_and_paths_exist(path):
+def check_links_and_paths_exist(path):
     links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text_of(path))]
     wrong = [link for link in links if "://" not in link and not (path.parent / link).exists()]
     assert not wrong, f"links that lead nowhere: {wrong}"
@@ -90,16 +89,14 @@ def test_links_and_paths_exist(path):
     assert not wrong, f"files that do not exist: {wrong}"
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
-def test_modules_exist(path):
+def check_modules_exist(path):
     named = {code for code in code_of(path) if re.fullmatch(rf"({'|'.join(ROOMS)})(\.\w+)+", code)}
     files = {name for name in named if name.rpartition(".")[2] in ("py", "toml", "md")}
     wrong = [name for name in sorted(named - files) if not importlib.util.find_spec(name)]
     assert not wrong, f"modules that do not exist: {wrong}"
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
-def test_commands_are_understood(path):
+def check_commands_are_understood(path):
     for tokens in commands_of(path, "twillight"):
         if len(tokens) == 1:
             assert tokens[0] in VERBS, f"{tokens}: no such verb"
@@ -109,11 +106,19 @@ def test_commands_are_understood(path):
             assert tokens[1] in recipe_names(), f"{tokens}: no such recipe"
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
-def test_targets_of_make_exist(path):
+def check_targets_of_make_exist(path):
     (phony,) = re.findall(r"^\.PHONY: (.+)$", text_of(ROOT / "Makefile"), re.M)
     asked = {tokens[0] for tokens in commands_of(path, "make")}
     assert asked - {"VERB"} <= set(phony.split())
+
+
+CHECKS = (check_links_and_paths_exist, check_modules_exist, check_commands_are_understood, check_targets_of_make_exist)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+def test_what_a_document_names_exists(path):
+    for check in CHECKS:
+        check(path)
 
 
 def test_every_verb_is_in_the_readme():

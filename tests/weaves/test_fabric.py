@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.presets import PRESETS
 from weaves.draft import cells
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric, preset_names
@@ -53,7 +54,7 @@ def test_a_fabric_reads_back_from_its_own_file(tmp_path_factory, fabric):
     assert Fabric.model_validate(json.loads(fabric.model_dump_json())) == fabric
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_preset_is_a_cloth_with_a_source(name):
     fabric = load_fabric(name)
     assert fabric.name == name

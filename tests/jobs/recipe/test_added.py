@@ -1,5 +1,6 @@
 """Methods from outside in recipes; the tests of what their code may be are in tests/pipeline/models/added."""
 
+import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from jobs.plan.plan import plan
 from jobs.plan.training import Training
 from jobs.recipe import added
 from jobs.recipe.load import load_recipe
+from pipeline.models.added import describe as describe_module
 from pipeline.models.added.added_code import GROUP
 from weaves.errors import BadInput
 
@@ -36,6 +38,17 @@ NETWORK = METHOD + "    network = load = covers\n"
 HERE = '\n[[models]]\nmodel = "theirs"\n'
 
 
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch, tmp_path):
+    """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
+    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    for name, module in list(sys.modules.items()):
+        if (getattr(module, "__file__", None) or "").startswith(str(tmp_path)):
+            del sys.modules[name]
+
+
 @pytest.fixture
 def theirs(tmp_path):
     (tmp_path / "theirs.py").write_text(METHOD)
@@ -51,7 +64,8 @@ def test_a_given_method_is_one_more_model(files, theirs):
     before, after = ids(load_recipe(path)), ids(load_recipe(path, [theirs]))
     new = after.keys() - before.keys()
     assert new == {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")} | {
-        "bench extremes of theirs"
+        "bench errors by size of theirs",
+        "bench extremes of theirs",
     }
     changed = {title for title in before if after[title] != before[title]}
     assert changed == {"bench timing of all methods", "report page of tiny"}

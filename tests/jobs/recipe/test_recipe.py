@@ -11,10 +11,10 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("name", recipe_names())
-def test_recipes_of_the_package_load(name):
-    recipe = load_recipe(name)
-    assert recipe.name == name and recipe.about
+def test_recipes_of_the_package_load():
+    for name in recipe_names():
+        recipe = load_recipe(name)
+        assert recipe.name == name and recipe.about
 
 
 def test_the_quick_recipe_sees_six_fabrics_and_never_the_4_4_twill():
@@ -241,6 +241,7 @@ def test_a_random_unseen_draft_may_be_that_of_a_seen_fabric(files):
         load_recipe(files.write())
 
 
+@pytest.mark.slow
 def test_designs_are_chosen_on_other_cloths_than_those_of_any_page():
     """`ablations` is the recipe for choices of design (CONTRIBUTING.md)."""
     chosen_on = load_recipe("ablations")

@@ -11,6 +11,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
+from tests.presets import slow
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
 
@@ -27,7 +28,7 @@ def queries(rows, rng, minor=None, behind=False):
     return found if minor is None else found._replace(sigma_minor=found.sigma * np.float32(minor), angle=found.u)
 
 
-@pytest.mark.parametrize("minor", [None, 0.4])
+@pytest.mark.parametrize("minor", [slow(None), 0.4])
 def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
     fabric = coloured("gauze", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
     asked = queries(3, np.random.default_rng(1), minor, behind=True)
@@ -49,7 +50,7 @@ def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
             assert found[row, family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
 
 
-@pytest.mark.parametrize("name", ["twill_4_4", "gauze", "crepe"])
+@pytest.mark.parametrize("name", [slow("twill_4_4"), "gauze", slow("crepe")])
 @pytest.mark.parametrize(
     ("sigma", "stretch", "bound"), [((0.1, 0.6), 1.0, 0.02), ((0.8, 2.0), 1.0, 0.03), ((0.2, 0.5), 3.0, 0.04)]
 )

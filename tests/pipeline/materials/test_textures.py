@@ -12,7 +12,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from weaves.fabric import load_fabric, preset_names
+from tests.presets import PRESETS
+from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
 
 
@@ -51,7 +52,7 @@ def test_the_mean_base_colour_is_the_diffuse_albedo_of_the_truth(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_the_mean_base_colour_of_every_preset(name):
     check_base_color(name, 24)
 

@@ -6,6 +6,7 @@ import pytest
 from pipeline.mitsuba.bsdf import STRAIGHT_THROUGH
 from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM, unit
+from tests.presets import slow
 
 LEVEL = 0.01
 CONFIGURATIONS = {
@@ -45,7 +46,7 @@ def number(value):
     return np.asarray(value, np.float64).reshape(-1)
 
 
-@pytest.mark.parametrize("name", ["front", "gauze", "behind"])
+@pytest.mark.parametrize("name", ["front", slow("gauze"), "behind"])
 def test_values_and_densities_are_those_of_the_cloth(mi, name):
     fabric, sigma, theta, phi = CONFIGURATIONS[name]
     bsdf = mi.load_dict({"type": "twillight", "fabric": fabric, "sigma": sigma})
@@ -60,6 +61,7 @@ def test_values_and_densities_are_those_of_the_cloth(mi, name):
         np.testing.assert_array_equal(number(bsdf.pdf(context, si, light)), number(pdf))
 
 
+@pytest.mark.slow
 def test_samples_name_their_lobe(mi):
     """Voile at numbers that reach each lobe; the gap's light goes straight on, and has its probability as density."""
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})

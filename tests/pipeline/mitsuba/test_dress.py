@@ -15,6 +15,7 @@ from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import picture
 from pipeline.scenes.shipped import SHIPPED
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
+from tests.presets import slow
 
 METHOD = "soft_nodes:2"
 
@@ -61,7 +62,7 @@ def traced(loaded, size, samples=1, seed=0, depth=2):
     return np.asarray(mi.render(world, sensor=camera, integrator=tracer, spp=samples, seed=seed))[..., :3]
 
 
-@pytest.mark.parametrize("name", ["plane", "sphere", "drape"])
+@pytest.mark.parametrize("name", ["sphere", slow("plane"), slow("drape")])
 def test_each_pixel_is_that_of_our_renderer(use, name):
     """One ray a pixel and one light: nothing is random. Footprints differ by the near plane, some .2 %.
 

@@ -40,14 +40,14 @@ def test_every_flip_of_a_card_is_refused(folder, tmp_path_factory, data):
         read_card(damaged)
 
 
-@pytest.mark.parametrize("place", range(0, 256, 15))
-def test_every_flip_of_weights_is_refused(folder, tmp_path, place):
-    write_model(tmp_path, bytes(range(256)), CONTENT)
-    content = bytearray(range(256))
-    content[place] ^= 1 << place % 8
-    (tmp_path / WEIGHTS).write_bytes(content)
-    with pytest.raises(BadInput, match=r"model\.safetensors: damaged, its SHA-256.*train it again"):
-        read_weights(tmp_path, read_card(tmp_path))
+def test_every_flip_of_weights_is_refused(folder, tmp_path):
+    for place in range(0, 256, 15):
+        write_model(tmp_path, bytes(range(256)), CONTENT)
+        content = bytearray(range(256))
+        content[place] ^= 1 << place % 8
+        (tmp_path / WEIGHTS).write_bytes(content)
+        with pytest.raises(BadInput, match=r"model\.safetensors: damaged, its SHA-256.*train it again"):
+            read_weights(tmp_path, read_card(tmp_path))
 
 
 def test_a_card_of_an_earlier_version_is_refused(tmp_path):

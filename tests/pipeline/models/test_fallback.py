@@ -12,6 +12,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
@@ -88,7 +89,7 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     assert wrong.sum() < 0.1 * size.sum()
 
 
-@pytest.mark.parametrize("name", ["denim", "voile"])
+@pytest.mark.parametrize("name", ["denim", slow("voile")])
 def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
     """Soft nodes and `selvage` turn the cloth; the truth of the back is the reference."""
     fabric, (selvage,) = load_fabric(name), load_model(pretrained_folder("selvage"))

@@ -9,6 +9,7 @@ from scipy import stats
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth.query import Queries
+from tests.presets import slow
 from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -65,14 +66,15 @@ def expected_shares(bsdf, name):
     return pdf.reshape(ROWS, NODES, COLUMNS, NODES).sum(axis=(1, 3)) * cell
 
 
-def test_samples_follow_their_density(bsdfs):
+@pytest.mark.parametrize("names", [("ellipse", "behind"), slow(*[tuple(CONFIGURATIONS)])])
+def test_samples_follow_their_density(bsdfs, names):
     """Chi-square over the cells of the sphere and the delta lobe, those of fewer than 20 expected samples pooled.
 
     Sidak over the configurations at LEVEL.
     """
     values = {}
-    for number, (name, bsdf) in enumerate(bsdfs.items()):
-        looks = looks_of(name, COUNT)
+    for number, name in enumerate(names):
+        bsdf, looks = bsdfs[name], looks_of(name, COUNT)
         shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks)[0])
         assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
         sample = bsdf.sample(looks, np.random.default_rng(number).random((COUNT, 3)))

@@ -106,6 +106,7 @@ def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatc
     assert len(loads) == 1
 
 
+@pytest.mark.slow
 def test_eight_bits_cost_a_percent_and_save_three_bytes_of_four():
     torch.manual_seed(0)
     options = NeumipOptions(texels_per_yarn=2, hidden=128)

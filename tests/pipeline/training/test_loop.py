@@ -20,6 +20,7 @@ from pipeline.training.loop import rate_factor, train
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut, footprint_labels
 from pipeline.truth.conventions import COMPONENTS
+from tests.presets import slow
 from weaves.errors import BadInput, WorkFailed
 
 # The closed form of conftest is small in value: its loss is weighted for it, whatever suits real cloth.
@@ -108,7 +109,7 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("model", ["woven", "neumip", "selvage"])
+@pytest.mark.parametrize("model", ["woven", slow("neumip"), slow("selvage")])
 def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path):
     """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike."""
     whole, resumed = tmp_path / "whole", tmp_path / "resumed"
@@ -206,7 +207,7 @@ def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tm
         assert shares[0] == pytest.approx(1 / 30) and contents(damaged) == contents(whole)
 
 
-@pytest.mark.parametrize("model", ["woven", "neumip"])
+@pytest.mark.parametrize("model", [slow("woven"), "neumip"])
 def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
     """Held-out mean squared error against the variance of the truth, over all four components.
 

@@ -14,8 +14,9 @@ from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.monte_carlo import RANDOMISATIONS
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
+from tests.presets import PRESETS, slow
 from weaves.errors import BadInput
-from weaves.fabric import load_fabric, preset_names
+from weaves.fabric import load_fabric
 from weaves.population import Population, Ranges, population_fabrics
 from weaves.surface import surface_at as oracle
 
@@ -112,7 +113,7 @@ def test_order_of_convergence(estimator, low, high):
     assert low < order < high
 
 
-@pytest.mark.parametrize("estimator", ["mc", "owen"])
+@pytest.mark.parametrize("estimator", [slow("mc"), "owen"])
 def test_reported_errors_cover_the_true_error(estimator):
     """z-scores against a reference with 64 times the points, footprints of a yarn and more.
 
@@ -257,7 +258,7 @@ def test_bad_queries_are_named(field, value, words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_bounds_of_adaptive_estimates_hold_on_every_preset(name):
     """Default options and query distribution against 32,768 points: .3 % beyond the bound by its definition.
 

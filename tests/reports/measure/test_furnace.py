@@ -74,6 +74,7 @@ def test_the_brightest_method_returns_at_most_what_arrives(name):
     assert found["furnace_specular"] < 0.6
 
 
+@pytest.mark.slow
 def test_without_shadows_soft_nodes_make_no_light():
     """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
 

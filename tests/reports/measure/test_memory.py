@@ -42,6 +42,7 @@ def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(siz
 
 
 @needs_linux
+@pytest.mark.slow
 def test_torch_is_counted_too():
     assert peak_in_own_process(TORCH) == pytest.approx(32 * MB, abs=UNSURE)
 

@@ -69,6 +69,7 @@ def test_labels_far_from_their_marks_are_joined_to_them(drawn):
         assert line or gap <= 1.5 * (NEAR + CLEARANCE) * figure.dpi / 72
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
 def test_equal_figures_give_equal_bytes(scheme):
     first, second = (render(lambda _: crowded(scheme)[0], scheme) for _ in range(2))

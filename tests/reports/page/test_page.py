@@ -197,6 +197,7 @@ def test_tables_hold_the_records(written, made_up):
         assert list(pd.read_csv(csv)) == list(pd.read_parquet(parquet))
 
 
+@pytest.mark.slow
 def test_the_same_records_give_the_same_bytes(written, page_input, tmp_path):
     def content(folder: Path):
         return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

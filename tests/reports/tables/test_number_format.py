@@ -16,9 +16,8 @@ from reports.tables.number_format import (
 )
 
 
-@pytest.mark.parametrize(
-    ("found", "expected"),
-    [
+def test_numbers_are_worded():
+    for found, expected in [
         (scientific(2.62e-3), "2.62e−3"),
         (scientific(None), "–"),
         (scientific(math.nan), "–"),
@@ -42,10 +41,8 @@ from reports.tables.number_format import (
         (plain("twill_4_4"), "twill 4/4"),
         (plain("wool_gabardine"), "wool gabardine"),
         (plain("satin_8"), "satin 8"),
-    ],
-)
-def test_numbers_are_worded(found, expected):
-    assert found == expected
+    ]:
+        assert found == expected
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ def test_results_need_two_standard_errors(value, error, result):
     assert Bias("denim", SIDES[0], COMPONENTS[0], value, error, 10).result == result
 
 
+@pytest.mark.slow
 def test_the_table_is_measured_from_both_sides():
     found = list(measure(rows=200, fabrics=["basket"], reference=1024))
     assert [(bias.side, bias.component) for bias in found] == [(side, name) for side in SIDES for name in COMPONENTS]

@@ -22,6 +22,7 @@ def test_the_comparison_of_normal_errors():
     assert ratio == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_records_bring_calibrations_back():
     kinds = ("light behind", "curved")
     found = list(measure(fabrics=1, rows=8, estimators=("owen", "node_table"), reference=1 << 10, kinds=kinds))

@@ -1,8 +1,11 @@
 """Loss by mean colours: small where a footprint covers many threads, and no bias."""
 
+import pytest
+
 from reports.truth.footprint_colours import RECORDS, measure
 
 
+@pytest.mark.slow
 def test_mean_colours_lose_little_and_nothing_on_wide_footprints():
     found = list(measure(60, ["houndstooth"], [0.5, 16.0]))
     near, far = found

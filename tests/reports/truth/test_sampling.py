@@ -16,6 +16,7 @@ def found():
     return list(measure(looks=60, fabrics=("polyester_lining",), scenes=("plane",)))
 
 
+@pytest.mark.slow
 def test_every_sampler_is_measured_on_all_light_on_the_specular_part_and_in_scenes(found):
     assert [(one.sampler, one.fabric) for one in found] == [
         (label, fabric)
@@ -54,6 +55,7 @@ def test_all_samplers_have_the_same_mean(name):
         assert abs(apart) < 3.3 * error / math.sqrt(len(looks.u)), sampler
 
 
+@pytest.mark.slow
 def test_looks_of_a_scene_are_those_of_its_pixels():
     (plane,) = scene_subjects("plane", 50)
     assert plane.fabric.name == "denim" and len(plane.looks.u) == 50

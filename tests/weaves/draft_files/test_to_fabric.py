@@ -62,6 +62,7 @@ def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
     assert sum("1.15 of the spacing" in sentence for sentence in found.assumed) == 2
 
 
+@pytest.mark.slow
 def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
     """4,096 ends and picks in 256 colours without a run of two."""
     threads = range(4096)

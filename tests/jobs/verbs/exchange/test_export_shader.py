@@ -93,6 +93,7 @@ def test_missing_packages_are_named(twillight, monkeypatch):
     assert "not installed: onnxscript" in said
 
 
+@pytest.mark.slow
 def test_a_fabric_unlike_the_training_is_named(twillight, tmp_path):
     code, said, _ = twillight("export", "gauze", "--shader", "out", "--model", "selvage")
     assert code == 0 and "gauze is not like its training: optical_thickness = 2.5" in said

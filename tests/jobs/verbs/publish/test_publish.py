@@ -178,6 +178,7 @@ def test_duckdb_reads_it(published):
     assert rows == dict.fromkeys(names, (64, 0.1))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the libraries that it uses
 def test_croissant_reads_the_rows(published):
     described = mlcroissant.Dataset(jsonld=str(published / "croissant.json"))

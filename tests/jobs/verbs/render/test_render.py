@@ -99,6 +99,7 @@ def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_
     assert made[0].cloths["swatch"].yarns == (150.0, 150.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["truth", "point_sampled:2", "prefiltered"])
 def test_two_runs_give_the_same_bytes(render, tmp_path, method):
     for name in ("a.exr", "b.exr"):
@@ -106,6 +107,7 @@ def test_two_runs_give_the_same_bytes(render, tmp_path, method):
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
+@pytest.mark.slow
 def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     own, denim = "own.exr", "denim.exr"
     assert render("dinner_table", "--out", own, *SMALL)[0] == 0

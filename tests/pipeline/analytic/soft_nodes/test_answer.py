@@ -16,6 +16,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -44,7 +45,9 @@ def relative_error(found, truth):
 
 
 @pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.3, 1.0), (3.0, 8.0)], ids=["narrow", "middle", "wide"])
-@pytest.mark.parametrize(("name", "bound"), [("polyester_lining", 0.02), ("cotton_twill", 0.02), ("satin_8", 0.03)])
+@pytest.mark.parametrize(
+    ("name", "bound"), [slow("polyester_lining", 0.02), ("cotton_twill", 0.02), slow("satin_8", 0.03)]
+)
 def test_without_shadows_they_are_quadrature(name, bound, sigma):
     """What is left is the footprint's tail of 1 %, eight nodes across a yarn and a highlight's four places."""
     fabric = load_fabric(name)
@@ -63,7 +66,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [slow("plain"), "twill", "satin", slow("plain with gaps"), slow("twill with gaps"), "gauze"]
+)
 def test_with_shadows_they_are_some_per_cent_off(case):
     """Colour RMSE over the mean for narrow, middle and wide footprints; patches hidden almost wholly left out."""
     fabric, bounds = CASES[case]
@@ -77,6 +82,7 @@ def test_with_shadows_they_are_some_per_cent_off(case):
         assert relative_error(found[clear], truth[clear]) < bound
 
 
+@pytest.mark.slow
 def test_each_level_errs_less_on_wide_footprints():
     """Measured on denim 2.1, 1.9, 1.2 and 1.1 %: twice the nodes across a yarn, from k = 2 to 4, count most."""
     fabric = load_fabric("denim")
@@ -87,6 +93,7 @@ def test_each_level_errs_less_on_wide_footprints():
     assert errors[2] < 0.75 * errors[1]
 
 
+@pytest.mark.slow
 def test_what_is_seen_of_patches_almost_hidden():
     """Of which .2 to 5 % is seen, on satin: nodes placed once, to 2.6 deviations, are off by 5.6 % of the mean."""
     fabric = load_fabric("satin_8")
@@ -114,7 +121,9 @@ def test_footprints_along_the_axes():
     np.testing.assert_allclose(read_queries(table, turned)[1], read_queries(table, swapped)[1], rtol=1e-5)
 
 
-@pytest.mark.parametrize(("name", "bound"), [("cotton_twill", 0.03), ("silk_charmeuse", 0.045), ("gauze", 0.03)])
+@pytest.mark.parametrize(
+    ("name", "bound"), [("cotton_twill", 0.03), slow("silk_charmeuse", 0.045), slow("gauze", 0.03)]
+)
 def test_footprints_at_an_angle(name, bound):
     """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
     fabric = load_fabric(name)
@@ -138,7 +147,7 @@ def test_translation_by_repeats_changes_nothing():
     np.testing.assert_array_equal(read_queries(table, far)[0], read_queries(table, queries)[0])
 
 
-@pytest.mark.parametrize("width", [1.0, 0.7, 0.1])
+@pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
 def test_extremes_stay_finite_and_not_negative(width):
     fabric = cloth("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
     table = tabulate(fabric)
@@ -155,6 +164,7 @@ def test_extremes_stay_finite_and_not_negative(width):
     assert (read_queries(table, queries)[1] >= 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [7, 12])
 def test_irregular_drafts_of_many_floats(side):
     """Merged groups: wide footprints within 4 %."""
@@ -167,7 +177,7 @@ def test_irregular_drafts_of_many_floats(side):
 
 
 @pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.5, 1.2), (6.0, 9.0)], ids=["narrow", "middle", "wide"])
-@pytest.mark.parametrize("name", ["cotton_twill", "gauze"])
+@pytest.mark.parametrize("name", ["cotton_twill", slow("gauze")])
 def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
     fabric = load_fabric(name)
     ends, picks = fabric.weave.repeat

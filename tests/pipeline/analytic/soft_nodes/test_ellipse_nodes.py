@@ -18,6 +18,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import along_axes
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
@@ -60,7 +61,7 @@ def test_weights_add_up_to_the_footprint(name, u, v, major, stretch, angle):
     [((0.1, 0.3), 12.0, 0.09), ((0.25, 0.6), 10.0, 0.05)],
     ids=["minor below .1", "below .25"],
 )
-@pytest.mark.parametrize("name", ["denim", "satin_8", "gauze"])
+@pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("gauze")])
 def test_thin_footprints_are_near_the_truth(name, sigma, stretch, bound):
     """RMSE of a grey cloth's colour over its mean; as round footprints of equal area they were 8 to 16 %, 4 to 6 %."""
     fabric = load_fabric(name)

@@ -8,6 +8,7 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.scratch import SoftQuery, scratch_for
 from pipeline.analytic.soft_nodes.wide import axis_densities, product_weights, wave_weights, waves_kept
 from pipeline.truth.footprint.mixture import narrow_axis
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
@@ -50,8 +51,8 @@ def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
     return scratch.weight
 
 
-@pytest.mark.parametrize("name", ["denim", "satin_8", "herringbone"])
-@pytest.mark.parametrize("correlation", [0.0, -0.4, 0.8])
+@pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("herringbone")])
+@pytest.mark.parametrize("correlation", [slow(0.0), -0.4, 0.8])
 @pytest.mark.parametrize("stretch", [1.0, 1.7])
 def test_waves_are_the_gaussian_over_all_images(name, stretch, correlation):
     """To a tenth of the largest: several waves of 1 % are missing, and tails of up to 3.4 % of the peak are cut off."""

@@ -1,5 +1,9 @@
+import sys
+
 import pytest
 
+from pipeline.models.added import describe as describe_module
+from pipeline.models.added.apart import run_apart
 from pipeline.models.added.describe import describe
 from weaves.errors import BadInput
 
@@ -22,6 +26,17 @@ class Theirs:
     def bytes_stored(self, fabric):
         return 0
 """
+
+
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch, tmp_path):
+    """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
+    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    for name, module in list(sys.modules.items()):
+        if (getattr(module, "__file__", None) or "").startswith(str(tmp_path)):
+            del sys.modules[name]
 
 
 @pytest.fixture
@@ -81,7 +96,6 @@ def test_an_installed_module_has_its_distribution():
         ("class Theirs", "import nothing_of_this_name\nclass Theirs", "ModuleNotFoundError: No module named"),
         ("class Theirs", "class Theirs(", "(theirs.py, line 2)"),
         ("class Theirs", "raise SystemExit\nclass Theirs", "import: SystemExit (theirs.py, line 2)"),
-        ("class Theirs", "import os; os._exit(0)\nclass Theirs", "import ended its process (exit code 0)"),
         ("class Theirs", "class Other", "no such name; did you mean 'Other'? known: Other"),
         ("class Theirs:", "Theirs = 5\nclass Other:", "is no class of a method and no function of a metric"),
         ("def covers", "def cover", "lacks the function 'covers'"),
@@ -111,6 +125,13 @@ def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
         describe(f"{path}:Theirs", {}, {})
     assert sentence in str(refusal.value), refusal.value
     assert str(refusal.value).startswith("--add: ")
+
+
+def test_code_that_ends_its_process_gets_a_sentence(path, monkeypatch):
+    monkeypatch.setattr(describe_module, "run_apart", run_apart)
+    path.write_text("import os; os._exit(0)" + METHOD)
+    with pytest.raises(BadInput, match=r"import ended its process \(exit code 0\)"):
+        describe(f"{path}:Theirs", {}, {})
 
 
 def test_options_that_it_does_not_have_are_refused(path):

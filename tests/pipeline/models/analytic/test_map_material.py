@@ -25,6 +25,7 @@ def asked(name, kinds, rows=400, **options):
     return method.predict(cloth, queries), truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kinds", "bound"),
     [

@@ -9,6 +9,7 @@ from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -38,6 +39,7 @@ def test_more_points_err_less():
     assert spread[64] < 0.4 * spread[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("visibility", ["exact", "horizon", "soft_horizon"])
 def test_r2_errs_less_than_random_points(visibility):
     """Spread over seeds at k = 64; every seed is another shift of the same sequence."""
@@ -63,7 +65,7 @@ def test_the_horizon_map_errs_by_its_bias_only():
     assert (error < 0.03).all()
 
 
-@pytest.mark.parametrize("sigma", [(0.25, 0.8), (0.8, 8.0)])
+@pytest.mark.parametrize("sigma", [(0.25, 0.8), slow((0.8, 8.0))])
 def test_soft_horizons_err_less(sigma):
     """RMSE of a grey cloth's colour at k = 10, the root mean square over four seeds and three fabrics."""
     colour, errors = np.array([0.3, 0.3, 0.5, 0.5]), {}

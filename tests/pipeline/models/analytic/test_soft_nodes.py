@@ -10,6 +10,7 @@ from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -30,8 +31,8 @@ def test_each_level_is_its_sums_in_chunks():
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 
-@pytest.mark.parametrize("sigma", [(0.06, 0.3), (0.3, 1.5)])
-@pytest.mark.parametrize("name", ["cotton_twill", "wool_gabardine"])
+@pytest.mark.parametrize("sigma", [(0.06, 0.3), slow((0.3, 1.5))])
+@pytest.mark.parametrize("name", ["cotton_twill", slow("wool_gabardine")])
 def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
     """Views or lights beyond 70 degrees; left out, curvature would be more than a tenth of the squared error."""
     fabric, method = load_fabric(name), SoftNodes()
@@ -60,6 +61,7 @@ def test_flat_rows_do_not_depend_on_curved_ones():
     assert (mixed[::2] != alone[::2]).any(axis=1).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_a_little_curvature_changes_little():
     """Falls grow in proportion below the first curvature, so that a hundredth of it is almost flat cloth."""
     fabric, method = load_fabric("denim"), SoftNodes()

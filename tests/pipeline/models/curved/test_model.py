@@ -106,6 +106,7 @@ def test_rays_that_sink_below_every_yarn_have_hit_one():
     assert CurvedNetwork(SMALL, (4, 4)).cover(_view([0.9], 0.0)).item() < 1.0
 
 
+@pytest.mark.slow
 def test_a_cloth_with_gaps_is_never_certain():
     front = height_field(DENIM)
     assert _built().fall.item() == pytest.approx(front.highest - front.lowest)

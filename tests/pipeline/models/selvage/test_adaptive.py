@@ -28,6 +28,7 @@ def denim():
     return load_fabric("denim")
 
 
+@pytest.mark.slow
 def test_the_estimate_learns_the_mean_square_of_errors():
     """Errors whose deviation is a known function of the features: the estimate finds it to a tenth."""
     torch.manual_seed(3)

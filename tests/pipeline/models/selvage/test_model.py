@@ -66,6 +66,7 @@ def test_an_untrained_network_is_the_sums(fabrics):
     np.testing.assert_allclose(method.predict(fabrics[0], asked), SoftNodes().predict(fabrics[0], asked), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_it_learns_and_training_sees_what_rendering_sees(fabrics):
     """The loss falls by a fifth; against the network's own predictions it is 0."""
     network, losses = trained_a_little(fabrics)

@@ -9,7 +9,8 @@ from scipy import stats
 from pipeline.truth.checks import invariants
 from pipeline.truth.checks.invariants import SIGNIFICANCE, exact, quotient, worst
 from pipeline.truth.estimator import estimate
-from weaves.fabric import load_fabric, preset_names
+from tests.presets import PRESETS
+from weaves.fabric import load_fabric
 
 FABRIC = load_fabric("polyester_lining")
 
@@ -34,6 +35,7 @@ def test_a_preset_keeps_the_invariants_at_few_points(brief, test):
     assert len({item.name for item in found}) == len(found)
 
 
+@pytest.mark.slow
 def test_narrow_yarns_let_light_through_and_keep_the_invariants(brief):
     yarns = {name: getattr(FABRIC, name).model_copy(update={"width": 0.5}) for name in ("warp", "weft")}
     fabric = FABRIC.model_copy(update=yarns)
@@ -130,6 +132,6 @@ def test_numbers_without_error_are_exact_or_broken():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_keeps_the_invariants(name):
     assert not [found for test in invariants.INVARIANTS for found in broken(test, load_fabric(name))]

@@ -31,22 +31,22 @@ def test_deviations_and_correlation_are_those_of_the_turned_covariance(major, ra
     assert narrow_axis(x, y, correlation) == pytest.approx(min(sides), rel=1e-4)
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("correlation", CORRELATIONS)
-@pytest.mark.parametrize(("line", "bound"), [(COARSE_LINE, 0.02), (FINE_LINE, 1e-4)], ids=["coarse", "fine"])
-def test_the_mixture_is_the_gaussian(line, bound, correlation, sign):
+def test_the_mixture_is_the_gaussian():
     """Both kernels by their Fourier transforms, all that a sum over nodes can tell them apart by."""
-    places, shares = points(sign * correlation, line)
-    assert shares.sum() == pytest.approx(1.0, abs=1e-6)
-    assert shares @ places == pytest.approx(0.0, abs=1e-6)
-    x, y = np.meshgrid(np.linspace(-6, 6, 61), np.linspace(-6, 6, 61))  # waves, in deviations of both axes
-    own = np.exp(-0.5 * (x * x + y * y + 2 * sign * correlation * x * y))
-    blur, root = 1.0 - correlation, math.sqrt(correlation)
-    along = root * (x + sign * y)
-    mixture = np.exp(-0.5 * blur * (x * x + y * y)) * np.einsum(
-        "p,pij->ij", shares, np.cos(np.multiply.outer(places, along))
-    )
-    assert np.abs(mixture - own).max() < bound
+    for sign in [-1.0, 1.0]:
+        for correlation in CORRELATIONS:
+            for line, bound in [(COARSE_LINE, 0.02), (FINE_LINE, 1e-4)]:
+                places, shares = points(sign * correlation, line)
+                assert shares.sum() == pytest.approx(1.0, abs=1e-6)
+                assert shares @ places == pytest.approx(0.0, abs=1e-6)
+                x, y = np.meshgrid(np.linspace(-6, 6, 61), np.linspace(-6, 6, 61))  # waves, in deviations of both axes
+                own = np.exp(-0.5 * (x * x + y * y + 2 * sign * correlation * x * y))
+                blur, root = 1.0 - correlation, math.sqrt(correlation)
+                along = root * (x + sign * y)
+                mixture = np.exp(-0.5 * blur * (x * x + y * y)) * np.einsum(
+                    "p,pij->ij", shares, np.cos(np.multiply.outer(places, along))
+                )
+                assert np.abs(mixture - own).max() < bound
 
 
 def test_a_thin_ellipse_is_taken_wider_and_a_round_footprint_as_it_is():

@@ -14,6 +14,7 @@ from pipeline.truth.geometry.visibility import ray, visible
 from pipeline.truth.node_table.build import PIECE_FAMILY, tabulate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -83,7 +84,7 @@ def test_horizons_part_what_is_visible_from_what_is_not(name):
     ],
     ids=["plain", "twill_behind", "satin", "narrow_twill", "narrow_plain_behind"],
 )
-@pytest.mark.parametrize("footprint", ["gaussian", "box"])
+@pytest.mark.parametrize("footprint", ["gaussian", slow("box")])
 def test_answers_match_converged_ones(fabric, behind, footprint):
     """Mean signed error of each component below .3 %, within three standard errors of the mean over the queries.
 

@@ -15,6 +15,7 @@ from pipeline.truth.node_table.doubts import doubtful_from, no_doubts
 from pipeline.truth.node_table.kernels import no_shares
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 EVERYWHERE = Known(False, False, False)
@@ -30,7 +31,7 @@ def mean_of_points(cloth, directions, x, y, size, tilt):
     return sums[0] / 3600
 
 
-@pytest.mark.parametrize(("name", "behind"), [("denim", 0.0), ("gauze", 0.0), ("gauze", 1.0)])
+@pytest.mark.parametrize(("name", "behind"), [("denim", 0.0), slow("gauze", 0.0), ("gauze", 1.0)])
 @pytest.mark.parametrize("known", [EVERYWHERE, EVERY_PLACE])
 def test_cut_rows_are_unbiased(name, behind, known):
     """Rows at random heights of a square that borders cross agree with its points, over 12 squares of half a node."""

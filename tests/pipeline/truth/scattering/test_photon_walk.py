@@ -137,6 +137,7 @@ def _assert_small(scores):
     assert np.abs(scores).max() < stats.norm.isf(level / 2), np.round(scores, 1)
 
 
+@pytest.mark.slow
 def test_photons_leave_as_the_slab_says():
     """Rationale: reflection, transmission and unscattered share must be what photons do that meet one flake or none.
 
