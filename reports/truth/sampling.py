@@ -60,7 +60,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Saving:
+class VarianceSaving:
     """One sampler on one fabric."""
 
     sampler: str
@@ -86,7 +86,9 @@ class Subject(NamedTuple):
     looks: Queries
 
 
-def measure(looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES) -> Iterator[Saving]:
+def measure(
+    looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES
+) -> Iterator[VarianceSaving]:
     """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:
         cloth = load_fabric(name)
@@ -98,7 +100,7 @@ def measure(looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Seque
 
 
 RECORDS: Final = RowRecords(
-    Saving,
+    VarianceSaving,
     {
         "variance_saved": "variance_saved",
         "saved_in_time": "saved_in_time",
@@ -139,7 +141,7 @@ class _Estimate(NamedTuple):
     seconds: float
 
 
-def _savings(subjects: Sequence[Subject], name: str) -> Iterator[Saving]:
+def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
     found: dict[str, list[_Estimate]] = {sampler: [] for sampler in SETTINGS}
     for subject in subjects:
@@ -156,7 +158,7 @@ def _savings(subjects: Sequence[Subject], name: str) -> Iterator[Saving]:
         if sampler == "cosine":
             base, base_time = variance, whole
         saved = base / variance
-        yield Saving(sampler, name, saved, saved * base_time / whole, draw_time, whole, values.size)
+        yield VarianceSaving(sampler, name, saved, saved * base_time / whole, draw_time, whole, values.size)
 
 
 def _estimates(subject: Subject) -> dict[str, _Estimate]:

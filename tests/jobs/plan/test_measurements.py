@@ -15,7 +15,7 @@ from reports.options import StudyName
 from reports.record import read_records
 from reports.truth import finding, path_traced, sampling, stability
 from reports.truth.path_traced import Traced
-from reports.truth.sampling import Saving
+from reports.truth.sampling import VarianceSaving
 from weaves.errors import WorkFailed
 
 ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa: UP007
@@ -65,7 +65,7 @@ def test_every_study_is_in_a_shipped_recipe():
 @pytest.mark.parametrize(
     ("module", "row"),
     [
-        (sampling, Saving("lobes", "denim", 8.0, 5.0, 900.0, 2100.0, 100)),
+        (sampling, VarianceSaving("lobes", "denim", 8.0, 5.0, 900.0, 2100.0, 100)),
         (path_traced, Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.2)),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.shards.queries import QueryOptions, draw_queries
-from reports.truth.sampling import RECORDS, SETTINGS, Saving, Subject, _estimates, measure, scene_subjects
+from reports.truth.sampling import RECORDS, SETTINGS, Subject, VarianceSaving, _estimates, measure, scene_subjects
 from weaves.fabric import load_fabric
 
 
@@ -69,4 +69,4 @@ def test_records_bring_everything_back(found):
     assert [(one.sampler, one.fabric, one.count) for one in back] == [(o.sampler, o.fabric, o.count) for o in found]
     for name in ("variance_saved", "saved_in_time", "sample_time", "estimate_time"):
         np.testing.assert_allclose([getattr(one, name) for one in back], [getattr(one, name) for one in found])
-    assert isinstance(back[0], Saving)
+    assert isinstance(back[0], VarianceSaving)
