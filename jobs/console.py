@@ -25,12 +25,12 @@ def table_of(*columns: str, right: Sequence[str] = ()) -> Table:
 
 
 def print_result(result: ResultTable) -> None:
-    """Print a table of results after an empty line; rows of what failed are bold."""
+    """Print a table of results after an empty line; marked rows are bold."""
     columns = enumerate(result.columns)
     table = table_of(*result.columns, right=[name for index, name in columns if result.numeric(index)])
     table.title, table.title_justify = result.title, "left"
     for row in result.rows:
-        table.add_row(row.label, *map(str, row.cells), style="bold" if row.kind == "failed" else "")
+        table.add_row(row.label, *map(str, row.cells), style="bold" if row.kind == "marked" else "")
     Terminal().print("", table)
 
 

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from jobs.verbs.parameters import Local, OfSeveralPages
 from weaves.errors import BadInput
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from reports.record import Record
-    from reports.tables.compare import Difference
 
 WHERE = "compare"
 
@@ -35,10 +27,11 @@ def compare(
     BadInput
         If one has no Records or no machine, the machines differ without `other_machine`, or no measurement is shared.
     """
+    from jobs.console import print_result
     from jobs.terminal import Terminal
     from reports.machines import refuse_several
     from reports.record import read_machine, read_records
-    from reports.tables.compare import LEVEL, NO_DIFFERENCE, refuse_other_machine
+    from reports.tables.compare import LEVEL, NO_DIFFERENCE, difference_tables, refuse_other_machine
     from reports.tables.compare import compare as differences
     from reports.tables.sentences import busy
 
@@ -48,21 +41,20 @@ def compare(
         refuse_several(records, str(file))
     machine_a, machine_b = (read_machine(file) for file in files)
     unlike = refuse_other_machine(machine_a, machine_b, other_machine)
-    found = differences(first, second)
+    shared = differences(first, second)
     console = Terminal()
-    for title, rows in (("time", found.times), ("MSE, 95 % interval", found.errors)):
-        if rows:
-            console.print(_table(title, rows), "")
-    for sentence in [*unlike, *found.unlike, *busy(first, second)]:
+    for table in difference_tables(shared):
+        print_result(table)
+    console.print("")
+    for sentence in [*unlike, *shared.unlike, *busy(first, second)]:
         console.print(f"{sentence}.", soft_wrap=True)
-    left = [f"{count} only in {name}" for name, count in (("A", found.only_a), ("B", found.only_b)) if count]
-    marked = sum(one.result not in NO_DIFFERENCE for one in (*found.times, *found.errors))
-    summary = (
-        f"{marked} of {len(found.times) + len(found.errors)} measurements differ{''.join(f'; {part}' for part in left)}"
-    )
+    left = [f"{count} only in {name}" for name, count in (("A", shared.only_a), ("B", shared.only_b)) if count]
+    marked = sum(row.result not in NO_DIFFERENCE for row in (*shared.times, *shared.errors))
+    count = len(shared.times) + len(shared.errors)
+    summary = f"{marked} of {count} measurements differ{''.join(f'; {part}' for part in left)}"
     level = f"if nothing changed, any is marked at most once in {1 / LEVEL:.0f} comparisons (Holm)"
     load = "Load on the machine is not part of this test: first compare two runs of A, on a quiet machine."
-    console.print(f"{summary}; {level}.", *([load] if found.times else []), soft_wrap=True)
+    console.print(f"{summary}; {level}.", *([load] if shared.times else []), soft_wrap=True)
 
 
 def records_file(path: Path, recipe: str = "") -> Path:
@@ -89,42 +81,3 @@ def records_file(path: Path, recipe: str = "") -> Path:
         pages = ", ".join(file.parent.name for file in found)
         raise BadInput(str(path), "", "holds several pages", f"choose one with --recipe: {pages}")
     return found[0]
-
-
-def _table(title: str, rows: Sequence[Difference]) -> Table:
-    """Return differences as a table: subject, A, B, B over A, p-value and result; significant ones are bold."""
-    from rich.table import Table
-
-    from reports.tables.compare import NO_DIFFERENCE
-    from reports.tables.number_format import display
-
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for name in ("method", title, "A", "B", "B / A", "p", ""):
-        table.add_column(name, justify="right" if name in ("A", "B", "B / A", "p") else "left")
-    for row in rows:
-        p = "" if math.isnan(row.p) else f"{row.p:.2g}" if row.p >= 1e-3 else "< .001"
-        style = "" if row.result in NO_DIFFERENCE else "bold"
-        values = [_value(one) for one in (row.a, row.b)]
-        method = display(row.a.method, row.a.setting)
-        table.add_row(method, _what(row), *values, _number(row.ratio), p, row.result, style=style)
-    return table
-
-
-def _what(row: Difference) -> str:
-    """Return the subject of a measurement, without the method."""
-    one = row.a
-    if one.metric == "time":
-        return f"a query, {one.threads} thread{'' if one.threads == 1 else 's'}" if one.threads else "a query"
-    return {"prepare_time": "to add a fabric", "encode_time": f"to edit {one.note}"}.get(one.metric, one.fabric)
-
-
-def _value(one: Record) -> str:
-    """Return a time with its unit, or an error with half its 95 % interval."""
-    if one.unit != "1":
-        return f"{one.value:,.4g} {one.unit.split('/')[0]}"
-    half = "" if one.standard_error is None else f" ± {1.96 * one.standard_error:.1e}"
-    return f"{one.value:.2e}{half}"
-
-
-def _number(value: float) -> str:
-    return "–" if math.isnan(value) else f"{value:.3g}"

@@ -2,6 +2,8 @@
 
 A method is known by its name in the recipe: two models of one kind are two methods. The names that models have by
 default keep their colours on every page; others take the spare ones in the order of the page (`Scheme.naming`).
+
+Text needs a contrast of 4.5 (success criterion 1.4.3), marks of a plot 3 (1.4.11) [Campbell2023WCAG].
 """
 
 from __future__ import annotations
@@ -11,8 +13,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from reports.page.contrast import readable
+import numpy as np
+
 from reports.record import TRUTH
+from weaves.colour import LUMINANCE, linear_rgb
 
 Marker = str | tuple[int, Literal[0, 1, 2], int]
 """Of matplotlib: a name, or (number of corners, 0 for a polygon and 1 for a star, angle)."""
@@ -37,6 +41,34 @@ MARKERS: Final[Mapping[str, Marker]] = {
 
 MARKS: Final[tuple[Marker, ...]] = ((4, 1, 0), (5, 0, 180), (3, 1, 0), (6, 1, 0), "H")
 """Marks of methods that are not known, one after the other; their number and that of spare colours share no factor."""
+
+OF_TEXT: Final = 4.5
+OF_MARKS: Final = 3.0
+STEPS: Final = 20
+"""Steps from a colour to the ink in `readable`."""
+
+
+def contrast(first: str, second: str) -> float:
+    """Return (L1 + .05) / (L2 + .05) of two colours ``#rrggbb``, L1 the lighter one's relative luminance: 1 … 21."""
+    darker, lighter = sorted(float(np.dot(LUMINANCE, linear_rgb(colour))) for colour in (first, second))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def readable(colour: str, ground: str, ink: str) -> str:
+    """Return the colour nearest to `colour`, on the way to `ink`, in which text on `ground` can be read.
+
+    Parameters
+    ----------
+    colour, ground, ink : str
+        ``#rrggbb``; the contrast of `ink` on `ground` is at least `OF_TEXT`.
+    """
+    start, end = (np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)], np.float64) for code in (colour, ink))
+    for step in range(STEPS + 1):
+        mixed = np.rint(start + (end - start) * step / STEPS).astype(int)
+        code = "#" + "".join(f"{value:02x}" for value in mixed)
+        if contrast(code, ground) >= OF_TEXT:
+            break
+    return code
 
 
 @dataclass(frozen=True)

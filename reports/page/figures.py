@@ -1,4 +1,4 @@
-"""Plots of errors, aliasing, spectra and times: `plot(scheme, data) -> Figure`, for `reports.page.plot_style.render`.
+"""Plots of errors, aliasing, spectra and times: `plot(scheme, data) -> Figure`, for `render`; and their style.
 
 Plots of errors against costs are in `reports.page.front_figures`. A method has one colour and one mark in all plots.
 Filled marks are fabrics seen in training, open marks unseen ones.
@@ -6,10 +6,12 @@ Filled marks are fabrics seen in training, open marks unseen ones.
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -18,14 +20,61 @@ from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 
 from reports.measure.aliasing import HALF_NYQUIST
 from reports.page.colours import Marker, Scheme
-from reports.page.plot_style import NARROWEST, new_figure
 from reports.record import TRUTH
 from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, rows
 
+DPI: Final = 200
+NARROWEST: Final = 8.6
+"""Least width of plots in inches: the page shows every plot as wide as its column."""
+
 _ROLES: Final = ("seen", "unseen")
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
 _MARK_EVERY: Final = 9  # points of a spectrum; one curve's marks are shifted against the next one's
+
+
+def render(plot: Callable[..., Figure], scheme: Scheme, *data: Any) -> bytes:
+    """Return what ``plot(scheme, *data)`` draws, as PNG bytes on a transparent ground; equal data give equal bytes."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(_parameters(scheme)):
+        plot(scheme, *data).savefig(buffer, format="png", transparent=True, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def new_figure(
+    width: float, height: float, columns: int = 1, sharey: bool = False, lines: int = 1
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `columns` axes side by side in `lines`, `width` by `height` inches; `sharey` of a line."""
+    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    axes = figure.subplots(lines, columns, sharey="row" if sharey else False, squeeze=False)
+    return figure, list(axes.ravel())
+
+
+def _parameters(scheme: Scheme) -> dict[Any, Any]:
+    return {
+        "font.size": 10,
+        "text.color": scheme.ink,
+        "axes.labelcolor": scheme.muted,
+        "axes.titlecolor": scheme.ink,
+        "axes.titlesize": 11,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.titlepad": 10,
+        "axes.edgecolor": scheme.line,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "grid.color": scheme.line,
+        "grid.linewidth": 0.6,
+        "xtick.color": scheme.line,
+        "ytick.color": scheme.line,
+        "xtick.labelcolor": scheme.ink,
+        "ytick.labelcolor": scheme.ink,
+        "xtick.minor.size": 0,
+        "ytick.minor.size": 0,
+        "legend.frameon": False,
+    }
 
 
 def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:

@@ -23,8 +23,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 from reports.measure.by_size import SIZES
 from reports.page.colours import Scheme
+from reports.page.figures import NARROWEST, new_figure
 from reports.page.labels import Label, place_labels
-from reports.page.plot_style import NARROWEST, new_figure
 from reports.tables.number_format import display, size
 from reports.tables.summary import PAPER, front, of_baseline, rows
 

@@ -1,17 +1,16 @@
 """Places of labels beside their marks: no label covers another label, a mark or the border of its panel.
 
 Every label tries the same places, nearest first, and takes the first distance at which one is free; of the free places
-there it takes that which covers the least of the curves. A label away from its mark is joined to it by a thin line,
-which crosses a label only where every other place is taken. Equal figures give equal places.
+there it takes that which covers the least of the curves. A label away from its mark is joined to it by a thin line.
+Equal figures give equal places.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,6 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
-from matplotlib.transforms import Bbox
 
 from reports.page.colours import Scheme
 
@@ -66,11 +64,10 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
     figure.draw_without_rendering()  # the layout moves the axes
     make: Any = RendererAgg  # has no types
     renderer, pixels = make(*figure.bbox.size, figure.dpi), figure.dpi / 72.0
-    panels: dict[Axes, _Taken] = {}
+    used: dict[Axes, list[Points]] = {}
     written = []
     for label in labels:
         axes = label.axes
-        taken = panels.setdefault(axes, _Taken(_marks(axes, MARK * pixels), [], _curves(axes), []))
         halo = [withStroke(linewidth=2.5, foreground=scheme.ground)]
         text = axes.annotate(
             label.text, (label.x, label.y), xytext=(0, 0), textcoords="offset points", ha="center", va="center",
@@ -82,95 +79,73 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
         text.arrow_patch.set_in_layout(False)
         extent = Text.get_window_extent(text, renderer)  # of the letters alone
         mark = np.asarray(axes.transData.transform((label.x, label.y)), np.float64)
-        place = _free_place(mark, extent, taken, axes.bbox, pixels)
-        text.set_position((place.offset[0] / pixels, place.offset[1] / pixels))
-        text.arrow_patch.set_visible(place.distance > NEAR)
-        taken.labels.append(place.box)
-        taken.lines.append(place.line)
+        half = 0.5 * np.array([extent.width, extent.height]) + CLEARANCE * pixels
+        taken = used.setdefault(axes, _marks(axes, MARK * pixels))
+        panel = np.array([*axes.bbox.p0, *axes.bbox.p1])
+        offset, distance = _free_place(mark, half, np.array(taken), panel, _curves(axes), pixels)
+        text.set_position((offset[0] / pixels, offset[1] / pixels))
+        text.arrow_patch.set_visible(distance > NEAR)
+        taken.append(np.concatenate([mark + offset - half, mark + offset + half]))
         written.append(text)
     return written
 
 
-@dataclass
-class _Taken:
-    """Parts of a panel that are in use, in pixels."""
+def _free_place(
+    mark: Points, half: Points, taken: Points, panel: Points, curves: Points, pixels: float
+) -> tuple[Points, float]:
+    """Return the place of least cost at the nearest distance that has a free one: its offset, and the distance.
 
-    marks: list[Bbox]
-    labels: list[Bbox]
-    curves: Points
-    """Points along curves, (N, 2)."""
-    lines: list[Points]
-    """Points along lines to labels."""
-
-
-class _Place(NamedTuple):
-    """A place of a label."""
-
-    offset: tuple[float, float]
-    """From the mark to the middle of the label, in pixels."""
-    distance: float
-    """One of `DISTANCES`."""
-    box: Bbox
-    line: Points
-    """Points along the line to the mark, (N, 2); none if it is near."""
-
-
-def _free_place(mark: Points, extent: Bbox, taken: _Taken, inside: Bbox, pixels: float) -> _Place:
-    """Return the place of least cost at the nearest distance that has a free one."""
-    width, height = extent.width + 2 * CLEARANCE * pixels, extent.height + 2 * CLEARANCE * pixels
-    costs: dict[tuple[float, int, int, float, int], _Place] = {}
+    Parameters
+    ----------
+    mark, half : float64 (2,)
+        Place of the mark, and half the size of the label.
+    taken : float64 (N, 4)
+        Boxes in use: left, bottom, right, top.
+    panel : float64 (4,)
+        Box that the label may not leave.
+    curves : float64 (M, 2)
+        Points along curves.
+    """
+    # Turns alternate left and right of the first direction.
+    turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(DIRECTIONS)])
+    angles = np.radians(FIRST + turns * 360.0 / DIRECTIONS)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    places = []
     for distance in DISTANCES:
-        for turn in range(DIRECTIONS):
-            # Turns alternate left and right of the first direction.
-            angle = math.radians(FIRST + (-1) ** turn * -(-turn // 2) * 360.0 / DIRECTIONS)
-            right, up = math.cos(angle), math.sin(angle)
-            offset = (right * (distance * pixels + 0.5 * width), up * (distance * pixels + 0.5 * height))
-            middle = mark + offset
-            box = Bbox.from_bounds(middle[0] - 0.5 * width, middle[1] - 0.5 * height, width, height)
-            line = np.empty((0, 2)) if distance <= NEAR else _between(mark, middle)
-            line = line[~_within(line, box)]
-            used = [*taken.marks, *taken.labels]
-            covered = sum(_overlap(box, other) for other in used) + width * height - _overlap(box, inside)
-            through = sum(int(_within(line, other).any()) for other in taken.labels)
-            through += sum(int(_within(other, box).any()) for other in taken.lines)
-            cost = (round(covered, 3), through, int(_within(taken.curves, box).sum()), distance, turn)
-            costs[cost] = _Place(offset, distance, box, line)
-        if min(costs)[:2] == (0.0, 0):
+        offsets = directions * (distance * pixels + half)
+        boxes = np.concatenate([mark + offsets - half, mark + offsets + half], axis=-1)
+        outside = 4.0 * half.prod() - _overlaps(boxes, panel[None])
+        covered = np.round(_overlaps(boxes, taken) + outside, 3)
+        lower, upper = boxes[:, None, :2], boxes[:, None, 2:]
+        through = ((curves > lower) & (curves < upper)).all(axis=-1).sum(axis=-1)
+        best = int(np.lexsort((through, covered))[0])
+        places.append((covered[best], through[best], distance, offsets[best]))
+        if covered[best] == 0.0:
             break
-    return costs[min(costs)]
+    *_, distance, offset = min(places, key=lambda place: place[:3])
+    return offset, distance
 
 
-def _within(points: Points, box: Bbox) -> npt.NDArray[np.bool_]:
-    """Return which points (N, 2) lie in a box."""
-    x, y = points.T
-    return np.asarray((x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1))
+def _overlaps(boxes: Points, others: Points) -> Points:
+    """Return the area that each box (N, 4) shares with other boxes (M, 4), summed over these: (N,)."""
+    lower = np.maximum(boxes[:, None, :2], others[:, :2])
+    upper = np.minimum(boxes[:, None, 2:], others[:, 2:])
+    return np.asarray(np.maximum(upper - lower, 0.0).prod(axis=-1).sum(axis=-1))
 
 
-def _between(start: Points, end: Points) -> Points:
-    """Return points a pixel apart on the way from one point to another, (N, 2)."""
-    steps = np.linspace(0.0, 1.0, max(int(np.hypot(*(end - start))), 1))
-    return np.asarray(start + steps[:, None] * (end - start))
-
-
-def _overlap(first: Bbox, second: Bbox) -> float:
-    """Return the area that two boxes share."""
-    width = min(first.x1, second.x1) - max(first.x0, second.x0)
-    height = min(first.y1, second.y1) - max(first.y0, second.y0)
-    return float(max(width, 0.0) * max(height, 0.0))
-
-
-def _marks(axes: Axes, half: float) -> list[Bbox]:
+def _marks(axes: Axes, half: float) -> list[Points]:
     """Return the boxes of all marks of curves and of scattered points."""
     curves = [np.asarray(line.get_xydata(), np.float64) for line in axes.lines if line.get_marker() != "None"]
     points = np.concatenate([np.empty((0, 2)), *curves, *(np.asarray(c.get_offsets()) for c in axes.collections)])
-    return [Bbox.from_bounds(x - half, y - half, 2 * half, 2 * half) for x, y in axes.transData.transform(points)]
+    return [np.concatenate([place - half, place + half]) for place in axes.transData.transform(points)]
 
 
 def _curves(axes: Axes) -> Points:
     """Return points a pixel apart along all curves, (N, 2)."""
-    found = [np.empty((0, 2))]
+    points = [np.empty((0, 2))]
     for line in axes.lines:
         shown = np.asarray(axes.transData.transform(np.asarray(line.get_xydata(), np.float64)))
         for start, end in itertools.pairwise(shown):
-            found.append(_between(start, end))
-    return np.concatenate(found)
+            steps = np.linspace(0.0, 1.0, max(int(np.hypot(*(end - start))), 1))
+            points.append(start + steps[:, None] * (end - start))
+    return np.concatenate(points)

@@ -18,10 +18,10 @@ from reports.images import tiles
 from reports.images.exr import film, read_exr
 from reports.page import figures, front_figures
 from reports.page.content import PageInput
+from reports.page.figures import render
 from reports.page.files import write_files
 from reports.page.html import page_html, schemes
 from reports.page.pictures import films, filmstrip
-from reports.page.plot_style import render
 from reports.record import OF_A_PAGE, TRUTH, machine_path, write_records
 from reports.tables import summary
 from reports.tables.page_tables import page_frames, ranged_frames

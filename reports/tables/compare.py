@@ -27,6 +27,8 @@ from scipy import stats
 
 from reports.over_seeds import mean_over_seeds, statistic_over_seeds, trainings
 from reports.record import Machine, Metric, Record
+from reports.tables.number_format import NONE, display
+from reports.tables.table import ResultTable, TableCell, TableRow
 from weaves.errors import BadInput
 
 LEVEL: Final = 0.05
@@ -124,19 +126,51 @@ def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
     shared = [key for key in first if key in second]
     if not shared:
         raise BadInput("compare", "", "A and B share no measurement", "times or errors of the same methods are needed")
-    found = [
+    rows = [
         Difference(first[key], second[key], *_test(first[key], second[key]), extents.get(key, math.nan))
         for key in shared
     ]
-    adjusted = holm([one.p for one in found])
-    found = [replace(one, p=p) for one, p in zip(found, adjusted, strict=True)]
+    rows = [replace(row, p=p) for row, p in zip(rows, holm([row.p for row in rows]), strict=True)]
     return Comparison(
-        [one for one in found if one.a.metric in TIMES],
-        [one for one in found if one.a.metric not in TIMES],
+        [row for row in rows if row.a.metric in TIMES],
+        [row for row in rows if row.a.metric not in TIMES],
         len(first) - len(shared),
         len(second) - len(shared),
-        _unlike(found),
+        _unlike(rows),
     )
+
+
+def difference_tables(comparison: Comparison) -> list[ResultTable]:
+    """Return the differences of times and of errors as tables; what differs is marked."""
+    return [
+        ResultTable(title, ("method", "of", "A", "B", "B / A", "p", "result"), tuple(map(_row, differences)))
+        for title, differences in (("Times", comparison.times), ("MSE, 95 % interval", comparison.errors))
+        if differences
+    ]
+
+
+def _row(row: Difference) -> TableRow:
+    p = "" if math.isnan(row.p) else f"{row.p:.2g}" if row.p >= 1e-3 else "< .001"
+    ratio = NONE if math.isnan(row.ratio) else f"{row.ratio:.3g}"
+    words = (_subject(row.a), _value(row.a), _value(row.b), ratio, p, row.result)
+    kind = "" if row.result in NO_DIFFERENCE else "marked"
+    return TableRow(display(row.a.method, row.a.setting), tuple(map(TableCell, words)), kind=kind)
+
+
+def _subject(record: Record) -> str:
+    """Return the subject of a measurement, without the method."""
+    if record.metric == "time":
+        return f"a query, {record.threads} thread{'' if record.threads == 1 else 's'}" if record.threads else "a query"
+    words = {"prepare_time": "to add a fabric", "encode_time": f"to edit {record.note}"}
+    return words.get(record.metric, record.fabric)
+
+
+def _value(record: Record) -> str:
+    """Return a time with its unit, or an error with half its 95 % interval."""
+    if record.unit != "1":
+        return f"{record.value:,.4g} {record.unit.split('/')[0]}"
+    half = "" if record.standard_error is None else f" ± {1.96 * record.standard_error:.1e}"
+    return f"{record.value:.2e}{half}"
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -154,25 +188,25 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
     """Return times and errors by what they are of."""
-    chosen = (one for one in records if one.metric in TIMES or (one.metric == "mse" and one.scene == "queries"))
-    return {_key(one): one for one in chosen}
+    chosen = (r for r in records if r.metric in TIMES or (r.metric == "mse" and r.scene == "queries"))
+    return {_key(record): record for record in chosen}
 
 
 def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:
     """Return the range of each number over trainings, the largest of all benchmarks that have several."""
-    found: dict[_Key, float] = {}
+    extents: dict[_Key, float] = {}
     for records in benchmarks:
         counts = trainings(records)
         least, most = (_comparable(statistic_over_seeds(records, ends)) for ends in (min, max))
-        for key, one in most.items():
-            if counts[one.method, one.setting] > 1:
-                found[key] = max(found.get(key, 0.0), one.value - least[key].value)
-    return found
+        for key, record in most.items():
+            if counts[record.method, record.setting] > 1:
+                extents[key] = max(extents.get(key, 0.0), record.value - least[key].value)
+    return extents
 
 
-def _key(one: Record) -> _Key:
-    edit = one.note if one.metric == "encode_time" else ""
-    return one.metric, one.method, one.setting, one.fabric, one.threads, edit
+def _key(record: Record) -> _Key:
+    edit = record.note if record.metric == "encode_time" else ""
+    return record.metric, record.method, record.setting, record.fabric, record.threads, edit
 
 
 def _test(a: Record, b: Record) -> tuple[float, float]:
@@ -181,27 +215,27 @@ def _test(a: Record, b: Record) -> tuple[float, float]:
     if a.metric in TIMES:
         if not a.samples or not b.samples:
             return gap, math.nan
-        found = stats.mannwhitneyu(b.samples, a.samples, alternative="two-sided")
-        return float(found.statistic) - 0.5 * len(a.samples) * len(b.samples), float(found.pvalue)
+        test = stats.mannwhitneyu(b.samples, a.samples, alternative="two-sided")
+        return float(test.statistic) - 0.5 * len(a.samples) * len(b.samples), float(test.pvalue)
     if a.standard_error is None or b.standard_error is None:
         return gap, math.nan
     spread = math.hypot(a.standard_error, b.standard_error)
     return gap, float(2.0 * stats.norm.sf(abs(gap) / spread)) if spread else float(gap == 0)
 
 
-def _unlike(found: Sequence[Difference]) -> list[str]:
+def _unlike(rows: Sequence[Difference]) -> list[str]:
     """Return sentences on differences in what the two benchmarks measured."""
     sentences = []
-    if any(one.a.provenance.dataset != one.b.provenance.dataset for one in found):
+    if any(row.a.provenance.dataset != row.b.provenance.dataset for row in rows):
         sentences.append("A and B were measured on different data sets")
-    if any(one.a.provenance.version != one.b.provenance.version for one in found):
+    if any(row.a.provenance.version != row.b.provenance.version for row in rows):
         sentences.append("A and B were measured by different versions of the benchmark")
     once = [
-        one.a.method for one in found if math.isnan(one.extent) and one.a.provenance.model and one.a.metric not in TIMES
+        row.a.method for row in rows if math.isnan(row.extent) and row.a.provenance.model and row.a.metric not in TIMES
     ]
     if once:
         names = ", ".join(dict.fromkeys(once))
         sentences.append(f"one training in A and B: another training of {names} may differ by more than is marked here")
-    if methods := [one.a.method for one in found if one.a.metric == "time" and one.a.note != one.b.note]:
+    if methods := [row.a.method for row in rows if row.a.metric == "time" and row.a.note != row.b.note]:
         sentences.append(f"calls of different sizes were timed: {', '.join(dict.fromkeys(methods))}")
     return sentences

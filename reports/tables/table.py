@@ -56,7 +56,7 @@ class TableRow:
     method: str = ""
     setting: str = ""
     kind: str = ""
-    """``baseline``, ``noise`` or ``failed`` where a row is shown apart."""
+    """``baseline``, ``noise`` or ``marked`` where a row is shown apart."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def of_rows(
     lines = []
     for row in found:
         label, *others = cells(row, columns)
-        lines.append(TableRow(label.text, tuple(others), kind="" if getattr(row, "holds", True) else "failed"))
+        lines.append(TableRow(label.text, tuple(others), kind="" if getattr(row, "holds", True) else "marked"))
     return table(name, [column.title for column in columns], lines, values, key)
 
 

@@ -7,7 +7,7 @@ import pytest
 from pipeline.models.catalogue import CLASSES
 from reports.page import figures
 from reports.page.colours import DARK, LIGHT, MARKERS, MARKS
-from reports.page.plot_style import render
+from reports.page.figures import render
 from reports.tables import summary
 from reports.tables.number_format import NAMES, display
 

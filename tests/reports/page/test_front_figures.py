@@ -7,7 +7,7 @@ import pytest
 
 from reports.page import front_figures
 from reports.page.colours import DARK, LIGHT
-from reports.page.plot_style import render
+from reports.page.figures import render
 from reports.tables import summary
 from reports.tables.tradeoff import tradeoff_table
 

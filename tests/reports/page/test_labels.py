@@ -6,8 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from reports.page.colours import DARK, LIGHT
+from reports.page.figures import new_figure, render
 from reports.page.labels import CLEARANCE, MARK, NEAR, Label, place_labels
-from reports.page.plot_style import new_figure, render
 
 
 def crowded(scheme):

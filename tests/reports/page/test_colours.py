@@ -1,7 +1,6 @@
 import pytest
 
-from reports.page.colours import DARK, LIGHT
-from reports.page.contrast import OF_MARKS, OF_TEXT, contrast, readable
+from reports.page.colours import DARK, LIGHT, OF_MARKS, OF_TEXT, contrast, readable
 
 SCHEMES = pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
 
