@@ -46,7 +46,7 @@ def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
         )
     worst = percent(base.error, 0)
     figures.append({"value": worst, "note": f"error of a pixel of two points, in {base.ns:,.0f} ns"})
-    within = "; ".join(f"within {listed(limits)} error {name}" for name, limits in reached.items())
+    within = "; ".join(f"within {listed(limits)} error: {name}" for name, limits in reached.items())
     where = _fabrics(base.fabrics, base.role)
     return f"A pixel of two random points has an error of {worst} on {where}. Cheapest {within}.", figures
 

@@ -102,8 +102,8 @@ def test_the_trade_names_the_cheapest_methods_and_what_two_points_get():
     )
     lead, figures = trade(table)
     assert lead.replace("\u00a0", " ") == (
-        "A pixel of two random points has an error of 40 % on the 8 seen fabrics. Cheapest within 10 % and 5 % error "
-        "soft nodes, k = 1 at 2× the time of two points; within 2 % error no method."
+        "A pixel of two random points has an error of 40 % on the 8 seen fabrics. Cheapest within 10 % and 5 % error: "
+        "soft nodes, k = 1 at 2× the time of two points; within 2 % error: no method."
     )
     assert [figure["value"] for figure in figures] == ["2×", "2×", "–", "40 %"]
     assert trade(table[1:]) == trade(table[:0]) == ("", [])
