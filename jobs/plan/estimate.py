@@ -6,16 +6,10 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 from jobs.plan.schedule import schedule
-from jobs.plan.task import Stage, Task
-
-SECONDS_A_COST: Final[Mapping[Stage, float]] = MappingProxyType(
-    {"generate": 0.2, "train": 2.2, "bench": 1.2, "report": 1.0}
-)
-"""Seconds that tasks of a stage took by their stated cost, before any is known: `quick`, two cores of 2026."""
+from jobs.plan.task import Task
 
 # Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. Short tasks, whose
 # cost is less than what any task takes, say nothing about long ones.
@@ -29,7 +23,7 @@ class Estimate:
     """Seconds that tasks take.
 
     What finished tasks took is compared with their cost, by kind, by stage and overall. A kind of which little was done
-    is assumed to be as its stage, and a stage as everything. Before anything was done `SECONDS_A_COST` is taken.
+    is assumed to be as its stage, and a stage as everything. Before anything was done a cost is taken as it is.
     """
 
     def __init__(self) -> None:
@@ -40,7 +34,7 @@ class Estimate:
         """Take the time of a finished task."""
         for kind in _kinds(task):
             self._sums[kind][0] += seconds
-            self._sums[kind][1] += _cost(task)
+            self._sums[kind][1] += task.cost
 
     def seconds(self, task: Task) -> float:
         """Return how long a task takes on one worker."""
@@ -48,7 +42,7 @@ class Estimate:
         for kind, weight in zip(_kinds(task), _WEIGHTS, strict=True):
             seconds, cost = self._sums.get(kind, (0.0, 0.0))
             ratio = (seconds + ratio * weight) / (cost + weight)
-        return ratio * _cost(task)
+        return ratio * task.cost
 
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
         """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
@@ -80,10 +74,6 @@ def _rest(seconds: float, elapsed: float, share: float) -> float:
     if share >= _LEAST_SHARE:
         return elapsed * (1 - share) / share
     return max(seconds - elapsed, 0.1 * elapsed)
-
-
-def _cost(task: Task) -> float:
-    return SECONDS_A_COST[task.stage] * task.cost
 
 
 def _kinds(task: Task) -> tuple[str, str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 from jobs.plan.measurements.measurement import Measurement, Picture
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
@@ -134,7 +134,7 @@ class OnFabric(Measurement):
         """Estimated seconds on one core."""
         width, height = self.frame_options.frame_size
         pixels = sum(math.prod(self.picture_options.size(view)) for view in self.views)
-        return 1.0 + self.model.seconds(self.frame_options.frames * width * height + self.errors.rows + pixels)
+        return 0.3 + self.model.seconds(self.frame_options.frames * width * height + self.errors.rows + pixels)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
@@ -198,7 +198,7 @@ class OnUnseenPopulation(Measurement):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return 1.0 + self.model.seconds(len(self.fabrics) * self.errors.rows)
+        return 0.3 + self.model.seconds(len(self.fabrics) * self.errors.rows, len(self.fabrics))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
@@ -222,13 +222,17 @@ class ErrorsBySize(Measurement):
     """
 
     kind: Literal["errors by size"] = "errors by size"
-    seconds: ClassVar = 3.0
     model: Trained
     """The model with the networks of all fabrics."""
     dataset: HeldOutRows
     """The held-out queries of all fabrics."""
     seed: int
     """Seed of the points of random methods."""
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core; a shard of test rows is about one fabric."""
+        return 1.0 + self.model.seconds(0.0, len(self.dataset.rows))
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

@@ -24,7 +24,6 @@ class AtExtremes(Measurement):
 
     kind: Literal["extremes"] = "extremes"
     code: ClassVar = ("truth", "extremes")
-    seconds: ClassVar = 3.0
     model: Trained
     """The model."""
     fabrics: tuple[tuple[Uncoloured, Role], ...]
@@ -47,6 +46,11 @@ class AtExtremes(Measurement):
                     fabrics=tuple((one.fabric, role) for role, one in known.items()),
                     truth=EXTREME_TRUTH.model_copy(update=physics),
                 )
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 0.6 + self.model.seconds(0.0, len(self.fabrics))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure all methods side by side."""

@@ -73,9 +73,11 @@ class Trained(TaskPart):
         settings = self.options.settings
         return tuple(setting_of(k) for k in settings if k in counts) if settings else (self.options.variant,)
 
-    def seconds(self, queries: float) -> float:
-        """Return the estimated seconds in which one core answers so many queries with every setting."""
-        return queries * self.options.seconds[1] * (sum(self.options.settings) or 1)
+    def seconds(self, queries: float, fabrics: float = 1.0) -> float:
+        """Return the estimated seconds in which one core answers queries with every setting, of so many fabrics."""
+        settings = self.options.settings
+        preparing = self.options.prepare_seconds * (len(settings) or 1)
+        return fabrics * preparing + queries * self.options.seconds[1] * (sum(settings) or 1)
 
     def provenance(self, dataset: str = "") -> Provenance:
         """Return the provenance of Records of this model."""

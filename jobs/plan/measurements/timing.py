@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
@@ -14,6 +14,9 @@ from reports.options import RunOptions, TimingOptions, select
 if TYPE_CHECKING:
     from pipeline.models.method import Method
     from reports.record import Provenance, Record
+
+
+_SECONDS_A_CALL: Final = 0.15  # of a round of one row: all queries, then each of five classes of sizes
 
 
 class TimedModel(Trained):
@@ -59,8 +62,10 @@ class TimeOfMethods(Measurement):
 
     @property
     def cost(self) -> float:
-        """Estimated seconds."""
-        return 60.0
+        """Estimated seconds; a shard of test rows is about one fabric."""
+        rows = sum(len(model.options.settings) or 1 for model in self.models)
+        prepared = sum(model.seconds(0.0, len(self.dataset.rows)) for model in self.models)
+        return 5.0 + rows * self.options.timing_repeats * _SECONDS_A_CALL + 0.7 * prepared
 
     @property
     def threads(self) -> int:

@@ -17,7 +17,7 @@ from pipeline.truth.options import TruthOptions
 from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
 from weaves.fabric import Fabric
 
-_LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 20.0, 2048, 5
+_LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 10.0, 512, 5
 
 
 class TruthPicture(Reference):
@@ -181,4 +181,4 @@ class LivePage(Reference):
 
 
 def _seconds(pixels: int, truth: TruthOptions) -> float:
-    return pixels * SECONDS_A_POINT * points_a_row(truth)
+    return 0.3 + pixels * SECONDS_A_POINT * points_a_row(truth)

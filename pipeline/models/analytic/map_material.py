@@ -37,6 +37,7 @@ class MapMaterialOptions(AnalyticOptions):
     """Texture maps of base colour, normal, tangent, specular colour and two roughnesses; nothing is trained."""
 
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
+    prepare_seconds: ClassVar[float] = 1.8
 
     model: Literal["map_material"] = "map_material"
     size: Annotated[int, AfterValidator(_power_of_two)] = Field(default=512, ge=64, le=4096)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class PrefilteredOptions(AnalyticOptions):
     """MIP maps of normals and tangents, one point model a query and family; nothing is trained."""
 
-    seconds: ClassVar[tuple[float, float]] = (0.0, 2e-7)
+    seconds: ClassVar[tuple[float, float]] = (0.0, 5e-7)
+    prepare_seconds: ClassVar[float] = 0.3
 
     model: Literal["prefiltered"] = "prefiltered"
     texels_per_yarn: int = Field(default=16, ge=1, le=128)

@@ -34,7 +34,8 @@ class SoftNodesOptions(AnalyticOptions):
 
     turns: ClassVar[bool] = True
     parameter: ClassVar[str] = "levels"
-    seconds: ClassVar[tuple[float, float]] = (0.0, 2.5e-7)
+    seconds: ClassVar[tuple[float, float]] = (0.0, 1e-6)
+    prepare_seconds: ClassVar[float] = 1.2
 
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
