@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _RECORDS = "records merge"
 
 
-class Part(NamedTuple):
+class MergedTask(NamedTuple):
     """A finished task in one folder."""
 
     ledger: Ledger
@@ -67,13 +67,13 @@ def merge(
     target = Ledger(out)
     with target.store.held():
         others = [Ledger(source) for source in sources if source.resolve() != out.resolve()]
-        chosen: dict[str, Part] = {}
+        chosen: dict[str, MergedTask] = {}
         damaged: dict[str, str] = {}
         for ledger in (target, *others):
             for receipt in ledger.receipts([]):
                 if receipt.stage == "report":
                     continue
-                part = Part(ledger, receipt, list(_sound(ledger, receipt)))
+                part = MergedTask(ledger, receipt, list(_sound(ledger, receipt)))
                 if {Path(place).name for place in part.places} != receipt.files.keys():
                     damaged[receipt.task] = f"{ledger.out}: {receipt.stage} {receipt.title}"
                 elif receipt.task not in chosen:
@@ -109,7 +109,7 @@ def _sound(ledger: Ledger, receipt: Receipt) -> Iterator[str]:
             yield place
 
 
-def _refuse_conflict(first: Part, second: Part) -> None:
+def _refuse_conflict(first: MergedTask, second: MergedTask) -> None:
     """Refuse two products of one task with unlike bytes; the machine and the date beside Records do not count."""
     pairs = [_numbers(part.receipt.files) for part in (first, second)]
     if pairs[0] != pairs[1]:

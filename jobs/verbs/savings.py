@@ -61,7 +61,7 @@ class Value(NamedTuple):
     high: float | None = None
 
 
-class Saving(NamedTuple):
+class SceneSaving(NamedTuple):
     """One quantity of a scene by both recipes."""
 
     scene: str
@@ -112,7 +112,7 @@ def savings(
     console.print(f"the numbers: {path}", soft_wrap=True)
 
 
-def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[str] = ()) -> list[Saving]:
+def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[str] = ()) -> list[SceneSaving]:
     """Return the costs of a scene by the general recipe, which is run by the name `run`, and by its own recipe."""
     path = out / "recipes" / f"require-{scene}.toml"
     if not path.is_file():
@@ -129,12 +129,12 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[s
         sides.append(costs | _measured(out, whole.name, scene, model, called))
     _refuse_old_page(own, out, str(path))
     theirs, ours = sides
-    found = [Saving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    found = [SceneSaving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
     found += _difference(scene, out, (general, own), model)
     return found + list(_elsewhere(scene, out, general, same, own, model))
 
 
-def conclusion(rows: Sequence[Saving]) -> str:
+def conclusion(rows: Sequence[SceneSaving]) -> str:
     """Return a sentence on the savings of a scene's recipe and its error."""
     by = {row.quantity: row for row in rows}
     generated, learnt, error = by["queries generated"], by["queries learnt from"], by["mse"]
@@ -204,7 +204,7 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     return values | {("frame_time over 2 points", "1"): Value(relative)}
 
 
-def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[Saving]:
+def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: ModelRecipe) -> list[SceneSaving]:
     """Return the difference of the errors of both models; nothing if a picture or the truth's frames are not sound."""
     from reports.images.exr import RGB, read_exr
     from reports.measure.block_bootstrap import mse_difference
@@ -227,7 +227,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     first = read_shot(frames).first()
     a, b = (read_exr(path).stack(*RGB) for path in pictures)
     difference = mse_difference(a, b, first.pictures()[0], first.lit[0], recipes[0].bench.scenes.image)
-    return [Saving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
+    return [SceneSaving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
 
 
 def _setting(model: ModelRecipe) -> str:
@@ -237,7 +237,7 @@ def _setting(model: ModelRecipe) -> str:
 
 def _elsewhere(
     scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
-) -> Iterator[Saving]:
+) -> Iterator[SceneSaving]:
     """Yield the fallback shares of both models in the general recipe's other scenes whose frames exist."""
     from reports.measure.scene.shot import read_shot
 
@@ -248,14 +248,14 @@ def _elsewhere(
         if shot.name != scene:
             queries = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
             shares = (Value(fallback_share(*of, queries)) for of in ((same, general), (model, own)))
-            yield Saving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
+            yield SceneSaving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
 
 
 def _value(record: Record) -> Value:
     return Value(record.value, record.low, record.high)
 
 
-def _table(rows: Sequence[Saving]) -> Table:
+def _table(rows: Sequence[SceneSaving]) -> Table:
     """Show a scene's quantities by both recipes."""
     from rich.table import Table
 
@@ -274,7 +274,7 @@ def _shown(value: Value) -> str:
     return number if value.low is None else f"{number} ({value.low:.2g} to {value.high:.2g})"
 
 
-def _csv(rows: Sequence[Saving]) -> str:
+def _csv(rows: Sequence[SceneSaving]) -> str:
     """Return all rows as CSV, RFC 4180."""
     text = io.StringIO()
     writer = csv.writer(text)

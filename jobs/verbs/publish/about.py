@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from jobs.verbs.publish.contents import Part
+from jobs.verbs.publish.contents import PublishedPart
 from pipeline.shards.manifest import Manifest
 
 
@@ -15,7 +15,7 @@ class About(NamedTuple):
     ----------
     manifest : Manifest
         Its fabrics, roles and options.
-    parts : list of Part
+    parts : list of PublishedPart
         Its files of rows.
     licence : str
         SPDX identifier.
@@ -26,7 +26,7 @@ class About(NamedTuple):
     """
 
     manifest: Manifest
-    parts: list[Part]
+    parts: list[PublishedPart]
     licence: str
     authors: tuple[str, ...]
     truth_version: int

@@ -20,7 +20,7 @@ POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")
 SPLITS: Final = ("train", "validation", "test")
 
 
-class Part(NamedTuple):
+class PublishedPart(NamedTuple):
     """A file of rows.
 
     Attributes
@@ -57,7 +57,7 @@ def own_shards(manifest: Manifest) -> list[ShardEntry]:
     return [shard for shard in manifest.shards if shard.kind == "components"]
 
 
-def parts_of(manifest: Manifest) -> list[Part]:
+def parts_of(manifest: Manifest) -> list[PublishedPart]:
     """Return the files of a data set, by role, split and fabric."""
     shards: dict[tuple[str, str], list[ShardEntry]] = {}
     for shard in sorted(own_shards(manifest), key=lambda shard: shard.start):
@@ -69,7 +69,9 @@ def parts_of(manifest: Manifest) -> list[Part]:
             files = min(len(names), max(1, MOST_FILES * len(names) // len(shards)))
             for number, group in enumerate(_cut(names, files)):
                 parts = tuple(shard for name in group for shard in shards[name, split])
-                found.append(Part(f"data/{role}/{split}-{number:02}.parquet", role, split, tuple(group), parts))
+                found.append(
+                    PublishedPart(f"data/{role}/{split}-{number:02}.parquet", role, split, tuple(group), parts)
+                )
     return found
 
 

@@ -20,7 +20,7 @@ from jobs.verbs.parameters import NOTHING
 from jobs.verbs.publish.about import About
 from jobs.verbs.publish.card import LOADER, card
 from jobs.verbs.publish.citation import citation
-from jobs.verbs.publish.contents import Part, own_shards, parts_of
+from jobs.verbs.publish.contents import PublishedPart, own_shards, parts_of
 from jobs.verbs.publish.croissant import croissant
 from jobs.verbs.publish.licence import licence_id
 from jobs.verbs.publish.recipe import recipe_files
@@ -145,7 +145,7 @@ def _write(about: About, texts: dict[str, str], folder: Path, staging: Path) -> 
     return files
 
 
-def _facts(about: About, part: Part) -> dict[str, Any]:
+def _facts(about: About, part: PublishedPart) -> dict[str, Any]:
     """Return the metadata of a file of rows, from which it is known again."""
     return {
         "schema_version": about.manifest.schema_version,

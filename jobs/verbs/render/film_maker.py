@@ -11,7 +11,7 @@ import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from jobs.terminal import Terminal
-from jobs.verbs.render.look import Look
+from jobs.verbs.render.look import RenderLook
 from pipeline import versions
 from pipeline.atomic import atomic_write
 from pipeline.cores import cores
@@ -34,7 +34,9 @@ _HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
 class FilmMaker:
     """A scene, a method and threads that make frames, with a progress bar while they do."""
 
-    def __init__(self, loaded: Loaded, answerer: PictureMethod, size: tuple[int, int], how: Look, count: int) -> None:
+    def __init__(
+        self, loaded: Loaded, answerer: PictureMethod, size: tuple[int, int], how: RenderLook, count: int
+    ) -> None:
         self.size = size
         self._loaded, self._answerer, self._how, self._count = loaded, answerer, how, count
         self._queries = self._fallback = 0

@@ -20,7 +20,7 @@ MOST_PIXELS: Final = 16_384
 
 
 @dataclass(frozen=True)
-class Look:
+class RenderLook:
     """How a picture is made and shown.
 
     Attributes
@@ -42,7 +42,7 @@ class Look:
     exposure: float
 
 
-def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) -> Look:
+def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) -> RenderLook:
     """Return how a picture is made, from the command line; BadInput if a value cannot be used."""
     if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
         raise BadInput(WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
@@ -52,7 +52,7 @@ def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) 
         raise BadInput(WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
         raise BadInput(WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
-    return Look(size_of(size) if size else None, round(samples**0.5), options, tone, exposure)
+    return RenderLook(size_of(size) if size else None, round(samples**0.5), options, tone, exposure)
 
 
 def size_of(text: str) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from jobs.console import duration
 from jobs.terminal import Terminal
 from jobs.verbs.parameters import NOTHING, Local, SceneName
-from jobs.verbs.render.look import WHERE, Look, look
+from jobs.verbs.render.look import WHERE, RenderLook, look
 from pipeline.atomic import refuse_unwritable
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import load
@@ -63,7 +63,7 @@ def render(
     Terminal().print(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}", soft_wrap=True)
 
 
-def make(scene: Scene, method: str, frames: int, how: Look, out: Path) -> FilmMaker:
+def make(scene: Scene, method: str, frames: int, how: RenderLook, out: Path) -> FilmMaker:
     """Make a picture, a film or a folder, and return what made it; errors as for `render`."""
     # Torch, which help need not wait for.
     from jobs.verbs.render.film_maker import FilmMaker

@@ -15,7 +15,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from jobs.verbs.require_recipe import write_recipe
-from jobs.verbs.savings import DIFFERENCE, Saving, Value, conclusion, saved
+from jobs.verbs.savings import DIFFERENCE, SceneSaving, Value, conclusion, saved
 from pipeline.models.card import write_model
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -178,7 +178,7 @@ def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):
 def test_the_verdict_says_whether_the_error_differs(runs, interval, words):
     rows = [*by_quantity(both(runs)).values()]
     assert "paired" not in conclusion(rows)
-    rows.append(Saving("sphere", "neumip", DIFFERENCE, "1", Value(0.0), Value(0.0, *interval)))
+    rows.append(SceneSaving("sphere", "neumip", DIFFERENCE, "1", Value(0.0), Value(0.0, *interval)))
     assert words in conclusion(rows)
 
 
@@ -220,7 +220,7 @@ def write_frames(path, fabric):
 
 def test_less_than_the_aim_is_said(runs):
     few, same = Value(2.0), Value(1.0)
-    rows = [Saving("s", "m", name, "1", few, same) for name in ("queries generated", "queries learnt from", "mse")]
+    rows = [SceneSaving("s", "m", name, "1", few, same) for name in ("queries generated", "queries learnt from", "mse")]
     assert conclusion(rows).endswith("less than 3 times.")
 
 
