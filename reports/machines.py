@@ -58,9 +58,9 @@ def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
     for name, part in parts.items():
         refuse_several(part, name)
         for record in part:
-            one = record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": name})})
+            own = record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": name})})
             if metric_row(record.metric).of_machine:
-                records.append(one)
+                records.append(own)
                 continue
             key = _subject(record)
             first = known.setdefault(key, record)
@@ -69,7 +69,7 @@ def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
             elif _number(first) == _number(record):
                 shared += 1
             else:
-                records.append(one)
+                records.append(own)
                 unlike.append((first, record))
     return Joined(records, shared, unlike)
 

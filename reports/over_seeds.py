@@ -36,10 +36,10 @@ def trainings(records: Sequence[Record]) -> dict[tuple[str, str], int]:
     """Return the number of trainings of each method and setting; 0 where nothing is trained."""
     seeds: dict[tuple[str, str], set[int]] = {}
     for record in records:
-        found = seeds.setdefault((record.method, record.setting), set())
+        known = seeds.setdefault((record.method, record.setting), set())
         if record.provenance.model:
-            found.add(record.provenance.seed)
-    return {key: len(found) for key, found in seeds.items()}
+            known.add(record.provenance.seed)
+    return {key: len(known) for key, known in seeds.items()}
 
 
 def mean_over_seeds(records: Sequence[Record]) -> list[Record]:
@@ -56,7 +56,7 @@ def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> lis
     for index, record in enumerate(records):
         # Records of no training are never of the same number.
         groups.setdefault(_subject(record) if record.provenance.model else index, []).append(record)
-    ordered = (sorted(group, key=lambda one: one.provenance.seed) for group in groups.values())
+    ordered = (sorted(group, key=lambda record: record.provenance.seed) for group in groups.values())
     return [_condensed(group, statistic) for group in ordered]
 
 
@@ -70,7 +70,10 @@ def by_seed(records: Sequence[Record]) -> list[list[Record]]:
     seeds = sorted({record.provenance.seed for record in records if record.provenance.model})
     if len(seeds) < 2:
         return []
-    return [[one for one in records if not one.provenance.model or one.provenance.seed == seed] for seed in seeds]
+    return [
+        [record for record in records if not record.provenance.model or record.provenance.seed == seed]
+        for seed in seeds
+    ]
 
 
 def over_seeds(
@@ -97,24 +100,24 @@ def over_seeds(
     def decorated(table: Table) -> Table:
         @functools.wraps(table)
         def condensed(records: Sequence[Record]) -> pd.DataFrame:
-            found = table(mean_over_seeds(records))
-            if "method" not in found:
-                return found
+            frame = table(mean_over_seeds(records))
+            if "method" not in frame:
+                return frame
             counts = trainings(records)
-            names = [name for name in found.columns if name not in keys] if ranged is None else list(ranged)
-            found["seeds"] = [counts[key] for key in zip(found["method"], found["setting"], strict=True)]
+            names = [name for name in frame.columns if name not in keys] if ranged is None else list(ranged)
+            frame["seeds"] = [counts[key] for key in zip(frame["method"], frame["setting"], strict=True)]
             parts = [part for part in map(table, by_seed(records)) if len(part)]
             if not parts:
-                return found.assign(**{name + end: math.nan for name in names for end in (LEAST, MOST)})
+                return frame.assign(**{name + end: math.nan for name in names for end in (LEAST, MOST)})
             lines = pd.concat(parts).astype(dict.fromkeys((*names, *means), float))
             several = [counts[key] > 1 for key in zip(lines["method"], lines["setting"], strict=True)]
             every = lines[several].groupby([*keys])
             ends = every[names].min().add_suffix(LEAST).join(every[names].max().add_suffix(MOST))
-            found = found.merge(ends, on=[*keys], how="left")
+            frame = frame.merge(ends, on=[*keys], how="left")
             for name, mean in means.items():
-                of_trainings = every[name].agg(mean).reindex(pd.MultiIndex.from_frame(found[[*keys]]))
-                found[name] = found[name].where(found["seeds"] < 2, of_trainings.to_numpy())
-            return found
+                of_trainings = every[name].agg(mean).reindex(pd.MultiIndex.from_frame(frame[[*keys]]))
+                frame[name] = frame[name].where(frame["seeds"] < 2, of_trainings.to_numpy())
+            return frame
 
         return condensed
 
@@ -143,14 +146,14 @@ def _condensed(group: Sequence[Record], statistic: Statistic) -> Record:
         known = [value for value in values if value is not None]
         return statistic(known) if len(known) == len(group) else None
 
-    curves = [dict(one.curve) for one in group]
+    curves = [dict(record.curve) for record in group]
     shared = [x for x, _ in first.curve if all(x in curve for curve in curves)]
     return first.model_copy(
         update={
-            "value": statistic([one.value for one in group]),
-            "standard_error": of([one.standard_error for one in group]),
-            "low": of([one.low for one in group]),
-            "high": of([one.high for one in group]),
+            "value": statistic([record.value for record in group]),
+            "standard_error": of([record.standard_error for record in group]),
+            "low": of([record.low for record in group]),
+            "high": of([record.high for record in group]),
             "curve": tuple((x, statistic([curve[x] for curve in curves])) for x in shared),
             "samples": (),
         }

@@ -210,7 +210,7 @@ def this_machine(threads: int) -> Machine:
         threads=threads,
         system=f"{platform.system()} {platform.machine()}",
         python=platform.python_version(),
-        packages={name: found for name in PACKAGES if (found := _version(name))},
+        packages={name: number for name in PACKAGES if (number := _version(name))},
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
@@ -244,8 +244,8 @@ def read_records(paths: Iterable[Path]) -> list[Record]:
             fault = error.errors(include_url=False)[0]
             where = ".".join(map(str, fault["loc"]))
             why = fault["msg"].removeprefix("Value error, ")
-            found = f"holds no records of this version ({where}: {why})" if where else "holds no records"
-            raise BadInput(str(path), "", found, "run the benchmark again") from error
+            fault_words = f"holds no records of this version ({where}: {why})" if where else "holds no records"
+            raise BadInput(str(path), "", fault_words, "run the benchmark again") from error
     return records
 
 
@@ -253,13 +253,13 @@ def read_machine(path: Path) -> Machine:
     """Read the machine of the records in `path`; BadInput if it is missing, or one of both files is damaged."""
     beside = machine_path(path)
     try:
-        found = _MachineFile.model_validate(read_json(beside, MIB, "a file of one machine"))
-        whole = beside.read_bytes() == found.encoded() and found.sha256 == found.hash(file_sha256(path))
+        machine = _MachineFile.model_validate(read_json(beside, MIB, "a file of one machine"))
+        whole = beside.read_bytes() == machine.encoded() and machine.sha256 == machine.hash(file_sha256(path))
     except (OSError, ValidationError) as error:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
-    if "sha256" in found.model_fields_set and not whole:
+    if "sha256" in machine.model_fields_set and not whole:
         raise BadInput(str(path), "", f"damaged, or {beside.name} is: hashes differ", "run the benchmark again")
-    return Machine(**found.model_dump(exclude={"sha256"}))
+    return Machine(**machine.model_dump(exclude={"sha256"}))
 
 
 def to_table(records: Iterable[Record]) -> pd.DataFrame:

@@ -76,9 +76,9 @@ def _by_role(table: pd.DataFrame, column: str, worded: Callable[[float], str], o
 
 def _ends(table: pd.DataFrame, column: str, worded: Callable[[float], str], where: str = "") -> str:
     """Return the lowest and the highest value of a column with their methods in a sentence; empty without values."""
-    found = table[table[column].notna()] if len(table) else table
-    if found.empty:
+    measured = table[table[column].notna()] if len(table) else table
+    if measured.empty:
         return ""
-    ordered = list(rows(found.sort_values(column, kind="stable")))
+    ordered = list(rows(measured.sort_values(column, kind="stable")))
     ends = [f"{display(row.method, row.setting)} ({worded(getattr(row, column))})" for row in (ordered[0], ordered[-1])]
     return f" Lowest{where}: {ends[0]}; highest: {ends[1]}."

@@ -97,8 +97,8 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
         for (method, setting), row in places.items():
             single = _values(fabrics, role, method, setting)
             axes.scatter(single, np.full(len(single), row), s=16, color=colours[method], alpha=0.3, linewidths=0)
-            found = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
-            for mean in rows(found):
+            own = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
+            for mean in rows(own):
                 if mean.mse_least < mean.mse_most:
                     axes.plot(
                         [mean.mse_least, mean.mse_most], [row, row], linewidth=7, alpha=0.3, color=colours[method],
@@ -136,11 +136,11 @@ def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
         threshold = 10 ** math.floor(math.log10(smallest)) if math.isfinite(smallest) else 1e-6
         axes.set_xscale("symlog", linthresh=(threshold := max(threshold, 1e-5)))
         axes.axvline(0, color=scheme.muted, linewidth=1.0)
-        for found in rows(table):
-            row = places[found.method, found.setting]
-            value = getattr(found, column)
-            axes.plot([0, value], [row, row], color=colours[found.method], linewidth=1.6, alpha=0.35)
-            _mark(axes, value, row, colours[found.method], found.role, scheme.marker(found.method))
+        for measured in rows(table):
+            row = places[measured.method, measured.setting]
+            value = getattr(measured, column)
+            axes.plot([0, value], [row, row], color=colours[measured.method], linewidth=1.6, alpha=0.35)
+            _mark(axes, value, row, colours[measured.method], measured.role, scheme.marker(measured.method))
         axes.set(title=title, xlabel="variance beyond the truth's, over its squared mean")
         axes.xaxis.set_major_locator(FixedLocator(_signed_decades(table[column].dropna().tolist(), threshold)))
         axes.xaxis.set_minor_locator(NullLocator())
@@ -217,13 +217,13 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     places = _places(table)
     figure, (axes,) = new_figure(9.2, 1.0 + 0.28 * _height(places))
     colours = scheme.colours(table["method"])
-    for found in rows(table):
-        colour, row = colours[found.method], places[found.method, found.setting]
-        spread = _bounds(found.median_ns, found.first_quartile_ns, found.third_quartile_ns)
-        _mark(axes, found.median_ns, row, colour, "seen", scheme.marker(found.method), xerr=spread)
+    for measured in rows(table):
+        colour, row = colours[measured.method], places[measured.method, measured.setting]
+        spread = _bounds(measured.median_ns, measured.first_quartile_ns, measured.third_quartile_ns)
+        _mark(axes, measured.median_ns, row, colour, "seen", scheme.marker(measured.method), xerr=spread)
         axes.annotate(
-            _nanoseconds(found.median_ns), (found.third_quartile_ns, row), xytext=(8, 0), textcoords="offset points",
-            va="center", fontsize=9, color=scheme.muted,
+            _nanoseconds(measured.median_ns), (measured.third_quartile_ns, row), xytext=(8, 0),
+            textcoords="offset points", va="center", fontsize=9, color=scheme.muted,
         )  # fmt: skip
     axes.set(xscale="log", xlabel="time of a query, ns: median and quartiles of interleaved calls")
     axes.margins(x=0.12)

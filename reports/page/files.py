@@ -36,14 +36,14 @@ def read_files(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file of a page by its path in the folder; BadInput if there is no valid list."""
     path = folder / FILES
     try:
-        found = _LIST.validate_json(read_bytes(path, 16 * MIB, "a list of files"), strict=True)
+        hashes = _LIST.validate_json(read_bytes(path, 16 * MIB, "a list of files"), strict=True)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "write the page again with `twillight report`") from error
     except (OSError, ValidationError) as error:
         raise BadInput(str(path), "", "damaged", "write the page again with `twillight report`") from error
-    if any(Path(name).is_absolute() or ".." in Path(name).parts for name in found):
+    if any(Path(name).is_absolute() or ".." in Path(name).parts for name in hashes):
         raise BadInput(str(path), "", "names files outside of its folder", "write the page again")
-    return found
+    return hashes
 
 
 def _found(folder: Path) -> dict[str, str]:

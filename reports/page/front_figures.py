@@ -94,11 +94,11 @@ def _by_role(
     figure, panels = new_figure(max(4.9 * len(roles), NARROWEST), height, len(roles), sharey=True)
     labels: list[Label] = []
     for axes, role in zip(panels, roles, strict=True):
-        found = table[table["role"] == role]
-        _band(axes, scheme, found[found["front"]].sort_values("x"))
-        for method, settings in found.groupby("method", sort=False):
+        own = table[table["role"] == role]
+        _band(axes, scheme, own[own["front"]].sort_values("x"))
+        for method, settings in own.groupby("method", sort=False):
             labels += _curve(axes, scheme, str(method), settings, colours[str(method)], role)
-        for row in rows(found[of_baseline(found)]) if paper else ():
+        for row in rows(own[of_baseline(own)]) if paper else ():
             _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
         _tick(axes.yaxis, axes.get_ylim(), worded)
@@ -133,17 +133,17 @@ def _against_time(
     grid = np.asarray(flat).reshape(len(measures), len(panels))
     for place, ((measure, label), line) in enumerate(zip(measures.items(), grid, strict=True)):
         for axes, (panel, title) in zip(line, panels.items(), strict=True):
-            found = table[(table["panel"] == panel) & (table[measure] > 0)]
-            found = found.assign(x=found["time"], y=found[measure])
-            best = np.array(front(list(zip(found["x"], found["y"], strict=True))), np.bool_)
-            _band(axes, scheme, found[best].sort_values("x"), 5.0)
-            for method, settings in found.groupby("method", sort=False):
+            own = table[(table["panel"] == panel) & (table[measure] > 0)]
+            own = own.assign(x=own["time"], y=own[measure])
+            best = np.array(front(list(zip(own["x"], own["y"], strict=True))), np.bool_)
+            _band(axes, scheme, own[best].sort_values("x"), 5.0)
+            for method, settings in own.groupby("method", sort=False):
                 settings = settings.sort_values("x")
                 axes.plot(
                     settings["x"], settings["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
                     markersize=4.5, linewidth=1.1,
                 )  # fmt: skip
-            for row in rows(found[of_baseline(found)]) if measure == paper else ():
+            for row in rows(own[of_baseline(own)]) if measure == paper else ():
                 _paper_arrow(axes, scheme, (row.x, row.y), PAPER[0])
             axes.set(xscale="log", yscale="log", title="" if place else title)
             _tick(axes.yaxis, axes.get_ylim(), worded, 8)

@@ -32,14 +32,14 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Errors of several trainings are their mean.
     """
-    found: dict[tuple[str, str, str], dict[str, float]] = {}
+    numbers_of: dict[tuple[str, str, str], dict[str, float]] = {}
     names: dict[str, str] = {"size_time": "ns"} | {metric: measure for measure, (metric, _) in MEASURES.items()}
     for record in mean_over_seeds(records):
         if record.metric in names:
             values = {SIZES[EDGES.index(low)]: value for low, value in record.curve} | {WHOLE: record.value}
             for size, value in values.items():
-                found.setdefault((record.method, record.setting, size), {})[names[record.metric]] = value
-    lines = [(*key, *(numbers.get(name, math.nan) for name in names.values())) for key, numbers in found.items()]
+                numbers_of.setdefault((record.method, record.setting, size), {})[names[record.metric]] = value
+    lines = [(*key, *(numbers.get(name, math.nan) for name in names.values())) for key, numbers in numbers_of.items()]
     return pd.DataFrame(lines, columns=["method", "setting", "size", *names.values()])
 
 

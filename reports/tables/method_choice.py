@@ -85,8 +85,8 @@ def with_measured(table: pd.DataFrame, scenes: pd.DataFrame, scene: str) -> pd.D
 
 def _with_front(table: pd.DataFrame) -> pd.DataFrame:
     """Add the column `front` and sort by time."""
-    found = table.assign(front=front(list(zip(table["ms"], table["error"], strict=True))))
-    return found.sort_values("ms", kind="stable", ignore_index=True)
+    marked = table.assign(front=front(list(zip(table["ms"], table["error"], strict=True))))
+    return marked.sort_values("ms", kind="stable", ignore_index=True)
 
 
 def of_method(table: pd.DataFrame, method: str) -> pd.DataFrame:
@@ -111,5 +111,5 @@ def nearest(table: pd.DataFrame, error: float, ms: float) -> pd.DataFrame:
     best = table[table["front"]]
     fast = best[best["ms"] <= ms].nsmallest(1, "error")
     exact = best[best["error"] <= error].nsmallest(1, "ms")
-    found = pd.concat([fast, exact]).drop_duplicates()
-    return found if len(found) else pd.concat([best.nsmallest(1, "ms"), best.nsmallest(1, "error")]).drop_duplicates()
+    points = pd.concat([fast, exact]).drop_duplicates()
+    return points if len(points) else pd.concat([best.nsmallest(1, "ms"), best.nsmallest(1, "error")]).drop_duplicates()

@@ -130,7 +130,7 @@ def result_tables(
     per_material : collection of str
         Methods that are trained on every fabric by itself.
     """
-    found = {
+    sections = {
         "trade": _fronts(frames["tradeoff"], values),
         "error": _errors(records, frames, values, per_material),
         "equal-time": _equal_time(frames["equal_time"], values),
@@ -147,8 +147,8 @@ def result_tables(
         "stability": _extremes(frames, values),
     }
     for section, tables in truth_tables(records, values).items():
-        found[section] = [*found.get(section, []), *tables]
-    return {name: full for name, tables in found.items() if (full := _without_repeats(tables))}
+        sections[section] = [*sections.get(section, []), *tables]
+    return {name: full for name, tables in sections.items() if (full := _without_repeats(tables))}
 
 
 def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
@@ -230,11 +230,11 @@ def _by_fabric(
     lines = []
     for label in labels:
         method, _, setting = label.partition(" ")
-        found = []
+        line = []
         for value, best, low, high in zip(errors[label], lowest, least[label], most[label], strict=True):
             trainings_of = span(scientific, low, high) if low < high and not missing(value) else ""
-            found.append(TableCell(scientific(value), range=trainings_of, strong=value == best))
-        lines.append(method_row(method, setting, found))
+            line.append(TableCell(scientific(value), range=trainings_of, strong=value == best))
+        lines.append(method_row(method, setting, line))
     head = ["method", *(plain(str(name)) for name in errors["fabric"])]
     return table("by_fabric", head, by_method(lines), {**values, "role": role}, role)
 
@@ -249,11 +249,11 @@ def _equal_time(frame: pd.DataFrame, values: _Values) -> list[ResultTable]:
         for key, group in part.groupby(["method", "setting", "rival"], sort=False):
             method, setting, rival = map(str, key)
             at = {row.size: row for row in rows(group)}
-            found = [TableCell(display(rival))]
+            line = [TableCell(display(rival))]
             for row in map(at.__getitem__, sizes):
                 other = "too slow" if missing(row.rival_error) else times(row.ratio)
-                found.append(TableCell(f"{percent(row.error)} · {other}", strong=row.ratio < 1.0))
-            lines.append(method_row(method, setting, found))
+                line.append(TableCell(f"{percent(row.error)} · {other}", strong=row.ratio < 1.0))
+            lines.append(method_row(method, setting, line))
         known = {**values, "measure": measure.capitalize()}
         tables.append(table("equal_time", ["method", "rival", *sizes], lines, known, measure))
     return tables
@@ -449,7 +449,7 @@ def truth_facts(records: Sequence[Record]) -> dict[str, object]:
 
 
 def measured(
-    name: str, kept: RowRecords[Any], found: Iterable[Any], values: _Values, last: Column | None = None
+    name: str, kept: RowRecords[Any], objects: Iterable[Any], values: _Values, last: Column | None = None
 ) -> ResultTable:
     """Return the table of rows that are kept as Records: what names a row, then its metrics as the catalogue says."""
     named = [*(["fabric"] if any(part.name == "fabric" for part in fields(kept.row)) else [])]
@@ -459,7 +459,7 @@ def measured(
         about = METRICS[metric]
         ends = ("", "") if index else ("low", "high")
         columns.append(number(field, about.title, FORMATS[about.format], ends))
-    return of_rows(name, found, [*columns, *([last] if last else [])], values)
+    return of_rows(name, objects, [*columns, *([last] if last else [])], values)
 
 
 _MARKS: Final = {"below": " ✓", "above": " ✗", "open": ""}

@@ -71,14 +71,14 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
         mse, spread = _mean_error(group)
         baseline = _baseline(wide, role, set(group["fabric"]))
         base, base_spread = _mean_error(baseline)
-        found = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
+        ratios = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
         row = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
         row |= {"queries": int(group["count"].sum()), "mse": mse, "standard_error": spread}
         row |= {"low": mse - 1.96 * spread, "high": mse + 1.96 * spread}
         measured, noise = (float(group[name].mean()) for name in ("mse_measured", "truth_noise"))
         row |= {"mse_measured": measured, "truth_noise": noise}
         row["noise_share"] = noise / measured if measured > 0 else math.nan
-        row |= dict(zip(("ratio", "ratio_low", "ratio_high"), found, strict=True))
+        row |= dict(zip(("ratio", "ratio_low", "ratio_high"), ratios, strict=True))
         row |= {name: group[name].mean() if name in group else math.nan for name in _MEANS}
         row |= columns_over_fabrics(group, baseline)
         result.append(row)
@@ -112,10 +112,10 @@ def picture_table(records: Sequence[Record]) -> pd.DataFrame:
     """
     records = first_training(records)
     columns = [*_KEYS, "role", "fabric", "scene", "mse", "mse_measured", "truth_noise"]
-    found = [part for part in (_wide(records, scene) for scene in ("sphere", "plane")) if "mse" in part]
-    if not found:
+    parts = [part for part in (_wide(records, scene) for scene in ("sphere", "plane")) if "mse" in part]
+    if not parts:
         return pd.DataFrame(columns=columns)
-    return pd.concat([part[part["mse"].notna()] for part in found], ignore_index=True).reindex(columns=columns)
+    return pd.concat([part[part["mse"].notna()] for part in parts], ignore_index=True).reindex(columns=columns)
 
 
 @over_seeds([*_KEYS, "role"], columns_of("aliasing"))
@@ -157,11 +157,11 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
         wide = wide.merge(part.reset_index(), on=keys)
     wide = wide[[*keys, *metrics, *ends]]
     base = wide[of_baseline(wide)].set_index("scene")["mse"]
-    found = wide["mse"].where(wide["mse"] > 0)
-    wide["ratio"] = wide["scene"].map(base) / found
+    positive = wide["mse"].where(wide["mse"] > 0)
+    wide["ratio"] = wide["scene"].map(base) / positive
     wide["front"] = False
     for _, group in wide.groupby("scene"):
-        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], found[group.index], strict=True)))
+        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], positive[group.index], strict=True)))
     return wide.rename_axis(columns=None)
 
 
@@ -237,9 +237,9 @@ def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float
         if record.metric == "spectrum":
             curves.setdefault((record.method, record.setting), []).append(np.array(record.curve))
     return {
-        key: [(float(k), float(p)) for k, p in np.mean(found, axis=0)]
-        for key, found in curves.items()
-        if len({len(curve) for curve in found}) == 1
+        key: [(float(k), float(p)) for k, p in np.mean(parts, axis=0)]
+        for key, parts in curves.items()
+        if len({len(curve) for curve in parts}) == 1
     }
 
 
@@ -381,10 +381,10 @@ def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, 
     figures = {"ratio": other.to_numpy() / errors["mse"].to_numpy()}
     # A component that is nowhere seen on a fabric has no error there.
     figures |= {name: errors[name].dropna().to_numpy() for name in ERRORS if name in errors}
-    found = {name: over_fabrics(figures.get(name, ())) for name in ("ratio", *ERRORS)}
+    means = {name: over_fabrics(figures.get(name, ())) for name in ("ratio", *ERRORS)}
     return {
         f"{name}_fabrics{end}": number
-        for name, three in found.items()
+        for name, three in means.items()
         for end, number in zip(("", "_low", "_high"), three, strict=True)
     }
 

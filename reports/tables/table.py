@@ -123,12 +123,12 @@ def cells(row: Any, columns: Iterable[Column]) -> tuple[TableCell, ...]:
     return tuple(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in made)
 
 
-def method_row(method: str, setting: str, found: Iterable[TableCell]) -> TableRow:
+def method_row(method: str, setting: str, made: Iterable[TableCell]) -> TableRow:
     """Return the row of a method."""
     kind = "baseline" if (method, setting) == BASELINE else ""
     return TableRow(
         "the truth" if method == TRUTH else display(method, setting),
-        tuple(found),
+        tuple(made),
         method,
         setting.replace(" ", NO_BREAK),
         kind,
@@ -160,11 +160,11 @@ def of_methods(
 
 
 def of_rows(
-    name: str, found: Iterable[Any], columns: Sequence[Column], values: Mapping[str, object], key: str = ""
+    name: str, objects: Iterable[Any], columns: Sequence[Column], values: Mapping[str, object], key: str = ""
 ) -> ResultTable:
     """Return the table of any objects, whose first column labels the rows; those that do not hold are marked."""
     lines = []
-    for row in found:
+    for row in objects:
         label, *others = cells(row, columns)
         lines.append(TableRow(label.text, tuple(others), kind="" if getattr(row, "holds", True) else "marked"))
     return table(name, [column.title for column in columns], lines, values, key)

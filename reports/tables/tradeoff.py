@@ -57,16 +57,16 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
     parts: list[pd.DataFrame] = []
     for _, group in errors.groupby("role", sort=False):
         whole = group[group["fabrics"] == group["fabrics"].max()]
-        found = whole.merge(timing, on=["method", "setting"]).merge(moving[[*keys, "flicker"]], on=keys, how="left")
-        found = found.rename(columns={"median_ns": "ns", "colour_rrmse": "error"})
-        found = found.rename(columns={f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)})
-        found["error"] = found["error"].where(found["error"] > 0)
-        found["flicker"] = found["flicker"].astype(float).abs()
+        part = whole.merge(timing, on=["method", "setting"]).merge(moving[[*keys, "flicker"]], on=keys, how="left")
+        part = part.rename(columns={"median_ns": "ns", "colour_rrmse": "error"})
+        part = part.rename(columns={f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)})
+        part["error"] = part["error"].where(part["error"] > 0)
+        part["flicker"] = part["flicker"].astype(float).abs()
         for name, cost, fault in (
             ("front", "ns", "error"), ("front_flicker", "ns", "flicker"), ("front_bytes", "bytes_stored", "error"),
         ):  # fmt: skip
-            found[name] = front(list(zip(found[cost], found[fault], strict=True)))
-        parts.append(found[[*COLUMNS]])
+            part[name] = front(list(zip(part[cost], part[fault], strict=True)))
+        parts.append(part[[*COLUMNS]])
     return pd.concat(parts, ignore_index=True)
 
 
