@@ -25,7 +25,7 @@ from reports.truth.stability import (
 EXPRESSIONS = list(expressions())
 
 
-@pytest.mark.parametrize("name", {expression.name for expression in EXPRESSIONS})
+@pytest.mark.parametrize("name", dict.fromkeys(expression.name for expression in EXPRESSIONS))
 def test_corners_hold(name):
     findings = [finding for row in EXPRESSIONS if row.name == name for finding in judged(row)]
     assert findings
