@@ -1,4 +1,4 @@
-"""`README.md` and `load.py` of a published data set: its card, with the header that data hubs read, and a loader."""
+"""Card of a published data set (`README.md`) with the header that data hubs read, `load.py` and `CITATION.cff`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import yaml
 
-from jobs.verbs.publish.about import About
-from jobs.verbs.publish.contents import POPULATIONS
+from jobs.verbs.publish.contents import POPULATIONS, About
 from jobs.verbs.publish.licence import hub_licence, licence_url
 from pipeline.shards.joined import columns_joined
 
@@ -142,3 +141,22 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     """Return a Markdown table; the first row is its head."""
     lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return "\n".join([lines[0], "|" + " --- |" * len(rows[0]), *lines[1:]])
+
+
+def citation(about: About) -> str:
+    """Return the text of ``CITATION.cff``, in the Citation File Format 1.2."""
+    content = {
+        "cff-version": "1.2.0",
+        "message": "If you use this data set, please cite it as below.",
+        "type": "dataset",
+        "title": about.title,
+        "authors": [{"name": name} for name in about.authors],
+        "abstract": about.summary,
+        "version": about.version,
+        "license": about.licence,
+        "keywords": ["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
+        "identifiers": [
+            {"type": "other", "value": about.manifest.fingerprint, "description": "Fingerprint of all that shaped it"}
+        ],
+    }
+    return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120))

@@ -1,4 +1,4 @@
-"""Files of a published data set: which shards are joined in which file.
+"""Files of a published data set: which shards are joined in which file; and the facts that several files share.
 
 A file holds whole fabrics of one role and one split. Research repositories take about a hundred files, so fabrics share
 a file if there are many.
@@ -79,3 +79,61 @@ def _cut(names: list[str], groups: int) -> Iterator[list[str]]:
     """Yield names in groups of almost equal number."""
     for group in range(groups):
         yield names[len(names) * group // groups : len(names) * (group + 1) // groups]
+
+
+class About(NamedTuple):
+    """Facts of a published data set.
+
+    Attributes
+    ----------
+    manifest : Manifest
+        Its fabrics, roles and options.
+    parts : list of PublishedPart
+        Its files of rows.
+    licence : str
+        SPDX identifier.
+    authors : tuple of str
+        Names.
+    truth_version : int
+        Version of the ground truth that answered the rows; 0 if the shards do not name it.
+    """
+
+    manifest: Manifest
+    parts: list[PublishedPart]
+    licence: str
+    authors: tuple[str, ...]
+    truth_version: int
+
+    @property
+    def title(self) -> str:
+        """Title of the data set."""
+        return f"Twillight {self.manifest.name}: ground truth of the appearance of woven cloth"
+
+    @property
+    def summary(self) -> str:
+        """Description of the data set in two sentences."""
+        return (
+            f"{self.rows:,} queries of the patch BSDF of {len(self.manifest.fabrics)} woven fabrics: a footprint, a "
+            "direction to the light and one to the viewer, and the light that the cloth returns, computed from its "
+            "weave and its yarns. Every answer has a standard error and a bound of its error."
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(part.rows for part in self.parts)
+
+    @property
+    def version(self) -> str:
+        """Version: that of the columns, that of the ground truth, and 0."""
+        return f"{self.manifest.schema_version}.{self.truth_version}.0"
+
+    @property
+    def configs(self) -> dict[str, list[str]]:
+        """Splits of each role that has rows."""
+        found: dict[str, list[str]] = {}
+        for part in self.parts:
+            splits = found.setdefault(part.role, [])
+            if part.split not in splits:
+                splits.append(part.split)
+        return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
-from jobs.verbs.publish.about import About
+from jobs.verbs.publish.contents import About
 from jobs.verbs.publish.licence import licence_url
 from pipeline.shards.joined import columns_joined
 

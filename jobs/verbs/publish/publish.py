@@ -17,10 +17,8 @@ from rich.progress import track
 from jobs.console import size
 from jobs.terminal import Terminal
 from jobs.verbs.parameters import NOTHING
-from jobs.verbs.publish.about import About
-from jobs.verbs.publish.card import LOADER, card
-from jobs.verbs.publish.citation import citation
-from jobs.verbs.publish.contents import PublishedPart, own_shards, parts_of
+from jobs.verbs.publish.card import LOADER, card, citation
+from jobs.verbs.publish.contents import About, PublishedPart, own_shards, parts_of
 from jobs.verbs.publish.croissant import croissant
 from jobs.verbs.publish.licence import licence_id
 from jobs.verbs.publish.recipe import recipe_files
