@@ -24,17 +24,13 @@ class TruthNoise(Measurement):
 
     kind: Literal["truth noise"] = "truth noise"
     fabric: Coloured
-    """The fabric."""
     role: Role
-    """Role of the fabric."""
     dataset: HeldOutRows
     """Held-out queries of the fabric."""
     errors: ErrorOptions
     """Number of these queries."""
     frames: Made
-    """The truth's frames."""
     frame_options: FrameOptions
-    """Options of the frames."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -42,9 +38,7 @@ class TruthNoise(Measurement):
         bench = subjects.recipe.bench
         for subject in subjects.fabrics:
             yield cls(
-                fabric=subject.fabric,
-                role=subject.role,
-                dataset=subject.dataset,
+                **vars(subject),
                 errors=select(ErrorOptions, bench),
                 frames=TruthFrames.of(subject.fabric, subjects.recipe).made,
                 frame_options=select(FrameOptions, bench),
@@ -66,31 +60,22 @@ class OnFabric(Measurement):
 
     kind: Literal["errors"] = "errors"
     model: Trained
-    """The model."""
     ways: RunOptions
-    """Ways to run it that are measured too."""
     fabric: Coloured
-    """The fabric."""
     role: Role
-    """Role of the fabric."""
     dataset: HeldOutRows
     """Held-out queries of the fabric."""
     errors: ErrorOptions
     """Number of these queries."""
     frames: Made
-    """The truth's frames."""
     frame_options: FrameOptions
-    """Options of the frames."""
     views: dict[View, Made]
-    """The truth's pictures."""
     picture_options: PictureOptions
-    """Options of the pictures."""
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     edge: Made | None
     """The truth's edge, where cloth is curved."""
     edge_options: EdgeOptions | None
-    """Options of the edge."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -103,9 +88,7 @@ class OnFabric(Measurement):
                 yield cls(
                     model=trained,
                     ways=model.ways(bench),
-                    fabric=subject.fabric,
-                    role=subject.role,
-                    dataset=subject.dataset,
+                    **vars(subject),
                     errors=select(ErrorOptions, bench),
                     frames=frames.made,
                     frame_options=select(FrameOptions, bench),
@@ -171,11 +154,8 @@ class OnUnseenPopulation(Measurement):
 
     kind: Literal["errors on random fabrics"] = "errors on random fabrics"
     model: Trained
-    """The model."""
     ways: RunOptions
-    """Ways to run it that are measured too."""
     fabrics: tuple[Coloured, ...]
-    """The fabrics."""
     dataset: HeldOutRows
     """Held-out queries of the fabrics."""
     errors: ErrorOptions
@@ -256,13 +236,9 @@ class OfAddedMetric(Measurement):
 
     kind: Literal["added metric"] = "added metric"
     metric: AddedMetric
-    """The metric."""
     model: Trained
-    """The model."""
     fabric: Coloured
-    """The fabric."""
     role: Role
-    """Role of the fabric."""
     dataset: HeldOutRows
     """Held-out queries of the fabric."""
     errors: ErrorOptions
@@ -277,9 +253,7 @@ class OfAddedMetric(Measurement):
                     yield cls(
                         metric=metric,
                         model=trained,
-                        fabric=subject.fabric,
-                        role=subject.role,
-                        dataset=subject.dataset,
+                        **vars(subject),
                         errors=select(ErrorOptions, subjects.recipe.bench),
                     )
 

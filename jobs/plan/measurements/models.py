@@ -25,7 +25,6 @@ class AtExtremes(Measurement):
     kind: Literal["extremes"] = "extremes"
     code: ClassVar = ("truth", "extremes")
     model: Trained
-    """The model."""
     fabrics: tuple[tuple[Uncoloured, Role], ...]
     """One fabric of each role."""
     truth: TruthOptions
@@ -74,13 +73,11 @@ class Latents(Measurement):
     code: ClassVar = ("truth", "bench")
     seconds: ClassVar = 10.0
     model: Trained
-    """The model."""
     presets: tuple[Uncoloured, ...]
     """Presets of the pairs."""
     queries: QueryOptions
     """Distribution of the queries."""
     truth: TruthOptions
-    """Options of the truth."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

@@ -28,7 +28,6 @@ class SceneCloth(TaskPart):
     """A cloth of a scene and how it is laid out."""
 
     fabric: Fabric
-    """The fabric."""
     yarns: tuple[float, float]
     """Yarn spacings in one unit of u and of v."""
     turn: float
@@ -42,7 +41,6 @@ class SceneShot(Reference):
     code: ClassVar = ("truth", "fallback", "scenes", "bench", "scene_bench")  # answers of the fallback are stored
     endings: ClassVar = (".npz", ".exr")
     scene: str
-    """Name of the scene."""
     found: Place
     """Reference to the scene in the recipe: its name, or a path."""
     files: tuple[str, ...]
@@ -114,13 +112,11 @@ class OnScene(Measurement):
     kind: Literal["scene errors"] = "scene errors"
     code: ClassVar = ("fallback", "bench", "scene_bench")
     scene: str
-    """Name of the scene."""
     shot: Made
     """Frames of the scene with the truth's answers."""
     model: Trained
     """The model with one setting."""
     options: SceneErrorOptions
-    """Options of the comparison."""
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     extent: tuple[int, int]
@@ -185,7 +181,6 @@ class FrameTime(Measurement):
     code: ClassVar = ("fallback", "bench")
     seconds: ClassVar = 10.0
     scene: str
-    """Name of the scene."""
     shot: Made
     """Frames of the scene with the truth's answers."""
     models: tuple[Trained, ...]

@@ -52,7 +52,6 @@ class Trained(TaskPart):
     """A model, and the networks that were trained of it."""
 
     options: ModelOptions
-    """The model."""
     networks: tuple[Made, ...] = ()
     """Its trained networks; none where nothing is trained."""
     seed: Annotated[int, PLACE] = 0

@@ -23,7 +23,6 @@ class TimedModel(Trained):
     """A model with all its networks, and the ways to run them that are timed too."""
 
     ways: RunOptions
-    """Ways to run them."""
 
     def not_run(self, methods: list[Method], provenance: Provenance) -> list[Record]:
         """Return a Record for every runtime that this machine lacks."""
@@ -44,7 +43,6 @@ class TimeOfMethods(Measurement):
     timed: ClassVar = True
     code: ClassVar = ("truth", "bench")  # the truth is timed too
     models: tuple[TimedModel, ...]
-    """All models."""
     dataset: HeldOutRows
     """The held-out queries of all fabrics."""
     options: TimingOptions

@@ -26,15 +26,12 @@ class TruthPicture(Reference):
     kind: Literal["truth picture"] = "truth picture"
     code: ClassVar = ("truth", "bench")
     fabric: Coloured
-    """The fabric."""
     scene: View
-    """The view."""
     extent: tuple[int, int]
     """Width and height in pixels."""
     view: ViewOptions
     """Camera, light and scale."""
     truth: TruthOptions
-    """Options of the truth."""
     seed: int
     """Seed of the truth's points."""
 
@@ -81,7 +78,6 @@ class TruthFrames(Reference):
     kind: Literal["truth frames"] = "truth frames"
     code: ClassVar = ("truth", "bench")
     fabric: Coloured
-    """The fabric."""
     options: FrameOptions
     """Options of the frames and of the truth."""
 
@@ -115,7 +111,6 @@ class TruthEdge(Reference):
     kind: Literal["truth edge"] = "truth edge"
     code: ClassVar = ("truth", "bench")
     fabric: Coloured
-    """The fabric."""
     options: EdgeOptions
     """Cylinder, camera, light and truth."""
 
@@ -150,7 +145,6 @@ class LivePage(Reference):
     kind: Literal["live page"] = "live page"
     endings: ClassVar = (".html",)
     fabric: Coloured
-    """The fabric."""
     pixels: int
     """Along each side of the pictures of the truth and of other methods."""
 

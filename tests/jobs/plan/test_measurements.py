@@ -1,6 +1,7 @@
 """Measurements: every kind is planned, read back from its own dump, and says what it depends on."""
 
 from dataclasses import replace
+from importlib import import_module
 from typing import Annotated, Union, get_args
 
 import numpy as np
@@ -60,6 +61,9 @@ def test_what_a_measurement_needs_is_part_of_its_identity(tasks):
 def test_every_study_is_in_a_shipped_recipe():
     named = {name: load_recipe(name).bench.studies for name in ("truth", "mitsuba")}
     assert sorted(named["truth"] + named["mitsuba"]) == sorted(get_args(StudyName))
+    for name in named["truth"] + named["mitsuba"]:
+        module = import_module(f"reports.truth.{name}")
+        assert name == "stability" or (callable(module.measure) and module.RECORDS)
 
 
 @pytest.mark.parametrize(
