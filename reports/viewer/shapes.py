@@ -17,8 +17,6 @@ from pipeline.truth.query import Queries
 Floats = npt.NDArray[np.float64]
 Shape = Literal["plane", "sphere", "drape"]
 
-SHAPES: Final[tuple[Shape, ...]] = ("plane", "sphere", "drape")
-
 VIEW_SPREAD: Final = 0.27
 """Tangent of half the angle of view."""
 

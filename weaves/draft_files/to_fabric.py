@@ -22,7 +22,7 @@ from weaves.fabric import Fabric
 from weaves.validation import validated
 from weaves.yarn import Yarn
 
-NARROWEST: Final = 0.05
+NARROWEST_YARN: Final = 0.05
 """Least width of a yarn, in yarn spacings."""
 
 MOST_SOURCE: Final = 2000
@@ -154,9 +154,9 @@ def _width(
         assumed.append(f"{title}: the file states no thickness; width {yarn.width:g} is that of {like}.")
         return {"width": yarn.width}
     stated = round(threads.width, 4)
-    width = min(max(stated, NARROWEST), 1.0)
+    width = min(max(stated, NARROWEST_YARN), 1.0)
     if width != stated:
-        ratio = f"the thickness is {stated:g} of the spacing, outside of {NARROWEST:g} to 1"
+        ratio = f"the thickness is {stated:g} of the spacing, outside of {NARROWEST_YARN:g} to 1"
         assumed.append(f"{title}: {ratio}; width {width:g} is taken.")
     else:
         read.append(f"{title}: width {width:g} of the spacing.")
