@@ -14,7 +14,7 @@ from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.schema import SCHEMAS
 from pipeline.truth.estimator import ESTIMATORS
-from reports.tables.documents import BLOCK, block, with_block
+from reports.tables.documents import README_BLOCK, block, with_block
 from weaves.fabric import PRESETS, load_fabric
 
 ROOT = Path(__file__).parents[1]
@@ -63,7 +63,7 @@ def test_the_readme_is_one_screen_and_a_half():
 
 
 def test_no_number_of_the_readme_is_typed_by_hand():
-    prose = with_block(text_of(ROOT / "README.md"), BLOCK, "", "README.md")
+    prose = with_block(text_of(ROOT / "README.md"), README_BLOCK, "", "README.md")
     for pattern in (r"<!--.*?-->", r"^    .+$", r"`[^`\n]+`", r"\]\([^)]*\)"):
         prose = re.sub(pattern, "", prose, flags=re.M)
     for name in NAMES_WITH_DIGITS:
@@ -72,7 +72,7 @@ def test_no_number_of_the_readme_is_typed_by_hand():
 
 
 def test_the_readme_shows_the_recipe_quick():
-    assert "Recipe `quick`" in block(text_of(ROOT / "README.md"), BLOCK, "README.md")
+    assert "Recipe `quick`" in block(text_of(ROOT / "README.md"), README_BLOCK, "README.md")
 
 
 def check_links_and_paths_exist(path):

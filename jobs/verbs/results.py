@@ -31,7 +31,7 @@ def results(
         If the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
     from reports.record import read_machine, read_records
-    from reports.tables.documents import BLOCK, block, readme_block, results_page, with_block
+    from reports.tables.documents import README_BLOCK, block, readme_block, results_page, with_block
 
     name = load_recipe(recipe, add).name
     source = records_file(out, name)
@@ -40,8 +40,8 @@ def results(
         if not readme.is_file():
             raise BadInput(str(readme), "", "does not exist", "a Markdown file with a generated block is needed")
         text = read_text(readme, MIB, "a Markdown file")
-        old = block(text, BLOCK, str(readme))
-        fresh = with_block(text, BLOCK, readme_block(records, machine, old, str(source)), str(readme))
+        old = block(text, README_BLOCK, str(readme))
+        fresh = with_block(text, README_BLOCK, readme_block(records, machine, old, str(source)), str(readme))
         if fresh != text:
             atomic_write(readme, fresh.encode())
         outcome = "unchanged" if fresh == text else "written"

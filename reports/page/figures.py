@@ -25,7 +25,7 @@ from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, rows
 
 DPI: Final = 200
-NARROWEST: Final = 8.6
+NARROWEST_PLOT: Final = 8.6
 """Least width of plots in inches: the page shows every plot as wide as its column."""
 
 _ROLES: Final = ("seen", "unseen")
@@ -91,7 +91,9 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     """
     roles = [role for role in _ROLES if role in set(table["role"])]
     places = _places(table)
-    figure, panels = new_figure(max(4.6 * len(roles), NARROWEST), 1.1 + 0.28 * _height(places), len(roles), sharey=True)
+    figure, panels = new_figure(
+        max(4.6 * len(roles), NARROWEST_PLOT), 1.1 + 0.28 * _height(places), len(roles), sharey=True
+    )
     colours = scheme.colours(table["method"])
     for axes, role in zip(panels, roles, strict=True):
         for (method, setting), row in places.items():

@@ -23,7 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 from reports.measure.by_size import SIZES
 from reports.page.colours import Scheme
-from reports.page.figures import NARROWEST, new_figure
+from reports.page.figures import NARROWEST_PLOT, new_figure
 from reports.page.labels import Label, place_labels
 from reports.tables.number_format import display, size
 from reports.tables.summary import PAPER, front, of_baseline, rows
@@ -91,7 +91,7 @@ def _by_role(
     colours = scheme.colours(table["method"])
     paper = paper and bool(of_baseline(table).any())
     height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
-    figure, panels = new_figure(max(4.9 * len(roles), NARROWEST), height, len(roles), sharey=True)
+    figure, panels = new_figure(max(4.9 * len(roles), NARROWEST_PLOT), height, len(roles), sharey=True)
     labels: list[Label] = []
     for axes, role in zip(panels, roles, strict=True):
         own = table[table["role"] == role]
@@ -128,7 +128,7 @@ def _against_time(
     measures = {name: label for name, label in measures.items() if (table[name] > 0).any()}
     colours = scheme.colours(table["method"])
     height = 0.6 + 2.4 * len(measures) + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
-    width = max(2.3 * len(panels), NARROWEST)
+    width = max(2.3 * len(panels), NARROWEST_PLOT)
     figure, flat = new_figure(width, height, len(panels), sharey=True, lines=len(measures))
     grid = np.asarray(flat).reshape(len(measures), len(panels))
     for place, ((measure, label), line) in enumerate(zip(measures.items(), grid, strict=True)):

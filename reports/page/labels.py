@@ -24,10 +24,10 @@ from reports.page.colours import Scheme
 
 DISTANCES: Final = (7.0, 13.0, 20.0, 28.0, 38.0, 50.0, 64.0, 80.0, 100.0)
 """From the middle of a mark to the nearest edge of its label, in points."""
-NEAR: Final = 13.0
+UNJOINED: Final = 13.0
 """Largest distance without a line."""
-DIRECTIONS: Final = 48
-FIRST: Final = 225.0
+_DIRECTIONS: Final = 48
+_FIRST: Final = 225.0
 """Direction of the first place, in degrees: below, on the left."""
 CLEARANCE: Final = 1.5
 """Least distance of a label from others, in points."""
@@ -84,7 +84,7 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
         panel = np.array([*axes.bbox.p0, *axes.bbox.p1])
         offset, distance = _free_place(mark, half, np.array(taken), panel, _curves(axes), pixels)
         text.set_position((offset[0] / pixels, offset[1] / pixels))
-        text.arrow_patch.set_visible(distance > NEAR)
+        text.arrow_patch.set_visible(distance > UNJOINED)
         taken.append(np.concatenate([mark + offset - half, mark + offset + half]))
         written.append(text)
     return written
@@ -107,8 +107,8 @@ def _free_place(
         Points along curves.
     """
     # Turns alternate left and right of the first direction.
-    turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(DIRECTIONS)])
-    angles = np.radians(FIRST + turns * 360.0 / DIRECTIONS)
+    turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(_DIRECTIONS)])
+    angles = np.radians(_FIRST + turns * 360.0 / _DIRECTIONS)
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     places = []
     for distance in DISTANCES:

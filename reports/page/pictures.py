@@ -24,12 +24,12 @@ from reports.tables.number_format import beyond_noise, display, scientific
 from reports.tables.summary import BASELINE, rows
 from weaves.colour import LUMINANCE
 
-GAP: Final = 2
+FRAME_GAP: Final = 2
 """Clear pixels between frames."""
 SHOWN: Final = 6
 """Frames of a strip, if there are as many."""
 
-LARGEST: Final = (40, 96)
+LARGEST_CROP: Final = (40, 96)
 """Height and width of the largest crop that `liveliest` chooses, in pixels."""
 
 Bytes8 = npt.NDArray[np.uint8]
@@ -124,11 +124,11 @@ def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
     crop = liveliest(films)
     strips = [_strip(frames[:SHOWN], crop) for frames in films.values()]
     width = max(strip.shape[1] for strip in strips)
-    lines = [np.pad(strip, ((0, GAP), (0, width - strip.shape[1]), (0, 0))) for strip in strips]
-    return png(np.concatenate(lines)[:-GAP])
+    lines = [np.pad(strip, ((0, FRAME_GAP), (0, width - strip.shape[1]), (0, 0))) for strip in strips]
+    return png(np.concatenate(lines)[:-FRAME_GAP])
 
 
-def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int, int] = LARGEST) -> Crop:
+def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int, int] = LARGEST_CROP) -> Crop:
     """Return the rectangle of at most `largest` (height, width) pixels in which most changes from frame to frame.
 
     The rectangle, of all that lie an eighth of it apart, with the largest sum of the luminance's variance over frames,
@@ -150,6 +150,6 @@ def _strip(frames: npt.NDArray[np.floating], crop: Crop) -> Bytes8:
     codes = encoded(EXPOSURE * frames[:, top : top + height, left : left + width])
     opaque = np.concatenate([codes, np.full((*codes.shape[:3], 1), 255, np.uint8)], axis=-1)
     over_time = opaque[np.arange(height) * len(opaque) // height, height // 2]
-    clear = np.zeros((height, GAP, 4), np.uint8)
+    clear = np.zeros((height, FRAME_GAP, 4), np.uint8)
     parts = [part for frame in opaque for part in (frame, clear)]
     return np.concatenate([*parts, clear, clear, over_time], axis=1)

@@ -1,7 +1,7 @@
 """Documents from the Records of one page: the table of README.md, and all tables as reports/RESULTS.md.
 
 Errors and flicker are the same in every run on one machine. Times are not: in README.md a time that is printed already
-is kept while the new one lies within `TOLERANCE` of it, so that a fresh run of the same recipe changes no byte.
+is kept while the new one lies within `TIME_TOLERANCE` of it, so that a fresh run of the same recipe changes no byte.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from reports.tables.summary import (
 from reports.tables.table import WORDS, markdown_table, paragraphs
 from weaves.errors import BadInput
 
-BLOCK: Final = "quick"
+README_BLOCK: Final = "quick"
 """Name of the block in README.md."""
 
-TOLERANCE: Final = 1.25
+TIME_TOLERANCE: Final = 1.25
 """Factor by which a time may differ from the one that is printed."""
 
 README_METHODS: Final[Mapping[tuple[str, str], str]] = {
@@ -154,12 +154,12 @@ def two_decimals(value: float) -> str:
 
 
 def kept_time(printed: str, fresh: float) -> str:
-    """Return a ratio of times with two digits; the one that is printed if the new one is within `TOLERANCE` of it."""
+    """Return a ratio of times with two digits; the printed one if the new one is within `TIME_TOLERANCE` of it."""
     try:
         old = float(printed.removesuffix("×").replace(",", ""))
     except ValueError:
         return times(fresh)
-    near = math.isfinite(fresh) and fresh > 0 and old > 0 and 1 / TOLERANCE <= fresh / old <= TOLERANCE
+    near = math.isfinite(fresh) and fresh > 0 and old > 0 and 1 / TIME_TOLERANCE <= fresh / old <= TIME_TOLERANCE
     return printed if near else times(fresh)
 
 

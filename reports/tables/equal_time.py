@@ -2,8 +2,8 @@
 
 A rival is a method with a parameter: its settings are a curve of error against time, taken at the very time of the
 method by straight lines in both logarithms between settings, of which only those count that no faster one beats. Before
-its fastest setting a rival has no answer; beyond its slowest it keeps that setting's error. Every setting of `OURS` is
-compared with its rivals too: what it promises is a lower error at every time.
+its fastest setting a rival has no answer; beyond its slowest it keeps that setting's error. Every setting of
+`OWN_CURVE` is compared with its rivals too: what it promises is a lower error at every time.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from reports.over_seeds import mean_over_seeds
 from reports.record import Record
 from reports.tables.summary import rows
 
-OURS: Final = "soft_nodes"
+OWN_CURVE: Final = "soft_nodes"
 """The method with a parameter whose own settings are compared."""
 
-COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
+_COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
 
 
 def size_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -44,7 +44,7 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
 
 
 def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
-    """Return every method without settings, and each of `OURS`, beside every method with them, at its time.
+    """Return every method without settings, and each of `OWN_CURVE`, beside every method with them, at its time.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
     for (method, size), part in sizes.groupby(["method", "size"], sort=False):
         if len(part) > 1:
             curves[str(method), str(size)] = part
-        if len(part) == 1 or method == OURS:
+        if len(part) == 1 or method == OWN_CURVE:
             single.append(part)
     lines = []
     for measure, row in itertools.product(MEASURES, rows(pd.concat(single)) if single else ()):
@@ -73,7 +73,7 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
                 other = error_at([(float(t), float(e)) for t, e in points], row.ns)
                 ratio = other / own if own > 0 else math.nan
                 lines.append((measure, row.method, row.setting, size, row.ns, own, rival, other, ratio))
-    return pd.DataFrame(lines, columns=list(COLUMNS))
+    return pd.DataFrame(lines, columns=list(_COLUMNS))
 
 
 def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:

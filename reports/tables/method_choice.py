@@ -23,7 +23,7 @@ import pandas as pd
 from reports.measure.by_size import WHOLE
 from reports.tables.summary import front, rows
 
-COLUMNS = ("method", "setting", "error", "ms", "fallback", "known")
+_COLUMNS = ("method", "setting", "error", "ms", "fallback", "known")
 
 MEASURED, PREDICTED = "measured here", "from its footprints"
 """How the numbers of a row are known."""
@@ -69,17 +69,17 @@ def predictions(
         total = math.sqrt((1.0 - left) * squared + left * error**2)
         time = 1e-6 * queries * ((1.0 - left) * own + left * ns)
         lines.append((method, setting, total, time, left, PREDICTED))
-    return _with_front(pd.DataFrame(lines, columns=list(COLUMNS)))
+    return _with_front(pd.DataFrame(lines, columns=list(_COLUMNS)))
 
 
 def with_measured(table: pd.DataFrame, scenes: pd.DataFrame, scene: str) -> pd.DataFrame:
     """Return predictions, replaced by measurements in the scene itself where there are any (`summary.scene_table`)."""
     here = scenes[(scenes["scene"] == scene) & scenes["colour_rrmse"].notna() & scenes["frame_time"].notna()]
     names = {"colour_rrmse": "error", "frame_time": "ms", "fallback_share": "fallback"}
-    measured = here.rename(columns=names).assign(known=MEASURED)[list(COLUMNS)]
+    measured = here.rename(columns=names).assign(known=MEASURED)[list(_COLUMNS)]
     known = set(zip(measured["method"], measured["setting"], strict=True))
     others = [key not in known for key in zip(table["method"], table["setting"], strict=True)]
-    parts = [part for part in (measured, table.loc[others, list(COLUMNS)]) if len(part)]
+    parts = [part for part in (measured, table.loc[others, list(_COLUMNS)]) if len(part)]
     return _with_front(pd.concat(parts, ignore_index=True) if parts else table)
 
 
@@ -91,7 +91,7 @@ def _with_front(table: pd.DataFrame) -> pd.DataFrame:
 
 def of_method(table: pd.DataFrame, method: str) -> pd.DataFrame:
     """Return the rows of one method, which is on its own front."""
-    return _with_front(table.loc[table["method"] == method, list(COLUMNS)])
+    return _with_front(table.loc[table["method"] == method, list(_COLUMNS)])
 
 
 def cheapest(table: pd.DataFrame, error: float = math.inf, ms: float = math.inf) -> Any | None:

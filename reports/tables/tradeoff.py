@@ -16,7 +16,7 @@ LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 FLICKER_LIMITS: Final = (0.1, 0.01, 0.001)
 """Distances of the flicker from the truth's that the page names the cheapest method for."""
 
-COLUMNS: Final = (
+_COLUMNS: Final = (
     "role",
     "method",
     "setting",
@@ -50,7 +50,7 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
         time), front_bytes (of error and bytes).
     """
     if errors.empty or timing.empty:
-        return pd.DataFrame(columns=[*COLUMNS])
+        return pd.DataFrame(columns=[*_COLUMNS])
     timing = timing[timing["method"] != TRUTH]
     keys = ["method", "setting", "role"]
     moving = aliasing if aliasing is not None and len(aliasing) else pd.DataFrame(columns=[*keys, "flicker"])
@@ -66,7 +66,7 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
             ("front", "ns", "error"), ("front_flicker", "ns", "flicker"), ("front_bytes", "bytes_stored", "error"),
         ):  # fmt: skip
             part[name] = front(list(zip(part[cost], part[fault], strict=True)))
-        parts.append(part[[*COLUMNS]])
+        parts.append(part[[*_COLUMNS]])
     return pd.concat(parts, ignore_index=True)
 
 

@@ -7,7 +7,7 @@ from matplotlib.text import Text
 
 from reports.page.colours import DARK, LIGHT
 from reports.page.figures import new_figure, render
-from reports.page.labels import CLEARANCE, MARK, NEAR, Label, place_labels
+from reports.page.labels import CLEARANCE, MARK, UNJOINED, Label, place_labels
 
 
 def crowded(scheme):
@@ -59,14 +59,14 @@ def test_no_label_covers_a_mark_or_leaves_its_panel(drawn):
 
 
 def test_labels_far_from_their_marks_are_joined_to_them(drawn):
-    """A label without a line touches the ring of `NEAR` points round its mark."""
+    """A label without a line touches the ring of `UNJOINED` points round its mark."""
     figure, texts, boxes = drawn
     joined = [text.arrow_patch.get_visible() for text in texts]
     assert any(joined) and not all(joined)
     for text, box, line in zip(texts, boxes, joined, strict=True):
         x, y = text.axes.transData.transform(text.xy)
         gap = np.hypot(x - np.clip(x, box.x0, box.x1), y - np.clip(y, box.y0, box.y1))
-        assert line or gap <= 1.5 * (NEAR + CLEARANCE) * figure.dpi / 72
+        assert line or gap <= 1.5 * (UNJOINED + CLEARANCE) * figure.dpi / 72
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.content import ModelNote, PageInput, PictureFile
 from reports.page.files import read_files
 from reports.page.page import write_page
-from reports.page.pictures import GAP
+from reports.page.pictures import FRAME_GAP
 from reports.record import OF_A_PAGE, Record, read_machine, read_records, this_machine
 from reports.truth import accuracy, bias, effort
 from reports.truth.finding import RECORDS, judge
@@ -339,10 +339,10 @@ def test_scenes_show_intervals_noise_frames_and_maps(scenes, tmp_path):
     assert {"figures/film-attic.png", f"{stem}-flip.png", f"{stem}-relative.png"} <= set(page.files)
     # Three frames of 32 pixels and their slice over time, all twice as large.
     film = matplotlib.image.imread(tmp_path / "page" / "figures" / "film-attic.png")
-    assert film.shape[:2] == (2 * (3 * 24 + 2 * GAP), 2 * (4 * 32 + 5 * GAP))
+    assert film.shape[:2] == (2 * (3 * 24 + 2 * FRAME_GAP), 2 * (4 * 32 + 5 * FRAME_GAP))
     # Rows are the truth, woven, which is brighter, and points.
     rows = film[::2, ::2, :3]
-    truth, woven, points = (rows[top : top + 24, :32].mean() for top in (0, 24 + GAP, 2 * (24 + GAP)))
+    truth, woven, points = (rows[top : top + 24, :32].mean() for top in (0, 24 + FRAME_GAP, 2 * (24 + FRAME_GAP)))
     assert points < truth < woven
     words = page.words
     assert "cheapest within 10 %: woven (21.6 ms); no method reaches 5 % or 2 %" in words

@@ -10,7 +10,7 @@ import pytest
 
 from reports.images import tiles
 from reports.page.content import PictureFile
-from reports.page.pictures import GAP, MOST_FILMS, SHOWN, Crop, films, filmstrip, liveliest, strips
+from reports.page.pictures import FRAME_GAP, MOST_FILMS, SHOWN, Crop, films, filmstrip, liveliest, strips
 
 
 def file(method, setting="", scene="attic", fabric=""):
@@ -80,14 +80,14 @@ def test_every_row_shows_its_frames_and_a_slice_over_time():
     frames = np.linspace(0.0, 0.6, 8 * 12 * 20 * 3).reshape(8, 12, 20, 3)
     picture = matplotlib.image.imread(io.BytesIO(filmstrip({"truth": frames, "points": frames[::-1]})), format="png")
     shown = np.rint(255 * picture).astype(int)[:: tiles.SCALE, :: tiles.SCALE]
-    assert shown.shape == (2 * 12 + GAP, (SHOWN + 1) * 20 + (SHOWN + 2) * GAP, 4)
+    assert shown.shape == (2 * 12 + FRAME_GAP, (SHOWN + 1) * 20 + (SHOWN + 2) * FRAME_GAP, 4)
     codes = tiles.encoded(tiles.EXPOSURE * frames)
     for row, order in enumerate((range(SHOWN), range(7, 7 - SHOWN, -1))):
-        line = shown[row * (12 + GAP) :][:12]
+        line = shown[row * (12 + FRAME_GAP) :][:12]
         for place, frame in enumerate(order):
-            assert (line[:, place * (20 + GAP) :][:, :20, :3] == codes[frame]).all()
+            assert (line[:, place * (20 + FRAME_GAP) :][:, :20, :3] == codes[frame]).all()
         assert (line[:, -20:, :3] == codes[list(order)][np.arange(12) // 2, 6]).all()
-    assert (shown[12 : 12 + GAP, :, 3] == 0).all()
+    assert (shown[12 : 12 + FRAME_GAP, :, 3] == 0).all()
 
 
 def test_the_liveliest_crop_holds_what_moves():
