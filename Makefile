@@ -49,14 +49,14 @@ test: $(READY)
 QUICK := not slow and not faults and not external
 
 tests: $(READY)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "$(QUICK)" --numprocesses logical --maxprocesses 8 --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "$(QUICK)" --numprocesses logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 # Every test but the faults. CONTRIBUTING.md says how long each lane takes and which change needs it.
 test-all: test test-external test-slow
 
 # Tests that start a server, a cluster, a browser or a compiler.
 test-external: $(READY)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "external and not slow and not faults" --numprocesses 2 --dist loadscope
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "external and not slow and not faults" --numprocesses 2 --dist loadscope --no-loadscope-reorder
 
 # The tests marked slow: long statistics, every kernel compiled from nothing, every recipe made small. Takes long.
 test-slow: $(READY)

@@ -14,6 +14,17 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "_
 STARTED = {"cpp", "selvage_cpp", "neumip_cpp", "webgl", "browse", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
 
+LONG = (
+    "tests/jobs/test_smoke.py",
+    "tests/jobs/verbs/render/",
+    "tests/pipeline/models/",
+    "tests/pipeline/analytic/",
+    "tests/pipeline/truth/",
+    "tests/pipeline/training/",
+    "tests/reports/",
+)
+"""Folders with long tests and kernels to compile: they start first, so that no core waits for one at the end."""
+
 QUICK = "not slow and not faults and not external"
 """The lane of `make test`, whose number of tests has a budget."""
 
@@ -21,6 +32,11 @@ QUICK = "not slow and not faults and not external"
 def pytest_itemcollected(item):
     if STARTED.intersection(getattr(item, "fixturenames", ())):
         item.add_marker(pytest.mark.external)
+
+
+def pytest_collection_modifyitems(items):
+    order = {start: index for index, start in enumerate(LONG)}
+    items.sort(key=lambda item: next((order[start] for start in LONG if item.nodeid.startswith(start)), len(LONG)))
 
 
 def pytest_collection_finish(session):

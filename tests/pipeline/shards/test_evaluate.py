@@ -154,7 +154,7 @@ def test_a_method_in_place_of_the_truth_answers_on_all_threads(case):
     together = Barrier(2)
 
     def answer(queries):
-        together.wait(timeout=20.0)
+        together.wait(timeout=300.0)
         return np.tile(queries.sigma[:, None], (1, 4)), queries.sigma
 
     columns = query_columns(40)

@@ -51,7 +51,7 @@ def test_methods_take_turns_after_the_warm_up():
 
 def test_on_several_threads_each_makes_the_call_at_the_same_time():
     """A barrier of three lets nobody through unless three threads are in the call at once."""
-    barrier, names = threading.Barrier(3, timeout=5), set()
+    barrier, names = threading.Barrier(3, timeout=300), set()
 
     def predict(fabric, queries):
         names.add(threading.current_thread().name)
