@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import entry_points
 from typing import Any, Final
 
-from pipeline.models.added.added_code import ADDED, GROUP, AddedFunction, AddedMethod
+from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, AddedMethod
 from pipeline.models.added.describe import describe
-from pipeline.models.added.source import WHERE
-from pipeline.models.catalogue import CLASSES, REPLACED
+from pipeline.models.added.source import ADD
+from pipeline.models.catalogue import CLASSES, REPLACED_MODELS
 from reports.added_metric import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
@@ -45,18 +45,18 @@ class Added:
             source = text if ":" in text else _installed().get(text)
             if source is None:
                 known = f"installed: {', '.join(sorted(_installed()))}" if _installed() else "none is installed"
-                raise BadInput(WHERE, "", text, f"no method of this name; {known}; MODULE:NAME or FILE.py:NAME?")
+                raise BadInput(ADD, "", text, f"no method of this name; {known}; MODULE:NAME or FILE.py:NAME?")
             method = describe(source, {}, {})
             if isinstance(method, AddedFunction):
                 metric = validated(AddedMetric, method.model_dump(), text)
                 if metric.name in [one.name for one in self.metrics]:
-                    raise BadInput(WHERE, "", text, f"a metric {metric.name!r} is given twice")
+                    raise BadInput(ADD, "", text, f"a metric {metric.name!r} is given twice")
                 self.metrics.append(metric)
                 continue
-            if method.name in CLASSES or method.name == ADDED:
-                raise BadInput(WHERE, "", text, f"its name {method.name!r} is that of a method of the package")
+            if method.name in CLASSES or method.name == ADDED_MODEL:
+                raise BadInput(ADD, "", text, f"its name {method.name!r} is that of a method of the package")
             if method.name in self._given:
-                raise BadInput(WHERE, "", text, f"a method {method.name!r} is given twice")
+                raise BadInput(ADD, "", text, f"a method {method.name!r} is given twice")
             self._given[method.name] = method
 
     def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
@@ -118,6 +118,6 @@ def _installed() -> dict[str, str]:
 
 def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:
     """Return what is allowed in place of an unknown name."""
-    if model in REPLACED:
-        return f"this method is gone: take {REPLACED[model]!r}"
+    if model in REPLACED_MODELS:
+        return f"this method is gone: take {REPLACED_MODELS[model]!r}"
     return f"code of your own is given with --add FILE.py:CLASS; {nearest(model, known)}"

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from pipeline.models.added.added_code import ADDED
+from pipeline.models.added.added_code import ADDED_MODEL
 from pipeline.models.domain import PHYSICS, Domain
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
@@ -92,7 +92,7 @@ def _taken_over(
         allowed = f"must be a model of the recipe {trainer.name}; {nearest_name(str(name), list(known))}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
     model, options = known[name], known[name].options
-    kind = options.name if options.model == ADDED else options.model
+    kind = options.name if options.model == ADDED_MODEL else options.model
     if entry.get("model", kind) != kind:
         allowed = f"{name} is {kind} in the recipe {trainer.name}"
         raise BadInput(where, f"{key}.model", entry["model"], allowed)

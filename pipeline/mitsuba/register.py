@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from pipeline.mitsuba.bsdf import BSDF, bsdf_class
 from pipeline.mitsuba.integrator import INTEGRATOR, integrator_class
-from pipeline.models.patch_bsdf import USUAL
+from pipeline.models.patch_bsdf import USUAL_METHOD
 from pipeline.scenes.loading import Loaded
 from pipeline.scenes.scene import PREFIX
 from pipeline.scenes.variant import llvm_works
@@ -44,7 +44,7 @@ def register() -> Any:
     return mi
 
 
-def dress(loaded: Loaded, method: str = USUAL) -> Any:
+def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     """Let the shapes of a loaded scene, which is changed, wear their cloth as a BSDF; return Mitsuba's scene."""
     mi = register()
     worn = {}

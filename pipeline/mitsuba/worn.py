@@ -32,7 +32,7 @@ from pipeline.cores import cores
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import TRUTH, named_method
 from pipeline.models.network import one_thread
-from pipeline.models.patch_bsdf import USUAL, PatchBSDF, Sample
+from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers
@@ -69,7 +69,7 @@ class ClothOptions(BaseModel):
 
     fabric: str
     """A preset, or the path of a fabric's TOML."""
-    method: str = USUAL
+    method: str = USUAL_METHOD
     """The method that evaluates the cloth: a model that comes with the package or learns nothing, with ``:k`` for a
     setting; the folder of a trained model; or ``truth``."""
     yarns: Yarns = 100.0

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
-from pipeline.models.method import CHUNK, Method
+from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.models.network import one_thread
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -44,16 +44,16 @@ class AllCores:
         self.method.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries in runs of `CHUNK`, float32 (N, 4); each run but the first has a seed of its own."""
-        starts = range(CHUNK, len(queries.u), CHUNK)
+        """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own."""
+        starts = range(CHUNK_ROWS, len(queries.u), CHUNK_ROWS)
 
         def answer(start: int) -> npt.NDArray[np.float32]:
             own = int(fingerprint([seed, start]), 16)
-            return self.method.predict(fabric, queries.take(slice(start, start + CHUNK)), own)
+            return self.method.predict(fabric, queries.take(slice(start, start + CHUNK_ROWS)), own)
 
         with one_thread():
             # Before any thread starts, the first run loads kernels and tabulates the fabric.
-            first = self.method.predict(fabric, queries.take(slice(CHUNK)), seed)
+            first = self.method.predict(fabric, queries.take(slice(CHUNK_ROWS)), seed)
             if not starts:
                 return first
             with ThreadPoolExecutor(self._threads) as pool:

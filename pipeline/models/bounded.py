@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.method import CHUNK, Method, refuse_other
+from pipeline.models.method import CHUNK_ROWS, Method, refuse_other
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
@@ -61,8 +61,8 @@ class Bounded:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
         refuse_other(queries, self.name, ("stretch",))
         result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
-        for start in range(0, len(result), CHUNK):
-            rows = slice(start, start + CHUNK)
+        for start in range(0, len(result), CHUNK_ROWS):
+            rows = slice(start, start + CHUNK_ROWS)
             result[rows] = limited(result[rows], read_queries(table, queries.take(rows)).bounds)
         return result
 

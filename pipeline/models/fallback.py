@@ -7,7 +7,7 @@ form: they are out of the method's domain (`pipeline.models.domain`), and the fa
 queries is part of every result. A method with a function `outside_domain` answers them itself. A method that `turns`
 answers a viewer behind the cloth as one in front of the cloth's back.
 
-The fallback is a node table of the ground truth with other nodes (`NODES` is odd, the truth's numbers are even) and
+The fallback is a node table of the ground truth with other nodes (`_NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. Queries
 that the table does not know, such as cloth that turns across a footprint, thin footprints and irregular drafts, go to
 the estimator `quadrature`.
@@ -33,19 +33,19 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-NODES: Final = 15
+_NODES: Final = 15
 """Nodes a yarn spacing: 1 to 3 % off in the shipped scenes (RMSE over the mean), at some 30 microseconds a query."""
 
-AZIMUTHS: Final = 96
+_AZIMUTHS: Final = 96
 """Directions in which horizons are known."""
 
-TABLE: Final = NodeTable(lambda cells: NODES, AZIMUTHS, COARSE_LINE)
+TABLE: Final = NodeTable(lambda cells: _NODES, _AZIMUTHS, COARSE_LINE)
 """The table of the fallback."""
 
 QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=0.1)
 """Options of the estimator for queries that the table cannot answer: typically 2 % off, at .1 ms a query."""
 
-FLAT: Final = 0.1
+FLAT_TURN: Final = 0.1
 """Radians that cloth may turn across a footprint's deviation and count as flat. In the shipped scenes that changes
 answers by .1 to .3 % with the light behind and by 1 % with it in front; at grazing angles by up to 7 %."""
 
@@ -58,7 +58,7 @@ def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
 def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     """Return the components and the transparency of N queries of any kind, float32 (N, 5)."""
     turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
-    flat = queries._replace(curvature=np.where(turned <= FLAT, np.float32(0.0), queries.curvature))
+    flat = queries._replace(curvature=np.where(turned <= FLAT_TURN, np.float32(0.0), queries.curvature))
     result, left = np.empty((len(queries.u), 5), np.float32), np.ones(len(queries.u), np.bool_)
     for behind in (False, True):
         rows = np.flatnonzero((queries.wo[:, 2] < 0.0) == behind)

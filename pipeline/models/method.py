@@ -12,7 +12,7 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-CHUNK = 4096
+CHUNK_ROWS = 4096
 """Rows of one inference on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
 
 _ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ

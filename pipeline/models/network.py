@@ -16,7 +16,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import CHUNK, Method
+from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -182,7 +182,7 @@ def in_chunks(
     """
     result = np.empty((len(queries.u), width), np.float32)
     arrays = [getattr(queries, name) for name in columns]
-    chunk = CHUNK if device.type == "cpu" else GPU_CHUNK
+    chunk = CHUNK_ROWS if device.type == "cpu" else GPU_CHUNK
     with torch.inference_mode():
         for start in range(0, len(result), chunk):
             rows = slice(start, start + chunk)

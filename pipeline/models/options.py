@@ -40,20 +40,43 @@ def setting_of(k: int | None) -> str:
     return "" if k is None else f"k = {k}"
 
 
-class Options(BaseModel):
-    """Options of a model."""
+class Design(BaseModel):
+    """A design: options, and choices that are no options but part of its identity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    fixed: ClassVar[tuple[str, ...]] = ()
+    """Names of the choices of its design that are no options; identities and cards state them beside the options."""
+    newer: ClassVar[tuple[str, ...]] = ()
+    """Options that identities leave out at their defaults: trainings of earlier versions keep theirs."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_fixed(cls, given: Any) -> Any:
+        """Accept choices that a card states, if they are those of this version."""
+        if not isinstance(given, dict):
+            return given
+        return {key: value for key, value in given.items() if key not in cls.fixed or value != getattr(cls, key)}
+
+    @model_serializer(mode="wrap")
+    def _identified(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        """Return the options; as an identity with all choices of the design."""
+        content: dict[str, Any] = dump(self)
+        if info.context != IDENTITY:
+            return content
+        usual = [key for key in self.newer if getattr(self, key) == type(self).model_fields[key].default]
+        content |= {key: getattr(self, key) for key in self.fixed}
+        return {key: value for key, value in content.items() if key not in usual}
+
+
+class Options(Design):
+    """Options of a model."""
 
     model: str = ""
     """Name of its folder or file in `pipeline.models`."""
     name: Name = Field(default_factory=lambda options: options["model"])
     """Name in tables and files, and of the trained model."""
 
-    fixed: ClassVar[tuple[str, ...]] = ()
-    """Names of the choices of its design that are no options; identities and cards state them beside the options."""
-    newer: ClassVar[tuple[str, ...]] = ()
-    """Options that identities leave out at their defaults: trainings of earlier versions keep theirs."""
     learns: ClassVar[bool] = True
     """True if the model is trained."""
     of_one_material: ClassVar[bool] = False
@@ -119,24 +142,6 @@ class Options(BaseModel):
         if not self.parameter:
             return [self]
         return [self.model_copy(update={self.parameter: [k]}) for k in self.settings]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_fixed(cls, given: Any) -> Any:
-        """Accept choices that a card states, if they are those of this version."""
-        if not isinstance(given, dict):
-            return given
-        return {key: value for key, value in given.items() if key not in cls.fixed or value != getattr(cls, key)}
-
-    @model_serializer(mode="wrap")
-    def _identified(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
-        """Return the options; as an identity with all choices of the design."""
-        content: dict[str, Any] = dump(self)
-        if info.context != IDENTITY:
-            return content
-        usual = [key for key in self.newer if getattr(self, key) == type(self).model_fields[key].default]
-        content |= {key: getattr(self, key) for key in self.fixed}
-        return {key: value for key, value in content.items() if key not in usual}
 
 
 class ComponentLossOptions(Options):

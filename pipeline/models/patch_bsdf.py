@@ -30,7 +30,7 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-USUAL: Final = "soft_nodes:2"
+USUAL_METHOD: Final = "soft_nodes:2"
 """Method that answers unless another one is given."""
 
 _LEAST_DEVIATION = np.float32(1e-3)  # a thousandth of a yarn is a point
@@ -99,7 +99,11 @@ class PatchBSDF:
     """
 
     def __init__(
-        self, fabric: Fabric, method: str | Fallback | TruthAnswers = USUAL, points: int = 8, widening: float = 2.0
+        self,
+        fabric: Fabric,
+        method: str | Fallback | TruthAnswers = USUAL_METHOD,
+        points: int = 8,
+        widening: float = 2.0,
     ) -> None:
         if points < 1:
             raise BadInput("PatchBSDF", "points", points, "must be 1 or more")

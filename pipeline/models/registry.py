@@ -20,7 +20,7 @@ from safetensors import SafetensorError
 from torch import Tensor
 
 from pipeline.fingerprint import IDENTITY
-from pipeline.models.added.added_code import ADDED, AddedMethod
+from pipeline.models.added.added_code import ADDED_MODEL, AddedMethod
 from pipeline.models.analytic.adapter import AnalyticOptions
 from pipeline.models.card import CARD, WEIGHTS, read_card, read_weights
 from pipeline.models.catalogue import CLASSES, ModelOptions
@@ -154,7 +154,7 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
 def load_model(folder: Path) -> list[Method]:
     """Return the methods of one trained folder, options read from its card."""
     card = read_card(folder)
-    if isinstance(about := card.get("options"), dict) and about.get("model") == ADDED:
+    if isinstance(about := card.get("options"), dict) and about.get("model") == ADDED_MODEL:
         allowed = "is a network from outside the package, whose code is not here: measure it with --add"
         raise BadInput(str(folder / CARD), "name", card.get("name"), allowed)
     return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])

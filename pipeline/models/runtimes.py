@@ -9,7 +9,7 @@ All use the same weights. They differ in speed, and some of them in rounding.
     onnx-int8                the same with weights of 8 bits, and activations rounded to 8 bits as they come
 
 A runtime in single precision (`EXACT`) must agree with the method itself: both are compared once for every module, and
-a difference above `TOLERANCE` is refused.
+a difference above `RUNTIME_TOLERANCE` is refused.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import CHUNK, Method
+from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.models.network import PerQuery, Portable
 from pipeline.models.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -37,7 +37,7 @@ from pipeline.truth.query import Queries
 from weaves.errors import WorkFailed
 from weaves.fabric import Fabric
 
-TOLERANCE: Final = 1e-4
+RUNTIME_TOLERANCE: Final = 1e-4
 """Largest difference of values in single precision: norm of the difference over that of the method's values."""
 
 _STREAM = 0x0A57  # of the queries that modules are compiled and compared on
@@ -286,18 +286,18 @@ class RunBy:
         own = self._method.predict(fabric, queries)
         difference = np.linalg.norm(_answered(part, program, queries) - own)
         error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
-        if not error <= TOLERANCE:
+        if not error <= RUNTIME_TOLERANCE:
             raise WorkFailed(
                 f"{self.name} by {self._runtime} on {fabric.name}: answers differ from the method's own by "
-                f"{error:.1e}, beyond {TOLERANCE:g}"
+                f"{error:.1e}, beyond {RUNTIME_TOLERANCE:g}"
             )
 
 
 def _answered(part: PerQuery, program: _Program, queries: Queries) -> npt.NDArray[np.float32]:
     result = np.empty((len(queries.u), 4), np.float32)
     with torch.inference_mode():
-        for start in range(0, len(result), CHUNK):
-            rows = slice(start, start + CHUNK)
+        for start in range(0, len(result), CHUNK_ROWS):
+            rows = slice(start, start + CHUNK_ROWS)
             inputs = (torch.from_numpy(column) for column in part.inputs(queries.take(rows)))
             result[rows] = program.run(*inputs, *part.constants).numpy()
     return result

@@ -10,26 +10,32 @@ View = Literal["sphere", "plane"]
 """The views of one fabric: cloth on a sphere, and on a plane running to the horizon."""
 
 
-class ViewOptions(BaseModel):
-    """Camera, light and scale of the views."""
+class PixelOptions(BaseModel):
+    """Footprints of pixels, and where they are cut."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    pixel_sigma: float = Field(default=0.5, gt=0, le=4)
+    """Standard deviation of the pixel's Gaussian, in pixels."""
+    largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
+    """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
+    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
+    """Most grazing view of the cloth, in degrees to the normal: beyond, the truth needs too many points. A view shows
+    no cloth there, and the plane ends with the last whole row. In a scene such rays are tilted up to it, so that no
+    silhouette has holes; so are those that an interpolated normal would show the wrong side of the cloth."""
+
+
+class ViewOptions(PixelOptions):
+    """Camera, light and scale of the views."""
 
     footprint: Literal["geometric_mean", "major"] = "major"
     """Axis of the projected pixel that the round footprint takes: the `major` one blurs at grazing views but never
     aliases, so that the truth can judge aliasing; the `geometric_mean` of both keeps the pixel's area, is sharper, and
     shows moire of its own towards the horizon."""
-    pixel_sigma: float = Field(default=0.5, gt=0, le=4)
-    """Standard deviation of the pixel's Gaussian, in pixels."""
-    largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
-    """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
     plane_pixels_per_yarn: float = Field(default=6.0, gt=0, le=1000)
     """Pixels a yarn spacing takes across the bottom row of the plane."""
     horizon: float = Field(default=0.02, ge=0, le=0.9)
     """Height of the picture above the plane's horizon, as a share."""
-    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
-    """Views more grazing than this, in degrees to the normal, show no cloth: there the truth needs too many points. The
-    plane ends with the last whole row."""
     turn: float = Field(default=24.0, ge=-180, le=180)
     """Angle from the picture's horizontal to the weft, in degrees."""
     sphere_light: tuple[float, float] = (32.0, 132.0)
@@ -40,18 +46,9 @@ class ViewOptions(BaseModel):
     """How far the surface moves from frame to frame, in pixels (centre of the sphere, bottom row of the plane)."""
 
 
-class SceneOptions(BaseModel):
+class SceneOptions(PixelOptions):
     """How Mitsuba scenes become queries."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
-
-    pixel_sigma: float = Field(default=0.5, gt=0, le=4)
-    """Standard deviation of the pixel's Gaussian, in pixels."""
-    largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
-    """Both axes of a footprint are cut here, in yarn spacings."""
-    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
-    """Views more grazing than this, in degrees to the shading normal, are tilted up to it, so that no silhouette has
-    holes; so are those that an interpolated normal would show the wrong side of the cloth."""
     largest_shear: float = Field(default=90.0, gt=0, le=90)
     """A scene is refused if u and v cross anywhere in sight further from a right angle than this, in degrees. What is
     left of shear is ignored: yarns are taken to cross at right angles, the weft along dp_du. 90: nothing is refused."""

@@ -16,12 +16,11 @@ import numpy as np
 from pipeline.analytic.soft_nodes import features
 from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
-from pipeline.models.networks.layers import LinearLayer
+from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST
 from pipeline.models.neumip.model import LAYERS, Neumip, Parts
 from pipeline.models.runtimes import as_onnx
-from pipeline.models.selvage.error_network import SLOPE
-from pipeline.models.selvage.model import LARGEST, Selvage
+from pipeline.models.selvage.model import LARGEST_FACTOR, Selvage
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
 from pipeline.shader.descriptor import (
     CONVENTIONS,
@@ -216,7 +215,7 @@ def correction(method: Selvage, fabric: Fabric) -> tuple[Weights, list[PlacedLay
         "HIDDEN_LAYERS": len(layers) - 1,
         "FIRST_LAYER": first,
         "SLOPE": SLOPE,
-        "LARGEST": LARGEST,
+        "LARGEST": LARGEST_FACTOR,
         "BOUNDED": method.bound,
         **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
         "ALMOST_HIDDEN": float(own["_HIDDEN"]),

@@ -229,7 +229,7 @@ def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: 
         "domain": Domain.of(manifest.about, members).model_dump(mode="json"),
         "version": {"model": options.version, "training": versions.TRAINING},
         "options": options.model_dump(mode="json", context=IDENTITY),
-        "training": training.model_dump(mode="json", exclude={"device", "checkpoint_every"}),
+        "training": training.model_dump(mode="json", context=IDENTITY, exclude={"device", "checkpoint_every"}),
         "dataset": {"name": manifest.name, "fingerprint": manifest.fingerprint},
         "fabrics": [
             {

@@ -5,15 +5,17 @@ The learning rate warms up linearly and then falls to zero along half a cosine. 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.models.options import Design
 
 
-class TrainingOptions(BaseModel):
+class TrainingOptions(Design):
     """One training run; `device` and `threads` choose where, the rest decides the numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    fixed: ClassVar[tuple[str, ...]] = ("weight_decay", "gradient_clip")
 
     steps: int = Field(default=7000, ge=1, le=10_000_000)
     """Optimiser steps."""
@@ -25,10 +27,6 @@ class TrainingOptions(BaseModel):
     """Peak learning rate of AdamW."""
     warm_up: float = Field(default=0.03, ge=0, le=0.5)
     """Share of the steps in which the rate rises linearly."""
-    weight_decay: float = Field(default=0.0, ge=0, le=1)
-    """Decoupled weight decay of AdamW."""
-    gradient_clip: float = Field(default=1.0, gt=0, le=1e6)
-    """Largest Euclidean norm of the gradient."""
     average: float = Field(default=0.998, ge=0, lt=1)
     """Share of the exponential moving average of the weights that a step keeps; the average is what is shipped. 0: the
     last weights are."""
@@ -52,3 +50,8 @@ class TrainingOptions(BaseModel):
     """Looks at held-out queries along the curve."""
     validation_rows: int = Field(default=16_384, ge=1, le=2**24)
     """Most held-out queries used for the figures on the model card."""
+
+    weight_decay: ClassVar[float] = 0.0
+    """Decoupled weight decay of AdamW."""
+    gradient_clip: ClassVar[float] = 1.0
+    """Largest Euclidean norm of the gradient."""

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
 
-REPLACED: Final = {"jittered": "r2"}
+REPLACED_ESTIMATORS: Final = {"jittered": "r2"}
 """Estimators of earlier versions, and those to take in their place."""
 
 TABLE_CELLS: Final = 96
@@ -50,8 +50,8 @@ class TruthOptions(BaseModel):
     @field_validator("estimator", mode="before")
     @classmethod
     def _named_anew(cls, name: object) -> object:
-        if isinstance(name, str) and name in REPLACED:
-            raise ValueError(f"this estimator is gone: take {REPLACED[name]!r}")
+        if isinstance(name, str) and name in REPLACED_ESTIMATORS:
+            raise ValueError(f"this estimator is gone: take {REPLACED_ESTIMATORS[name]!r}")
         return name
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.models.added.added_code import ADDED
+from pipeline.models.added.added_code import ADDED_MODEL
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.options import Options
 from reports.tables.number_format import display
@@ -31,13 +31,13 @@ class ModelNote:
     per_material: bool = False
     """True if one model is trained for each fabric."""
     kind: str = ""
-    """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED`; empty: its name."""
+    """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED_MODEL`; empty: its name."""
 
     @property
     def learns(self) -> bool:
         """True if there is anything to train."""
         model = CLASSES.get(self.kind or self.name)
-        return bool(self.fingerprint) if self.kind == ADDED else model is None or model.learns
+        return bool(self.fingerprint) if self.kind == ADDED_MODEL else model is None or model.learns
 
     @property
     def published(self) -> bool:

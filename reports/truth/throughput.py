@@ -21,7 +21,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.method import CHUNK, Method
+from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
@@ -266,7 +266,7 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
 
 def _models(fabric: Fabric) -> Iterator[Rate]:
     """Yield queries a second of soft nodes at all levels and of `selvage`, by one thread and by two."""
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK)
+    queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK_ROWS)
     methods: list[Method] = [*map(SoftNodes, DETAILS), *load_model(pretrained_folder("selvage"))]
     for method in methods:
         what = " ".join(filter(None, ("queries,", method.name, method.setting)))
@@ -279,7 +279,7 @@ def _models(fabric: Fabric) -> Iterator[Rate]:
             return float(len(queries.u))
 
         yield _rate(count, what, fabric.name, "queries/s")
-        yield _threads_compared(what, fabric, answer, 4 * CHUNK)
+        yield _threads_compared(what, fabric, answer, 4 * CHUNK_ROWS)
 
 
 def _memory(fabric: Fabric, rows: int) -> Rate:

@@ -21,7 +21,7 @@ from pydantic import (
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.options import Name, Options
 
-ADDED: Final = "added"
+ADDED_MODEL: Final = "added"
 """The value of `model` of all methods from outside."""
 
 GROUP: Final = "twillight.methods"

@@ -11,7 +11,7 @@ from typing import Any, Final, get_args
 from pipeline.models.added.added_code import AddedFunction, AddedMethod, Kind
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed, faults_of
-from pipeline.models.added.source import WHERE, locate
+from pipeline.models.added.source import ADD, locate
 from weaves.errors import BadInput, brief, nearest
 from weaves.validation import validated
 
@@ -59,13 +59,13 @@ def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> Adde
     try:
         json.dumps(own)
     except TypeError as error:
-        raise BadInput(WHERE, "", text, f"its options must be numbers, texts, lists and tables ({error})") from error
+        raise BadInput(ADD, "", text, f"its options must be numbers, texts, lists and tables ({error})") from error
     try:
         fields = run_apart(_described, text, dict(own))
     except MethodFailed as failure:
-        raise BadInput(WHERE, "", text, failure.reason) from failure
+        raise BadInput(ADD, "", text, failure.reason) from failure
     fields |= more
-    return validated(AddedMethod, fields, WHERE) if "own" in fields else validated(AddedFunction, fields, WHERE)
+    return validated(AddedMethod, fields, ADD) if "own" in fields else validated(AddedFunction, fields, ADD)
 
 
 def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]) -> dict[str, Any]:
@@ -84,7 +84,7 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     if inspect.isfunction(make):
         return {**_stated_by_function(make, text), **code}
     if not callable(make):
-        raise BadInput(WHERE, "", text, "is no class of a method and no function of a metric")
+        raise BadInput(ADD, "", text, "is no class of a method and no function of a metric")
     _check_options(make, own, text)
     with faults_of(source.name, "__init__", LOADING, source.root):
         method = make(**own)
@@ -99,10 +99,10 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
 def _stated_by_function(function: Callable[..., Any], text: str) -> dict[str, Any]:
     """Return what a metric says of itself: its name, its docstring, and its attributes."""
     if len(inspect.signature(function).parameters) != len(METRIC_PARAMETERS):
-        raise BadInput(WHERE, "", text, f"a metric is a function of {', '.join(METRIC_PARAMETERS)}")
+        raise BadInput(ADD, "", text, f"a metric is a function of {', '.join(METRIC_PARAMETERS)}")
     definition = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split())
     if not definition:
-        raise BadInput(WHERE, "", text, "lacks a docstring, which defines the metric on the page")
+        raise BadInput(ADD, "", text, "lacks a docstring, which defines the metric on the page")
     stated = {key: getattr(function, key, default) for key, default in _OF_METRICS.items()}
     name = function.__name__
     words = name.replace("_", " ")
@@ -124,28 +124,28 @@ def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) 
         for key in own:
             if key not in names:
                 known = nearest(key, names) if names else "it has no options"
-                raise BadInput(WHERE, "", text, f"has no option {brief(key)}; {known}")
+                raise BadInput(ADD, "", text, f"has no option {brief(key)}; {known}")
     for parameter in named:
         if parameter.default is parameter.empty and parameter.name not in own:
-            raise BadInput(WHERE, "", text, f"its option {parameter.name!r} has no default; every option needs one")
+            raise BadInput(ADD, "", text, f"its option {parameter.name!r} has no default; every option needs one")
 
 
 def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Return what a method says of itself, from its attributes; BadInput if one is missing or cannot be used."""
     if lacks := [name for name in _FUNCTIONS if not callable(has.get(name))]:
-        raise BadInput(WHERE, "", text, f"lacks the function {lacks[0]!r} of pipeline.models.method.Method")
+        raise BadInput(ADD, "", text, f"lacks the function {lacks[0]!r} of pipeline.models.method.Method")
     if lacks := [name for name in _STATED if name not in has]:
-        raise BadInput(WHERE, "", text, f"lacks the attribute {lacks[0]!r}")
+        raise BadInput(ADD, "", text, f"lacks the attribute {lacks[0]!r}")
     name, setting, version = has["name"], has["setting"], has["version"]
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise BadInput(WHERE, "", text, f"name = {brief(name)} must be letters, digits, - and _, 64 at most")
+        raise BadInput(ADD, "", text, f"name = {brief(name)} must be letters, digits, - and _, 64 at most")
     if not isinstance(setting, str) or len(setting) > 40 or not setting.isprintable():
-        raise BadInput(WHERE, "", text, f"setting = {brief(setting)} must be a text of at most 40 letters")
+        raise BadInput(ADD, "", text, f"setting = {brief(setting)} must be a text of at most 40 letters")
     if isinstance(version, bool) or not isinstance(version, int | str) or not 0 < len(str(version)) <= 64:
-        raise BadInput(WHERE, "", text, f"version = {brief(version)} must be an integer or a short text")
+        raise BadInput(ADD, "", text, f"version = {brief(version)} must be an integer or a short text")
     kinds, known = has.get("kinds", []), get_args(Kind)
     if isinstance(kinds, str) or not all(kind in known for kind in kinds):
-        raise BadInput(WHERE, "", text, f"kinds = {brief(kinds)} must be some of {', '.join(known)}")
+        raise BadInput(ADD, "", text, f"kinds = {brief(kinds)} must be some of {', '.join(known)}")
     stated = {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}
     return stated | _stated_of_network(has, text)
 
@@ -154,9 +154,9 @@ def _stated_of_network(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Return whether a method is trained, and on a single fabric; BadInput if it has one of two functions alone."""
     learns, one_fabric = callable(has.get("network")), has.get("of_one_material", False)
     if learns and not callable(has.get("load")):
-        raise BadInput(WHERE, "", text, "has a function 'network' and lacks 'load', which receives the trained network")
+        raise BadInput(ADD, "", text, "has a function 'network' and lacks 'load', which receives the trained network")
     if not isinstance(one_fabric, bool):
-        raise BadInput(WHERE, "", text, f"of_one_material = {brief(one_fabric)} must be True or False")
+        raise BadInput(ADD, "", text, f"of_one_material = {brief(one_fabric)} must be True or False")
     if one_fabric and not learns:
-        raise BadInput(WHERE, "", text, "has of_one_material = True and lacks a function 'network', which is trained")
+        raise BadInput(ADD, "", text, "has of_one_material = True and lacks a function 'network', which is trained")
     return {"has_network": learns, "has_one_fabric": one_fabric}

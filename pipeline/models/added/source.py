@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed, nearest
 
-WHERE: Final = "--add"
+ADD: Final = "--add"
 
 MOST_BYTES: Final = 512 * 2**20
 """Largest package."""
@@ -66,7 +66,7 @@ class CodeSource(NamedTuple):
         for path in _files(self.root):
             total += path.stat().st_size
             if total > MOST_BYTES:
-                raise BadInput(WHERE, "", self.text, f"the package {self.root.name} has more than {MOST_BYTES:,} bytes")
+                raise BadInput(ADD, "", self.text, f"the package {self.root.name} has more than {MOST_BYTES:,} bytes")
             found.update(f"{path.relative_to(self.root).as_posix()}\0{file_sha256(path)}\0".encode())
         return found.hexdigest()
 
@@ -91,7 +91,7 @@ class CodeSource(NamedTuple):
         """Return what the name stands for in the imported module; BadInput if there is no such name."""
         if not hasattr(module, self.name):
             names = [name for name in vars(module) if not name.startswith("_")]
-            raise BadInput(WHERE, "", self.text, f"no such name; {nearest(self.name, names)}")
+            raise BadInput(ADD, "", self.text, f"no such name; {nearest(self.name, names)}")
         return getattr(module, self.name)
 
     def imported(self) -> ModuleType:
@@ -124,29 +124,29 @@ def locate(text: str, folder: str = "") -> CodeSource:
     """
     place, _, name = text.rpartition(":")
     if not place or not name.isidentifier():
-        raise BadInput(WHERE, "", text, "must be MODULE:NAME, FILE.py:NAME, or the name of an installed method")
+        raise BadInput(ADD, "", text, "must be MODULE:NAME, FILE.py:NAME, or the name of an installed method")
     if place.endswith(".py"):
         path = Path(place).resolve()
         if not path.is_file():
-            raise BadInput(WHERE, "", text, f"there is no file {place}")
+            raise BadInput(ADD, "", text, f"there is no file {place}")
         return CodeSource(str(path), name, "", path)
     parts = place.split(".")
     if not all(part.isidentifier() for part in parts):
-        raise BadInput(WHERE, "", text, f"{place} is no name of a module; a file needs its path, ending in .py")
+        raise BadInput(ADD, "", text, f"{place} is no name of a module; a file needs its path, ending in .py")
     if parts[0] in _OURS:
-        raise BadInput(WHERE, "", text, "is part of this package; name it in the recipe")
+        raise BadInput(ADD, "", text, "is part of this package; name it in the recipe")
     here = ""
     spec = find_spec(parts[0])
     if spec is None:
         here = str(Path(folder or ".").resolve())
         spec = PathFinder.find_spec(parts[0], [here])
     if spec is None:
-        raise BadInput(WHERE, "", text, f"there is no module {parts[0]}, installed or in the folder {here}")
+        raise BadInput(ADD, "", text, f"there is no module {parts[0]}, installed or in the folder {here}")
     if locations := list(spec.submodule_search_locations or ()):
         return CodeSource(place, name, here, Path(locations[0]))
     root = Path(spec.origin or "")
     if not root.is_file():
-        raise BadInput(WHERE, "", text, f"{parts[0]} is part of Python")
+        raise BadInput(ADD, "", text, f"{parts[0]} is part of Python")
     return CodeSource(str(root), name, "", root) if here else CodeSource(place, name, "", root)
 
 

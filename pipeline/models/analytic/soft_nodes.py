@@ -17,7 +17,7 @@ from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
-from pipeline.models.method import CHUNK
+from pipeline.models.method import CHUNK_ROWS
 from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -106,9 +106,9 @@ class SoftNodes(Analytic["SoftNodeTable"]):
 
 
 def _in_chunks(read: Callable[[Queries], Float32], queries: Queries, width: int) -> Float32:
-    """Read `width` numbers a query, `CHUNK` rows at a time."""
+    """Read `width` numbers a query, `CHUNK_ROWS` rows at a time."""
     result = np.empty((len(queries.u), width), np.float32)
-    for start in range(0, len(result), CHUNK):
-        rows = slice(start, start + CHUNK)
+    for start in range(0, len(result), CHUNK_ROWS):
+        rows = slice(start, start + CHUNK_ROWS)
         result[rows] = read(queries.take(rows))
     return result

@@ -13,7 +13,15 @@ from pipeline.models.options import Gaussian, Options
 class SelvageOptions(Options):
     """Soft nodes corrected by a residual perceptron: one network for many fabrics and scales; own design."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("error_weight", "specular_colour", "diffuse_colour", "colour_weight")
+    fixed: ClassVar[tuple[str, ...]] = (
+        "layers",
+        "finest",
+        "dark",
+        "error_weight",
+        "specular_colour",
+        "diffuse_colour",
+        "colour_weight",
+    )
     seconds: ClassVar[tuple[float, float]] = (2e-5, 2.5e-6)
     prepare_seconds: ClassVar[float] = 1.2
     without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
@@ -24,12 +32,8 @@ class SelvageOptions(Options):
     model: Literal["selvage"] = "selvage"
     width: Literal[16, 32, 64] = 64
     """Width of the hidden layers."""
-    layers: int = Field(default=2, ge=1, le=8)
-    """Hidden layers."""
     level: Level = 2
     """Level of detail of its soft nodes."""
-    finest: Level = 8
-    """Level of detail of the soft nodes whose error is estimated beside its own."""
     error_width: Literal[16, 32, 64] = 32
     """Width of the hidden layer of the network that estimates errors."""
     exchange: bool = True
@@ -38,10 +42,14 @@ class SelvageOptions(Options):
     """Queries of each training fabric over which features are normalised to mean 0 and deviation 1."""
     bound: bool = True
     """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
-    dark: float = Field(default=0.1, gt=0, le=1e4)
-    """Colour well above which squared errors are divided by the colour, and well below which they are not."""
     footprint: Gaussian = "gaussian"
 
+    layers: ClassVar[int] = 2
+    """Hidden layers."""
+    finest: ClassVar[Level] = 8
+    """Level of detail of the soft nodes whose error is estimated beside its own."""
+    dark: ClassVar[float] = 0.1
+    """Colour well above which squared errors are divided by the colour, and well below which they are not."""
     error_weight: ClassVar[float] = 1e-5
     """Weight of the loss of the estimated errors, which share no weights with the correction."""
     specular_colour: ClassVar[float] = 0.3

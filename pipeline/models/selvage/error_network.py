@@ -18,13 +18,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.models.networks.layers import SLOPE
 from pipeline.models.selvage import SelvageOptions
 
 FLOOR: Final = 0.05
 """Colour added to the colour that errors are relative to: a third of that of a usual cloth."""
-
-SLOPE: Final = 0.01
-"""Slope of the leaky ReLU below 0."""
 
 OWN, FINEST = 0, 1
 """Columns of the estimates: of `selvage` itself, of the finest soft nodes."""

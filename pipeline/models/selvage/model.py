@@ -40,18 +40,18 @@ from pipeline.analytic.soft_nodes.features import (
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import CHUNK, refuse_other
+from pipeline.models.method import CHUNK_ROWS, refuse_other
 from pipeline.models.network import Answering, Batch, Columns, PerQuery
-from pipeline.models.networks.layers import LinearLayer
+from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.adaptive import Adaptive
-from pipeline.models.selvage.error_network import FLOOR, SLOPE, ErrorNetwork, colour_weights
+from pipeline.models.selvage.error_network import FLOOR, ErrorNetwork, colour_weights
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-LARGEST: Final = 2.0
+LARGEST_FACTOR: Final = 2.0
 """Largest factor."""
 
 _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
@@ -109,7 +109,7 @@ class SelvageNetwork(nn.Module):
         x = self._normalised(features)
         for layer in self.hidden:
             x = functional.leaky_relu(layer(x), SLOPE)
-        factors: Tensor = LARGEST * torch.sigmoid(self.last(x))
+        factors: Tensor = LARGEST_FACTOR * torch.sigmoid(self.last(x))
         answer = components * factors
         return torch.minimum(answer, bounds) if self.options.bound else answer
 
@@ -288,7 +288,7 @@ class Selvage:
         x = torch.addmm(bias, features, self._of_query)
         for weight, shift in self._others:
             x = torch.addmm(shift, functional.leaky_relu(x, SLOPE), weight)
-        answer = LARGEST * torch.sigmoid(x.float()) * components
+        answer = LARGEST_FACTOR * torch.sigmoid(x.float()) * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
     def _refuse(self, queries: Queries) -> None:
@@ -320,14 +320,14 @@ class Selvage:
         table = self._nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
-            for start in range(0, len(result), CHUNK):
-                rows = slice(start, start + CHUNK)
+            for start in range(0, len(result), CHUNK_ROWS):
+                rows = slice(start, start + CHUNK_ROWS)
                 features, components, bounds = read_queries(table, queries.take(rows))
                 of_query = torch.from_numpy(features)[:, :OF_QUERY]
                 x = torch.addmm(cloth.bias, of_query, self._of_query)
                 for weight, shift in self._others:
                     x = torch.addmm(shift, functional.leaky_relu_(x, SLOPE), weight)
-                x.sigmoid_().mul_(LARGEST)
+                x.sigmoid_().mul_(LARGEST_FACTOR)
                 np.multiply(x.numpy(), components, out=result[rows])
                 if self.bound:
                     np.minimum(result[rows], bounds, out=result[rows])

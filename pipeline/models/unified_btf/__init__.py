@@ -15,7 +15,7 @@ from pipeline.truth.options import TruthOptions
 class BtfOptions(ComponentLossOptions):
     """Options of both encodings of bidirectional textures."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("log_samples",)
+    fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
 
     texels_per_yarn: int = Field(default=8, ge=1, le=64)
     """Texels along one yarn spacing."""
@@ -26,8 +26,6 @@ class BtfOptions(ComponentLossOptions):
     added."""
     fewest_samples: int = Field(default=50, ge=1, le=65_536)
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
-    directions: Literal["projected_disc", "hemisphere"] = "projected_disc"
-    """Density of the samples' directions, as in the queries."""
     max_angle: float = Field(default=89.0, gt=0, le=89.9)
     """Largest angle of the samples' directions to the macro normal, in degrees."""
     truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
@@ -45,6 +43,8 @@ class BtfOptions(ComponentLossOptions):
     latent: int
     """Numbers that a texel is known by."""
 
+    directions: ClassVar[Literal["projected_disc", "hemisphere"]] = "projected_disc"
+    """Density of the samples' directions, as in the queries."""
     log_samples: ClassVar[bool] = False
     """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
     those in log space."""

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from pipeline.models.all_cores import AllCores
-from pipeline.models.method import CHUNK
+from pipeline.models.method import CHUNK_ROWS
 from pipeline.models.named import own_method
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric
 
 DENIM = load_fabric("denim")
-ROWS = 3 * CHUNK + 17
+ROWS = 3 * CHUNK_ROWS + 17
 
 
 def queries(rows=ROWS):
@@ -47,13 +47,13 @@ def test_no_bit_depends_on_the_number_of_threads(name):
 
 def test_two_runs_are_answered_at_a_time():
     """Two runs after the first wait for one another: one thread alone would wait for ever."""
-    AllCores(Fake(together=2), threads=2).predict(DENIM, queries(3 * CHUNK))
+    AllCores(Fake(together=2), threads=2).predict(DENIM, queries(3 * CHUNK_ROWS))
 
 
 def test_runs_have_seeds_of_their_own_and_few_queries_have_the_callers():
     drawn = AllCores(Fake(), threads=2).predict(DENIM, queries(), seed=0)[:, 0]
-    assert (drawn[:CHUNK] == 0).all() and len(set(drawn[::CHUNK].tolist())) == 4
-    np.testing.assert_array_equal(drawn[CHUNK:-17:CHUNK], drawn[2 * CHUNK - 1 :: CHUNK])
+    assert (drawn[:CHUNK_ROWS] == 0).all() and len(set(drawn[::CHUNK_ROWS].tolist())) == 4
+    np.testing.assert_array_equal(drawn[CHUNK_ROWS:-17:CHUNK_ROWS], drawn[2 * CHUNK_ROWS - 1 :: CHUNK_ROWS])
     assert (AllCores(Fake(), threads=2).predict(DENIM, queries(7), seed=5) == 5).all()
 
 

@@ -6,7 +6,7 @@ import pytest
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
-from pipeline.models.fallback import FLAT, Fallback, fallback_answers
+from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -138,7 +138,7 @@ def test_a_method_may_answer_outside_its_domain_itself():
     np.testing.assert_array_equal(found[~alone], selvage.predict(denim, queries.take(~alone)))
 
 
-@pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT, 0.03), (3.0 * FLAT, 0.1)])
+@pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])
 def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(turned, bound):
     """Light from behind through open cloth, ellipses at all angles: RMSE over the mean against 4,096 points a query."""
     fabric = load_fabric("voile")

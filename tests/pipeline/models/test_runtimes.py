@@ -10,11 +10,11 @@ from torch import nn
 from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.method import CHUNK
+from pipeline.models.method import CHUNK_ROWS
 from pipeline.models.network import Answering, PerQuery, columns_of
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
-from pipeline.models.runtimes import RUNTIMES, TOLERANCE, RunBy, Runtime, not_run, runs
+from pipeline.models.runtimes import RUNTIME_TOLERANCE, RUNTIMES, RunBy, Runtime, not_run, runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -77,8 +77,8 @@ def test_any_number_of_rows_in_their_order(runtime):
     method = Linear(np.arange(12).reshape(4, 3))
     run = RunBy(method, runtime)
     run.prepare(DENIM)
-    for rows in (0, 1, 50, CHUNK + 3):
-        queries = asked(CHUNK + 3).take(slice(rows))
+    for rows in (0, 1, 50, CHUNK_ROWS + 3):
+        queries = asked(CHUNK_ROWS + 3).take(slice(rows))
         found = run.predict(DENIM, queries)
         assert found.shape == (rows, 4) and found.dtype == np.float32
         np.testing.assert_allclose(found, method.predict(DENIM, queries), rtol=2e-3, atol=2e-2)
@@ -101,7 +101,7 @@ def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatc
         run.prepare(fabric)
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 200)
         own = woven.predict(fabric, queries)
-        assert np.linalg.norm(run.predict(fabric, queries) - own) <= TOLERANCE * np.linalg.norm(own)
+        assert np.linalg.norm(run.predict(fabric, queries) - own) <= RUNTIME_TOLERANCE * np.linalg.norm(own)
         assert run.bytes_stored(fabric) == woven.bytes_stored(fabric)
     assert len(loads) == 1
 
