@@ -28,7 +28,6 @@ from pipeline.analytic.soft_nodes.shade import (
     AREA,
     BARE_AREA,
     DIFFUSE,
-    NODE_SUMS,
     OPEN_DIFFUSE,
     OPEN_SPECULAR,
     SPECULAR,
@@ -36,6 +35,7 @@ from pipeline.analytic.soft_nodes.shade import (
     directions,
     shade_footprint,
     shade_footprint_behind,
+    write_sums,
 )
 from pipeline.analytic.soft_nodes.wide import NARROW
 from pipeline.compiled.arrays import Float32
@@ -108,32 +108,24 @@ def _place_round(
 def _shade(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, sharp: np.float32, result: Float32) -> None:
     """Write the sums over the nodes that are placed, (K, NODE_SUMS)."""
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
-    low_i, high_i = _offsets(table, look.low_i, look.high_i)
+    back = look.iz < _0
+    grid = scratch.behind_grid if back else scratch.grid
+    light = GridHorizons(grid, *_offsets(table, look.low_i, look.high_i), look.turn_i)
     viewer = GridHorizons(scratch.grid, *_offsets(table, look.low_o, look.high_o), look.turn_o)
     for kind in range(kinds):
         if scratch.stops[kind] == 0:
             continue
         family = 0 if kind < of_warp else 1
+        yarn = table.yarn[family]
         count = fill_block(scratch.nodes[kind], scratch.cells[kind], scratch.stops[kind])
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
         if look.bend_o > _0:
             _shade_curved(table, scratch, look, sharp, kind, count, result)
-            continue
-        if look.iz < _0:
-            through = shade_footprint_behind(
-                nodes, cells, GridHorizons(scratch.behind_grid, low_i, high_i, look.turn_i), viewer, sharp, d,
-                table.yarn[family], thickness,
-            )  # fmt: skip
-            for q in range(len(through)):
-                result[kind, q] = through[q]
-            continue
-        found = shade_footprint(
-            nodes, cells, scratch.grid, low_i, high_i, look.turn_i, viewer.low, viewer.high, viewer.turn, sharp, d,
-            table.yarn[family], thickness,
-        )  # fmt: skip
-        for q in range(NODE_SUMS):
-            result[kind, q] = found[q]
+        elif back:
+            write_sums(shade_footprint_behind(nodes, cells, light, viewer, sharp, d, yarn, thickness), result[kind])
+        else:
+            write_sums(shade_footprint(nodes, cells, light, viewer, sharp, d, yarn, thickness), result[kind])
 
 
 # Not in `_shade`: flat cloth is not to wait for it.
@@ -159,16 +151,9 @@ def _shade_curved(
     of_light = GridHorizons(horizons, np.uint32(0), np.uint32(0), _0)
     of_viewer = GridHorizons(horizons, np.uint32(count), np.uint32(count), _0)
     if look.iz < _0:
-        through = shade_footprint_behind(nodes, order, of_light, of_viewer, sharp, d, yarn, thickness)
-        for q in range(len(through)):
-            result[kind, q] = through[q]
-        return
-    found = shade_footprint(
-        nodes, order, horizons, of_light.low, of_light.high, _0, of_viewer.low, of_viewer.high, _0, sharp, d, yarn,
-        thickness,
-    )  # fmt: skip
-    for q in range(NODE_SUMS):
-        result[kind, q] = found[q]
+        write_sums(shade_footprint_behind(nodes, order, of_light, of_viewer, sharp, d, yarn, thickness), result[kind])
+    else:
+        write_sums(shade_footprint(nodes, order, of_light, of_viewer, sharp, d, yarn, thickness), result[kind])
 
 
 @inlined_kernel

@@ -26,7 +26,7 @@ from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_an
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS
 from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, spread, tangent, turning
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
@@ -151,46 +151,44 @@ def directions(
 
 
 @inlined_fast_kernel
+def _flakes(
+    d: YarnDirections, h: np.float32, along: np.float32, across: np.float32, square: np.float32, scale: np.float32
+) -> np.float32:
+    """Return a quarter of the flakes' density, mean of four places; `h` is the half vector's cosine with the tangent.
+
+    `along`, `across`: by how much that cosine changes to the four places.
+    """
+    e, f = along + across, along - across
+    q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
+    q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
+    q01, q23 = q0 * q1, q2 * q3
+    # The product of all four may be as small as alpha^16: it is divided by before the cosines are.
+    return scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
+
+
+@inlined_fast_kernel
 def shade_node(
     d: YarnDirections,
-    nx: np.float32,
-    ny: np.float32,
-    nz: np.float32,
-    inverse: np.float32,
-    tx: np.float32,
-    ty: np.float32,
-    tz: np.float32,
+    at: NodeFrame,
     along: np.float32,
     across: np.float32,
     seen: np.float32,
     lit: np.float32,
     weight: np.float32,
-    square: np.float32,
-    scale: np.float32,
-    thickness: np.float32,
-    blend: np.float32,
+    layer: YarnLayer,
 ) -> Eight:
-    """Return a node's shares of the first six sums and of the last two.
-
-    `along`, `across`: by how much the half vector's cosine with the tangent changes to the four places.
-    """
-    facing_o = d.ox * nx + d.oy * ny + d.oz * nz
-    facing_i = d.ix * nx + d.iy * ny + d.iz * nz
+    """Return a node's shares of the first six sums and of the last two; `along`, `across` as for `_flakes`."""
+    facing_o = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
+    facing_i = d.ix * at.nx + d.iy * at.ny + d.iz * at.nz
     cos_o, cos_i = max(facing_o, _0), max(facing_i, _0)
     both = seen_and_lit(seen, lit, d.alike, d.right, d.opposite)
-    wide = weight * inverse
+    wide = weight * at.inverse
     area = wide * cos_o
-    diffuse = area * ((blend * cos_i + (_1 - blend) * d.iz) if facing_i > _0 else _0)
-    along_i, along_o = d.ix * tx + d.iy * ty + d.iz * tz, d.ox * tx + d.oy * ty + d.oz * tz
-    h, e, f = along_i + along_o, along + across, along - across
-    q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
-    q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
-    q01, q23 = q0 * q1, q2 * q3
-    flakes = scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
-    # The product of all four may be as small as alpha^16: it is divided by before the cosines are.
-    specular = wide * reflection(
-        flakes, _1, sigma(along_i, square), sigma(along_o, square), cos_i, cos_o, thickness
-    )  # fmt: skip
+    diffuse = area * ((layer.blend * cos_i + (_1 - layer.blend) * d.iz) if facing_i > _0 else _0)
+    along_i, along_o = d.ix * at.tx + d.iy * at.ty + d.iz * at.tz, d.ox * at.tx + d.oy * at.ty + d.oz * at.tz
+    flakes = _flakes(d, along_i + along_o, along, across, layer.square, layer.scale)
+    sigma_i, sigma_o = sigma(along_i, layer.square), sigma(along_o, layer.square)
+    specular = wide * reflection(flakes, _1, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
     return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
 
 
@@ -205,61 +203,82 @@ def _node_behind(
     weight: np.float32,
     layer: YarnLayer,
 ) -> Five:
-    """Return a node's shares of the five sums with the light behind; `along`, `across` as for `shade_node`."""
+    """Return a node's shares of the five sums with the light behind; arguments as for `shade_node`."""
     cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _0)
     cos_i = max(-(d.ix * at.nx + d.iy * at.ny + d.iz * at.nz), _0)
     wide = weight * at.inverse
     area = wide * cos_o
     diffuse = area * ((layer.blend * cos_i - (_1 - layer.blend) * d.iz) if cos_i > _0 else _0)
     along_i, along_o = d.ix * at.tx + d.iy * at.ty + d.iz * at.tz, d.ox * at.tx + d.oy * at.ty + d.oz * at.tz
-    h, e, f = along_i + along_o, along + across, along - across
-    q0, q1 = spread(h - e, d.size, layer.square), spread(h - f, d.size, layer.square)
-    q2, q3 = spread(h + f, d.size, layer.square), spread(h + e, d.size, layer.square)
-    q01, q23 = q0 * q1, q2 * q3
-    flakes = layer.scale * ((q0 + q1) * q23 + (q2 + q3) * q01) / (q01 * q23)
+    flakes = _flakes(d, along_i + along_o, along, across, layer.square, layer.scale)
     sigma_o = sigma(along_o, layer.square)
     specular = wide * transmission(flakes, _1, sigma(along_i, layer.square), sigma_o, cos_i, cos_o, layer.thickness)
     both, clear = seen * lit, unscattered(sigma_o, cos_o, layer.thickness)
     return area * seen, diffuse * both, specular * both, area, area * seen * clear
 
 
+@inlined_fast_kernel
+def _seen(over: np.float32) -> np.float32:
+    """Return the share of a node that the viewer sees, `over` widths of the ramp above its horizon."""
+    return ramp(over) + _TAIL / (_1 + over * over)
+
+
+@inlined_fast_kernel
+def _fixed_node(
+    nodes: Float32, b: int, k: int, hx: np.float32, hy: np.float32, hz: np.float32
+) -> tuple[NodeFrame, np.float32, np.float32]:
+    """Return the surface at a fixed node, and how the half vector's cosine with the tangent changes in its box."""
+    at = NodeFrame(
+        nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k], nodes[b, 6, k]
+    )
+    along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
+    across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
+    return at, along, across
+
+
+@inlined_fast_kernel
+def _placed_node(
+    nodes: Float32, k: int, radius: np.float32, fibre: Fibre, hx: np.float32, hy: np.float32, hz: np.float32
+) -> tuple[NodeFrame, np.float32, np.float32]:
+    """Return the same of a node placed in a footprint."""
+    angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
+    nx, ny, nz = normal(angles, fibre.beta)
+    t = tangent(angles, fibre)
+    by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
+    along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
+    return NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z), along, nodes[HALF_V, k] * _GAUSS * by_v
+
+
+@inlined_fast_kernel
+def _layer(alpha: np.float32, thickness: np.float32, blend: np.float32) -> YarnLayer:
+    """Return the optics of a family."""
+    square = alpha * alpha
+    return YarnLayer(square, _FLAKES * alpha * square, thickness, blend)
+
+
 @fast_kernel
 def shade_fixed(
     nodes: Float32,
     weight: Float32,
-    low_i: Float32,
-    high_i: Float32,
-    sharpness_i: Float32,
-    turn_i: np.float32,
-    low_o: Float32,
-    high_o: Float32,
-    sharpness_o: Float32,
-    turn_o: np.float32,
+    light: NodeHorizons,
+    viewer: NodeHorizons,
     d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
 ) -> Ten:
-    """Return the sums over fixed nodes of one family.
-
-    `low`, `high`: mean horizons at the azimuths around a direction; `turn`: where between them it lies.
-    """
-    square = alpha * alpha
-    scale = _FLAKES * alpha * square
+    """Return the sums over fixed nodes of one family."""
+    layer = _layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            over_o = above(d.oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k])
-            over_i = above(d.iz, low_i[b, k], high_i[b, k], turn_i, sharpness_i[b, k])
-            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
-            lit = ramp(over_i)
-            along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
-            across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
+            seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
+            lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
+            at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
             node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
-                d, nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
-                nodes[b, 6, k], along, across, seen, lit, weight[b, k], square, scale, thickness, blend,
-            )  # fmt: skip
+                d, at, along, across, seen, lit, weight[b, k], layer
+            )
             doubt = lit * (_1 - lit) + seen * (_1 - seen)
             a += node_a
             c += node_c
@@ -291,68 +310,49 @@ def shade_fixed_behind(
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            over_o = above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k])
+            seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
-            seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
-            along = hx * nodes[b, 7, k] + hy * nodes[b, 8, k] + hz * nodes[b, 9, k]
-            across = hx * nodes[b, 10, k] + hy * nodes[b, 11, k] + hz * nodes[b, 12, k]
-            at = NodeFrame(
-                nodes[b, 0, k], nodes[b, 1, k], nodes[b, 2, k], nodes[b, 3, k], nodes[b, 4, k], nodes[b, 5, k],
-                nodes[b, 6, k],
-            )  # fmt: skip
-            found = _node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
-            a += found[0]
-            c += found[1]
-            s += found[2]
-            a0 += found[3]
-            through += found[4]
+            at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
+            of_node = _node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
+            a += of_node[0]
+            c += of_node[1]
+            s += of_node[2]
+            a0 += of_node[3]
+            through += of_node[4]
     return a, c, s, a0, through
+
+
+@inlined_fast_kernel
+def _over(horizons: GridHorizons, cell: np.uint32, level: np.float32, sharpness: np.float32) -> np.float32:
+    """Return by how many widths of the ramp a direction clears the horizon of a cell."""
+    low, high = horizons.grid[cell + horizons.low], horizons.grid[cell + horizons.high]
+    return above(level, np.float32(low), np.float32(high), horizons.turn, sharpness)
 
 
 @fast_kernel
 def shade_footprint(
     nodes: Float32,
     cells: npt.NDArray[np.uint32],
-    grid: npt.NDArray[np.uint8] | Float32,
-    low_i: np.uint32,
-    high_i: np.uint32,
-    turn_i: np.float32,
-    low_o: np.uint32,
-    high_o: np.uint32,
-    turn_o: np.float32,
+    light: GridHorizons,
+    viewer: GridHorizons,
     sharpness: np.float32,
     d: YarnDirections,
     yarn: Float32,
     thickness: np.float32,
 ) -> Ten:
-    """Return the sums over nodes placed in a footprint.
-
-    `cells` is each node's cell of its grid at the first azimuth; `low`, `high`: what leads to those around a direction.
-    """
+    """Return the sums over nodes placed in a footprint; `cells` is each one's cell of its grid at the first azimuth."""
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    alpha, blend = yarn[ALPHA], yarn[BLEND]
-    square = alpha * alpha
-    scale = _FLAKES * alpha * square
+    layer = _layer(yarn[ALPHA], thickness, yarn[BLEND])
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
     for k in range(len(cells)):
-        at = cells[k]
-        over_i = above(level_i, np.float32(grid[at + low_i]), np.float32(grid[at + high_i]), turn_i, sharp)
-        over_o = above(level_o, np.float32(grid[at + low_o]), np.float32(grid[at + high_o]), turn_o, sharp)
-        seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
-        lit = ramp(over_i)
-
-        angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
-        nx, ny, nz = normal(angles, fibre.beta)
-        t = tangent(angles, fibre)
-        by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
-        along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
-        across = nodes[HALF_V, k] * _GAUSS * by_v
+        lit = ramp(_over(light, cells[k], level_i, sharp))
+        seen = _seen(_over(viewer, cells[k], level_o, sharp))
+        at, along, across = _placed_node(nodes, k, radius, fibre, hx, hy, hz)
         node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
-            d, nx, ny, nz, _1 / nz, t.x, t.y, t.z, along, across, seen, lit, nodes[WEIGHT, k],
-            square, scale, thickness, blend,
-        )  # fmt: skip
+            d, at, along, across, seen, lit, nodes[WEIGHT, k], layer
+        )
         doubt = lit * (_1 - lit) + seen * (_1 - seen)
         a += node_a
         c += node_c
@@ -386,26 +386,23 @@ def shade_footprint_behind(
     level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for k in range(len(cells)):
-        low_i, high_i = light.grid[cells[k] + light.low], light.grid[cells[k] + light.high]
-        low_o, high_o = viewer.grid[cells[k] + viewer.low], viewer.grid[cells[k] + viewer.high]
-        lit = ramp(above(level_i, np.float32(low_i), np.float32(high_i), light.turn, sharp))
-        over_o = above(level_o, np.float32(low_o), np.float32(high_o), viewer.turn, sharp)
-        seen = ramp(over_o) + _TAIL / (_1 + over_o * over_o)
-
-        angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
-        nx, ny, nz = normal(angles, fibre.beta)
-        t = tangent(angles, fibre)
-        by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
-        along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
-        across = nodes[HALF_V, k] * _GAUSS * by_v
-        at = NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z)
-        found = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
-        a += found[0]
-        c += found[1]
-        s += found[2]
-        a0 += found[3]
-        through += found[4]
+        lit = ramp(_over(light, cells[k], level_i, sharp))
+        seen = _seen(_over(viewer, cells[k], level_o, sharp))
+        at, along, across = _placed_node(nodes, k, radius, fibre, hx, hy, hz)
+        of_node = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
+        a += of_node[0]
+        c += of_node[1]
+        s += of_node[2]
+        a0 += of_node[3]
+        through += of_node[4]
     return a, c, s, a0, through
+
+
+@inlined_kernel
+def write_sums(sums: Ten | Five, result: Float32) -> None:
+    """Write the sums of a family to its row."""
+    for q in range(len(sums)):
+        result[q] = sums[q]
 
 
 @fast_kernel

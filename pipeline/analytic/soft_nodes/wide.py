@@ -19,12 +19,12 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, GROUP_FAMILY, LINES, RULE_X, RULE_Y, START, SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.shade import (
-    NODE_SUMS,
     NodeHorizons,
     directions,
     shade_fixed,
     shade_fixed_behind,
     shade_gaps,
+    write_sums,
 )
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER, faintest
 from pipeline.compiled.arrays import Float32, Index, Mask
@@ -279,25 +279,15 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: f
         a, b = table.starts[kind], table.starts[kind + 1]
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         alpha, blend = table.yarn[family, ALPHA], table.yarn[family, BLEND]
+        nodes, own, thickness = table.nodes[a:b], shares[a:b], np.float32(table.thickness)
+        viewer = NodeHorizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
         if look.iz < _0:
-            light = NodeHorizons(
-                table.behind_mean[look.low_i, a:b], table.behind_mean[look.high_i, a:b],
-                table.behind_sharpness[near_i, a:b], look.turn_i,
-            )  # fmt: skip
-            viewer = NodeHorizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
-            through = shade_fixed_behind(
-                table.nodes[a:b], shares[a:b], light, viewer, d, alpha, np.float32(table.thickness), blend
-            )
-            for q in range(len(through)):
-                result[kind, q] = through[q]
-            continue
-        found = shade_fixed(
-            table.nodes[a:b], shares[a:b], mean[low_i, a:b], mean[high_i, a:b],
-            table.sharpness[near_i, a:b], look.turn_i, mean[low_o, a:b], mean[high_o, a:b],
-            table.sharpness[near_o, a:b], look.turn_o, d, alpha, np.float32(table.thickness), blend,
-        )  # fmt: skip
-        for q in range(NODE_SUMS):
-            result[kind, q] = found[q]
+            behind, sharpness = table.behind_mean, table.behind_sharpness[near_i, a:b]
+            light = NodeHorizons(behind[look.low_i, a:b], behind[look.high_i, a:b], sharpness, look.turn_i)
+            write_sums(shade_fixed_behind(nodes, own, light, viewer, d, alpha, thickness, blend), result[kind])
+        else:
+            light = NodeHorizons(mean[low_i, a:b], mean[high_i, a:b], table.sharpness[near_i, a:b], look.turn_i)
+            write_sums(shade_fixed(nodes, own, light, viewer, d, alpha, thickness, blend), result[kind])
     a, b = table.starts[kinds], table.starts[kinds + 1]
     if b == a:
         return _0

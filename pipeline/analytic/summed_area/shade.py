@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import ramp
-from pipeline.analytic.soft_nodes.shade import Eight, YarnDirections, shade_node
+from pipeline.analytic.soft_nodes.shade import Eight, NodeFrame, YarnDirections, YarnLayer, shade_node
 from pipeline.analytic.summed_area.clusters import LANES
 from pipeline.analytic.summed_area.tables import AREA, MEAN, MEAN_SCALE, SPREAD, SPREAD_SCALE, SPREAD_U, SPREAD_V, U, V
 from pipeline.analytic.torus_frame import Angles, Fibre, normal, tangent, turning
@@ -49,13 +49,10 @@ class Azimuth(NamedTuple):
 
 
 class Optics(NamedTuple):
-    """A family of yarns: twist and relief, squared roughness, scale of its flakes, optical thickness, blend."""
+    """A family of yarns: twist and relief, and the layer of flakes."""
 
     fibre: Fibre
-    square: np.float32
-    scale: np.float32
-    thickness: np.float32
-    blend: np.float32
+    layer: YarnLayer
 
 
 @inlined_fast_kernel
@@ -63,7 +60,7 @@ def optics(yarn: Float32, thickness: np.float32) -> Optics:
     """Return the optics of a family, given its row of `HeightField.yarn`."""
     alpha = yarn[ALPHA]
     fibre = Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    return Optics(fibre, alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
+    return Optics(fibre, YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND]))
 
 
 @inlined_fast_kernel
@@ -126,10 +123,8 @@ def _evaluate(
     t = tangent(a, own.fibre)
     by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, a, own.fibre)
     # The area is that of the surface: no division by n_z.
-    return shade_node(
-        d, nx, ny, nz, _1, t.x, t.y, t.z, spread_u * inverse * by_u, spread_v * inverse * by_v, seen, lit, area,
-        own.square, own.scale, own.thickness, own.blend,
-    )  # fmt: skip
+    at = NodeFrame(nx, ny, nz, _1, t.x, t.y, t.z)
+    return shade_node(d, at, spread_u * inverse * by_u, spread_v * inverse * by_v, seen, lit, area, own.layer)
 
 
 @inlined_fast_kernel

@@ -19,6 +19,7 @@ from pipeline.analytic.soft_nodes.shade import (
     NODE_SUMS,
     SIN,
     WEIGHT,
+    GridHorizons,
     directions,
     shade_footprint,
 )
@@ -102,12 +103,11 @@ def test_nodes_placed_in_the_footprint(point_shares, fabric, table, pair, deviat
         stop = scratch.stops[family]
         count = fill_block(nodes, cells, stop)
         nodes[HALF_V], nodes[HALF_ALONG] = 0.0, 0.0
-        none = (np.uint32(0), np.uint32(0), np.float32(0.0))
+        open_sky = GridHorizons(np.zeros(1, np.uint8), np.uint32(0), np.uint32(0), np.float32(0.0))
         given = directions(*wi, *wo, family)
         found = shade_footprint(
-            nodes, np.zeros(count, np.uint32), np.zeros(1, np.uint8), *none, *none, np.float32(1.0), given,
-            yarn, table.thickness,
-        )  # fmt: skip
+            nodes, np.zeros(count, np.uint32), open_sky, open_sky, np.float32(1.0), given, yarn, table.thickness
+        )
         assert len(found) == NODE_SUMS
 
         rows = nodes[:, :stop].astype(np.float64)
