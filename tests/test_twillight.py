@@ -220,3 +220,37 @@ def test_a_damaged_shard_is_refused(dataset, tmp_path):
 
 def test_fabrics_are_models_of_pydantic():
     assert Fabric.model_validate(load_fabric("denim").model_dump()) == load_fabric("denim")
+
+
+FORKED = """
+import multiprocessing
+import numpy as np
+import torch
+from torch.utils.data import DataLoader
+from twillight import Queries, evaluate, load_fabric, load_model
+
+cloth = load_fabric("polyester_lining")
+at = np.random.default_rng(0).uniform(0.0, 2.0, (2, 600))
+queries = Queries.round(*at, np.full(600, 0.5), np.tile([0.6, 0.0, 0.8], (600, 1)), np.tile([0.0, 0.0, 1.0], (600, 1)))
+methods = [load_model(name) for name in ("selvage", "soft_nodes:2", "point_sampled:2")]
+
+def answers(_):
+    few = evaluate(cloth, queries.take(slice(0, 50)), seed=3).mean
+    return np.concatenate([part.ravel() for part in (few, *(method.predict(cloth, queries) for method in methods))])
+
+own = answers(0)
+torch.ones(1000, 1000) @ torch.ones(1000, 1000)
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    print(*(np.array_equal(other, own) for other in pool.map(answers, range(2))))
+loader = DataLoader([0, 1], collate_fn=answers, num_workers=2, multiprocessing_context="fork")
+print(*(np.array_equal(other, own) for other in loader))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes do not fork here")
+def test_forked_processes_answer_after_their_parent_has():
+    """As multiprocessing and the loader of PyTorch start them; threads of torch and locks of kernels do not survive."""
+    environment = {key: value for key, value in os.environ.items() if key != "OMP_NUM_THREADS"}
+    command = [sys.executable, "-c", FORKED]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=600)
+    assert ended.stdout.split() == ["True"] * 4, ended.stderr

@@ -6,9 +6,14 @@ import pytest
 from pipeline.analytic.gauss_rules import overlap
 from pipeline.analytic.soft_horizons import (
     AZIMUTHS,
+    CURVATURES,
+    FALL,
     above,
     around,
     azimuths_apart,
+    bend_cells,
+    bend_of,
+    bend_rows,
     from_even,
     over_boxes,
     ramp,
@@ -61,3 +66,34 @@ def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
 def test_no_azimuth_is_an_azimuth_too():
     low, _, turn = around(np.float32(0.0), np.float32(0.0))
     assert 0 <= low < AZIMUTHS and 0.0 <= turn <= 1.0
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.01, 0.05, 0.1, 0.25, 0.7, 1.0])
+def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature(curvature):
+    """With shares of 1 the sine falls by FALL times the curvature, between tabulated curvatures too."""
+    bend = bend_of(np.float32(curvature))
+    assert 0 <= bend.low <= bend.high < len(CURVATURES)
+    assert bend.of_low + bend.of_high == pytest.approx(FALL * curvature, rel=1e-6)
+    if curvature in CURVATURES:
+        assert max(bend.of_low, bend.of_high) == pytest.approx(FALL * curvature, rel=1e-6)
+        own = bend.high if bend.of_high > 0 else bend.low
+        assert CURVATURES[own] == curvature
+
+
+def test_fixed_and_placed_nodes_have_the_same_horizon_over_curved_cloth():
+    """Rows of blocks and cells of a grid in levels; without curvature both are the line between two azimuths."""
+    random = np.random.default_rng(2)
+    level = random.integers(0, 256, (2, 16), np.uint8)
+    falls = random.integers(0, 256, (len(CURVATURES), 2, 16), np.uint8)
+    cells, turn = np.arange(16, dtype=np.uint32), np.float32(0.3)
+    for curvature in (0.0, 0.03, 0.4):
+        bend = bend_of(np.float32(curvature))
+        rows, placed = np.zeros((1, 16), np.float32), np.zeros(16, np.float32)
+        of_blocks = (a.astype(np.float32)[..., None, :] / np.float32(255.0) for a in (level, falls))
+        bend_rows(*of_blocks, 0, 1, turn, bend, rows)
+        flat = falls.reshape(len(CURVATURES), -1)
+        bend_cells(level.ravel(), flat, cells, np.uint32(0), np.uint32(16), turn, bend, placed)
+        np.testing.assert_allclose(placed / 255.0, rows[0], atol=2e-6)
+        straight = (1.0 - turn) * level[0] + turn * level[1]
+        assert (placed <= straight + 1e-3).all()
+        assert curvature > 0.0 or np.allclose(placed, straight, atol=1e-4)

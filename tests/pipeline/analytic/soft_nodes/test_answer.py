@@ -10,7 +10,7 @@ from pipeline.analytic.soft_nodes.answer import query_sums, sum_queries
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
+from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE, SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import deviations
@@ -192,3 +192,69 @@ def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
     # Horizons are means over the cells of one thread in place of those of all, and regimes end elsewhere.
     assert (np.sqrt(np.mean((added - whole) ** 2, axis=0)) < 0.05 * whole.mean(axis=0) + 1e-4).all()
     np.testing.assert_allclose(added.mean(axis=0), whole.mean(axis=0), rtol=0.02, atol=1e-4)
+
+
+SIZES = {"narrow": (0.05, 0.2), "middle": (0.3, 1.0), "wide": (3.0, 8.0)}
+SHAPES = [pytest.param(sigma, stretch, id=f"{name}{', long' if stretch > 1 else ''}")
+          for name, sigma in SIZES.items() for stretch in (1.0, 5.0)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
+@pytest.mark.parametrize("width", [1.0, 0.7])
+def test_straight_from_above_the_whole_footprint_is_seen(width, sigma, stretch):
+    """The projected area of all yarns and gaps is 1; up to 2 % of a footprint is cut off."""
+    fabric = cloth("cotton_twill", width=width)
+    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch), fabric.weave.repeat, 4, 0, 60)
+    up = np.tile(np.float32([0.0, 0.0, 1.0]), (60, 1))
+    sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=up))
+    np.testing.assert_allclose(sums[:, :, BARE_AREA].sum(axis=1) + gaps, 1.0, atol=0.02)
+    # A gap is seen through both sides of the cloth; nothing hides a yarn from straight above.
+    np.testing.assert_allclose(sums[:, :, AREA], sums[:, :, BARE_AREA], rtol=2e-3, atol=1e-4)
+    assert (gaps > 0.0).any() == (width < 1.0)
+
+
+@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
+def test_light_and_viewer_change_places(sigma, stretch):
+    """Bare numerators are reciprocal, diffuse ones where cosines go to the ply; a round footprint's weights are fixed.
+
+    Placed nodes do not depend on the directions either, so that only the order of float32 sums differs.
+    """
+    fabric = cloth("cotton_twill", blend=1.0)
+    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=70.0), fabric.weave.repeat, 5, 0, 60)
+    table = tabulate(fabric)
+    there, _ = query_sums(table, queries)
+    back, _ = query_sums(table, queries._replace(wi=queries.wo, wo=queries.wi))
+    for column in (BARE_SPECULAR, BARE_DIFFUSE):
+        size = there[:, :, column].max()
+        np.testing.assert_allclose(back[:, :, column], there[:, :, column], rtol=1e-4, atol=1e-5 * size)
+    assert not np.allclose(
+        back[:, :, AREA], there[:, :, AREA], rtol=1e-2
+    )  # the shares of the area differ: no empty test
+
+
+@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
+def test_hidden_parts_are_parts(sigma, stretch):
+    """Shadows and masking take light away: no sum exceeds its bare one, up to the faint tail of the ramp."""
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=85.0), fabric.weave.repeat, 6, 0, 100)
+    sums, _ = query_sums(tabulate(fabric), queries)
+    assert (sums >= 0.0).all()
+    for seen, bare in ((AREA, BARE_AREA), (DIFFUSE, BARE_DIFFUSE), (SPECULAR, BARE_SPECULAR)):
+        assert (sums[:, :, seen] <= 1.001 * sums[:, :, bare] + 1e-7).all()
+    assert (sums[:, :, AREA] < 0.9 * sums[:, :, BARE_AREA]).any()
+
+
+@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
+def test_the_mirrored_cloth_answers_mirrored_queries(sigma, stretch):
+    """x -> -x turns the draft and the sense of the twists; ends keep their family."""
+    fabric = cloth("cotton_twill", twist=20.0)
+    ends, _ = fabric.weave.repeat
+    mirrored = cloth("cotton_twill", twist=-20.0)
+    rows = [row[::-1] for row in fabric.weave.rows()]
+    mirrored = mirrored.model_copy(update={"draft": Matrix(rows=rows)})
+    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=70.0), fabric.weave.repeat, 7, 0, 60)
+    flip = np.float32([-1.0, 1.0, 1.0])
+    other = queries._replace(u=ends - queries.u, wi=queries.wi * flip, wo=queries.wo * flip, angle=-queries.angle)
+    first, second = read_queries(tabulate(fabric), queries), read_queries(tabulate(mirrored), other)
+    error = np.abs(first.components - second.components).max(axis=0)
+    assert (error < 0.01 * first.components.max(axis=0)).all(), error

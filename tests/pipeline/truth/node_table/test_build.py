@@ -1,6 +1,9 @@
 """The table of nodes: symmetries, areas, horizons against exact visibility, and its answers against converged ones."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -130,3 +133,48 @@ def test_a_viewer_behind_sees_the_back():
     np.testing.assert_allclose(
         estimate(fabric, behind, options, 0).mean, estimate(fabric.back(), front, options, 0).mean, rtol=1e-5, atol=1e-7
     )
+
+
+FENCED = """
+import ctypes
+import mmap
+import numpy as np
+from pipeline.truth.cloth import cloth_side
+from pipeline.truth.geometry.horizon import horizons
+from pipeline.truth.node_table.build import tabulate
+from pipeline.truth.options import TruthOptions
+from weaves.fabric import load_fabric
+
+protect, page = ctypes.CDLL(None).mprotect, mmap.PAGESIZE
+protect.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
+
+def fenced(values):
+    # A copy whose last byte is the last one before a page that nobody may touch.
+    size = -(-values.nbytes // page) * page
+    memory = np.frombuffer(mmap.mmap(-1, size + page), np.uint8)
+    assert protect(memory.ctypes.data + size, page, 0) == 0
+    own = memory[size - values.nbytes : size].view(values.dtype).reshape(values.shape)
+    own[...] = values
+    return own
+
+def field(side):
+    return type(side)(*(fenced(part) if isinstance(part, np.ndarray) else part for part in side))
+
+for name in ("denim", "voile"):
+    cloth = cloth_side(load_fabric(name), TruthOptions())
+    front, back = field(cloth.front), field(cloth.back)
+    tables = [tabulate(*sides, True, 6, 8) for sides in ((cloth.front, cloth.back), (front, back))]
+    assert all(np.array_equal(a, b) for a, b in zip(*tables))
+    picks, ends = front.top.shape
+    corners = np.array([(x, y) for x in (0.0, np.nextafter(ends, 0.0)) for y in (0.0, np.nextafter(picks, 0.0))])
+    x, y = fenced(corners[:, 0]), fenced(corners[:, 1])
+    assert all(np.isfinite(horizons(side, x, y, 8, True, bend)).all() for side in (front, back) for bend in (0.0, 0.3))
+print("done")
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pages are protected by mprotect")
+def test_the_kernels_of_a_table_stay_within_their_arrays():
+    """In a process of its own, which a read beyond an array's end would kill."""
+    ended = subprocess.run([sys.executable, "-c", FENCED], env=os.environ, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout.strip()) == (0, "done"), ended.stderr
