@@ -237,7 +237,7 @@ def _fixed_node(
 
 
 @inlined_fast_kernel
-def _placed_node(
+def _footprint_node(
     nodes: Float32, k: int, radius: np.float32, fibre: Fibre, hx: np.float32, hy: np.float32, hz: np.float32
 ) -> tuple[NodeFrame, np.float32, np.float32]:
     """Return the same of a node placed in a footprint."""
@@ -349,7 +349,7 @@ def shade_footprint(
     for k in range(len(cells)):
         lit = ramp(_over(light, cells[k], level_i, sharp))
         seen = _seen(_over(viewer, cells[k], level_o, sharp))
-        at, along, across = _placed_node(nodes, k, radius, fibre, hx, hy, hz)
+        at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
         node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
             d, at, along, across, seen, lit, nodes[WEIGHT, k], layer
         )
@@ -388,7 +388,7 @@ def shade_footprint_behind(
     for k in range(len(cells)):
         lit = ramp(_over(light, cells[k], level_i, sharp))
         seen = _seen(_over(viewer, cells[k], level_o, sharp))
-        at, along, across = _placed_node(nodes, k, radius, fibre, hx, hy, hz)
+        at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
         of_node = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
         a += of_node[0]
         c += of_node[1]
