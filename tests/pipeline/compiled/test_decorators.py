@@ -143,6 +143,7 @@ def copies(tmp_path: Path) -> list[Path]:
     return folders
 
 
+@pytest.mark.slow
 def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies):
     order = ("fast", "plain", "twice", "smooth", "shared")
     cold = answers(start(copies[0], ASK, *order))

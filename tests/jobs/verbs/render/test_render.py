@@ -47,6 +47,7 @@ def codes_of(path):
     return rgba[..., :3]
 
 
+@pytest.mark.slow
 def test_a_picture_is_the_frame_of_the_benchmark(render, tmp_path):
     """The light of the cloth is the same; the light through it is the fallback's, 1 to 3 % from the truth's: a code.
 
@@ -82,6 +83,7 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
     assert about["fallback_share"] == 0 and about["versions"].startswith("truth ")
 
 
+@pytest.mark.slow
 def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_path):
     """Denim's swatch is the scene `swatch` with denim; a satin of more threads than a swatch has gets more yarns."""
     monkeypatch.setattr(jobs.verbs.show, "SWATCH_SIZE", "32x24")

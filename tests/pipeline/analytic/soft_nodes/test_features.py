@@ -18,6 +18,7 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -78,9 +79,10 @@ def asked(fabric, count=200, **options):
     return queries
 
 
-@pytest.mark.parametrize("name", ["voile", "wool_gabardine", "satin_8"])
+@pytest.mark.parametrize("name", ["voile", slow("wool_gabardine"), slow("satin_8")])
 @pytest.mark.parametrize(
-    ("sigma", "bound", "clear"), [((0.05, 0.25), 0.18, 0.03), ((0.25, 1.0), 0.06, 0.006), ((1.0, 8.0), 0.035, 0.005)]
+    ("sigma", "bound", "clear"),
+    [((0.05, 0.25), 0.18, 0.03), slow((0.25, 1.0), 0.06, 0.006), ((1.0, 8.0), 0.035, 0.005)],
 )
 def test_it_is_near_the_truth(name, sigma, bound, clear):
     """RMSE of a grey cloth's colour over its mean, and of the transparency."""
