@@ -85,6 +85,7 @@ def test_samples_name_their_lobe(mi):
     assert [int(bsdf.flags(index)) & int(flags.All) for index in range(3)] == [2 + 8, 4 + 16, 1]
 
 
+@pytest.mark.slow
 def test_a_context_chooses_lobes(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
     si, front, behind = (

@@ -160,6 +160,7 @@ def test_mitsubas_own_integrators_show_cloth_where_they_are_evaluated(llvm, kind
     np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["denim", "gauze"])
 def test_cloth_in_an_even_sky_makes_no_light(mi, name):
     """Radiance is at most that of the sky: scattered light below 1, and what comes through gaps adds up to it."""

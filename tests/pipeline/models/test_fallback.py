@@ -123,6 +123,7 @@ def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
     np.testing.assert_array_equal(found, fallback_answers(rough, queries, 0))
 
 
+@pytest.mark.slow
 def test_a_method_may_answer_outside_its_domain_itself():
     """`selvage` does, by its soft nodes; the network answers within the domain, and nothing is left to the fallback."""
     (selvage,) = load_model(pretrained_folder("selvage"))

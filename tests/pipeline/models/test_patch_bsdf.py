@@ -93,6 +93,7 @@ def test_samples_follow_their_density(bsdfs, names):
     assert min(values.values()) > 1 - (1 - LEVEL) ** (1 / len(values)), values
 
 
+@pytest.mark.slow
 def test_weights_have_the_integral_of_eval_as_their_mean(bsdfs):
     """A z-test of scattered light and of light straight through, against even directions; Sidak at LEVEL."""
     scores, count = {}, 40_000
@@ -154,6 +155,7 @@ def test_the_back_is_the_front_of_the_turned_cloth(bsdfs):
     np.testing.assert_allclose(bsdf.straight(looks), back.straight(looks.turned()), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_patches_that_nobody_sees_still_have_samples():
     wo = np.tile(np.array(unit(89.8, 3.0), np.float32), (64, 1))
     u, v, sigma = (np.full(64, value, np.float32) for value in (0.62, 0.57, 0.01))

@@ -350,6 +350,7 @@ def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
     assert found["auto"] < 0.25 * found["owen"]
 
 
+@pytest.mark.slow
 def test_a_shadow_edge_between_two_azimuths_is_reported():
     """The edge of a yarn hides part of the next one from this viewer at one of the two azimuths beside it.
 

@@ -52,6 +52,7 @@ def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
     assert wrong**2 < 0.9 * error(flat, of_curved) ** 2
 
 
+@pytest.mark.slow
 def test_flat_rows_do_not_depend_on_curved_ones():
     fabric, method = load_fabric("voile"), SoftNodes()
     asked = draw_queries(QueryOptions(behind=0.3), fabric.weave.repeat, 2, 0, 300)

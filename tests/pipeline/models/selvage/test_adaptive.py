@@ -64,6 +64,7 @@ def test_who_answers(selvage, denim):
     np.testing.assert_array_equal(answers[left], fallback_answers(denim, queries.take(left), 5))
 
 
+@pytest.mark.slow
 def test_light_from_behind_is_answered_by_the_finest_nodes(selvage, denim):
     queries = draw_queries(QueryOptions(behind=0.5), denim.weave.repeat, 1, 0, 64)
     behind = queries.wi[:, 2] < 0
