@@ -5,11 +5,16 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).parents[1]
 
 # Processes that tests start, also those in copies of the tree, read the kernels that this tree has compiled.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "__pycache__"))
+
+# Examples depend on the test alone: what passes once passes again.
+settings.register_profile("fixed", derandomize=True)
+settings.load_profile("fixed")
 
 STARTED = {"cpp", "selvage_cpp", "neumip_cpp", "webgl", "browse", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
