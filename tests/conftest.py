@@ -1,7 +1,6 @@
 """What all tests share: one cache of compiled kernels, the lane of programs that are started, the order."""
 
 import os
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -45,11 +44,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish(session):
-    """Keep the number of tests within its budget when the whole lane is collected."""
+    """Note the number of tests when the whole lane is collected; tests/test_lint.py compares it with its budget."""
     config = session.config
-    if config.args_source is not config.ArgsSource.TESTPATHS or config.option.markexpr != QUICK:
-        return
-    limit = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["budgets"]["tests"]
-    config.cache.set("budgets/tests", len(session.items))
-    if len(session.items) > limit:
-        raise pytest.UsageError(f"{len(session.items):,} tests, the budget is {limit:,} (pyproject.toml)")
+    if config.args_source is config.ArgsSource.TESTPATHS and config.option.markexpr == QUICK:
+        config.cache.set("budgets/tests", len(session.items))

@@ -94,3 +94,8 @@ def test_help_and_plans_load_no_heavy_library(code):
     done = subprocess.run([sys.executable, "-c", f"{code}; {check}"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "loaded:"
+
+
+def test_make_test_has_as_many_tests_as_its_budget_at_most():
+    """Of the whole lane that is running, or that ran last."""
+    assert budgets.tests() <= budgets.limits()["tests"]
