@@ -30,7 +30,7 @@ def write_small(name, folder):
     if "unseen_population" in dataset:
         dataset["unseen_population"]["count"] = min(dataset["unseen_population"]["count"], MOST_UNSEEN)
     dataset["shard_rows"] = 4096  # each shard is a task
-    content["models"] = [_model(entry, folder) for entry in content["models"]]
+    content["models"] = [_model(entry, folder) for entry in content.get("models", [])]
     content["bench"] = _bench(content.get("bench", {}))
     path = folder / f"{name}.toml"
     path.write_text(tomli_w.dumps(content), encoding="utf-8")

@@ -64,7 +64,6 @@ def test_a_given_method_is_one_more_model(files, theirs):
     before, after = ids(load_recipe(path)), ids(load_recipe(path, [theirs]))
     new = after.keys() - before.keys()
     assert new == {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")} | {
-        "bench errors by size of theirs",
         "bench extremes of theirs",
     }
     changed = {title for title in before if after[title] != before[title]}
