@@ -72,7 +72,7 @@ CPU = torch.device("cpu")
 
 @pytest.mark.parametrize("chunk", [1, 10, 37, 100])
 def test_chunks_keep_the_order_of_rows_and_columns(chunk, monkeypatch):
-    monkeypatch.setattr("pipeline.models.method.CHUNK", chunk)
+    monkeypatch.setattr("pipeline.models.network.CHUNK_ROWS", chunk)
     asked = in_chunks(QUERIES, lambda wo, u: torch.cat([u[:, None], wo], dim=-1), CPU, ("wo", "u"), 4)
     np.testing.assert_array_equal(asked, np.concatenate([QUERIES.u[:, None], QUERIES.wo], axis=1))
 
