@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.models.options import RoundFootprint
 from pipeline.scenes.options import SceneOptions, View, ViewOptions
 from pipeline.truth.options import TruthOptions
+from weaves.validation import Frozen
 
 LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
     ("denim", "satin_8", "yarns"),
@@ -42,14 +43,10 @@ WishedError = Annotated[float, Field(gt=0, lt=1)]
 """A relative error."""
 
 
-class _Options(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+_Kind = TypeVar("_Kind", bound=Frozen)
 
 
-_Kind = TypeVar("_Kind", bound=_Options)
-
-
-class EdgeOptions(_Options):
+class EdgeOptions(Frozen):
     """The edge of a cloth cylinder (`reports.measure.silhouette`): cylinder, camera, light and truth."""
 
     radius: float = Field(default=10.0, ge=1, le=1e4)
@@ -69,7 +66,7 @@ class EdgeOptions(_Options):
     """Of the truth's points."""
 
 
-class ImageOptions(_Options):
+class ImageOptions(Frozen):
     """How a picture is compared with the truth's (`reports.measure.scene.image_error`)."""
 
     block: int = Field(default=16, ge=1, le=4096)
@@ -81,7 +78,7 @@ class ImageOptions(_Options):
     """Of the resamples and of the noised copy of the truth."""
 
 
-class _SceneSeed(_Options):
+class _SceneSeed(Frozen):
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth's points and of the points of random methods."""
 
@@ -117,7 +114,7 @@ class SceneBenchOptions(SceneErrorOptions, ShotOptions):
     """Scenes of the package, or paths of scenes as `pipeline.scenes.catalogue` reads them."""
 
 
-class _SeededOptions(_Options):
+class _SeededOptions(Frozen):
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth of the pictures and of the random points of the baseline."""
 
@@ -163,7 +160,7 @@ class FrameOptions(_ViewedOptions):
     """How true the frames of the truth are."""
 
 
-class RepeatOptions(_Options):
+class RepeatOptions(Frozen):
     """How often a timed call is repeated."""
 
     timing_repeats: int = Field(default=25, ge=20, le=10_000)
@@ -182,7 +179,7 @@ class TimingOptions(RepeatOptions, ErrorOptions):
     """Numbers of threads that methods are timed with; 0: one a core of the machine. The fewest are what is compared."""
 
 
-class RunOptions(_Options):
+class RunOptions(Frozen):
     """Ways to use a trained network that are measured beside the network itself."""
 
     bounds: bool = False
@@ -213,7 +210,7 @@ MOST_TILE: Final = 512
 """Fewest and most pixels along each side of a picture of the truth on a live page."""
 
 
-class LiveOptions(_Options):
+class LiveOptions(Frozen):
     """Live pages of fabrics, as `twillight view` writes them."""
 
     fabrics: tuple[str, ...] = ()
@@ -239,6 +236,6 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     """The silhouette, measured where the data set's queries are of curved cloth."""
 
 
-def select(kind: type[_Kind], options: _Options) -> _Kind:
+def select(kind: type[_Kind], options: Frozen) -> _Kind:
     """Return those of the options that a measurement reads."""
     return kind(**{name: getattr(options, name) for name in kind.model_fields})

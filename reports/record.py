@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import pandas as pd
-from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
 
 from pipeline import versions
 from pipeline.atomic import atomic_write
@@ -29,6 +29,7 @@ from reports.error import Error
 from reports.options import Role
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_json
+from weaves.validation import Frozen
 
 PACKAGES: Final = (
     "numpy",
@@ -64,10 +65,8 @@ Metric = Annotated[str, AfterValidator(_known)]
 """Name of a metric, a key of `reports.catalogue.METRICS`."""
 
 
-class Provenance(BaseModel):
+class Provenance(Frozen):
     """Subject of a measurement: names and fingerprints common to a task's records."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     recipe: str = ""
     """Name of the recipe."""
@@ -87,10 +86,8 @@ class Provenance(BaseModel):
     """Version of the measurements (`pipeline.versions.BENCH`)."""
 
 
-class Record(BaseModel):
+class Record(Frozen):
     """One measurement."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     method: str
     """Name of the method as the recipe names it; ``truth`` for the reference itself."""
@@ -166,10 +163,8 @@ _MOST_RECORDS: Final = 100_000
 _RECORDS: Final = TypeAdapter(Annotated[list[Record], Field(max_length=_MOST_RECORDS), FailFast()])
 
 
-class Machine(BaseModel):
+class Machine(Frozen):
     """Where and when it was measured."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     cpu: str
     """Model of the processor."""

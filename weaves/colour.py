@@ -15,7 +15,9 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Strict, Tag, model_validator
+
+from weaves.validation import Frozen
 
 Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
 Rgb = tuple[float, float, float]
@@ -27,10 +29,8 @@ LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
 """Luminance of linear sRGB primaries (Rec. 709)."""
 
 
-class Spectrum(BaseModel):
+class Spectrum(Frozen):
     """A reflectance spectrum: linear between the samples, constant beyond them."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     wavelengths: tuple[Annotated[float, Strict(), Field(ge=200, le=2000, allow_inf_nan=False)], ...] = Field(
         min_length=2, max_length=1000

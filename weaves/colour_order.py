@@ -10,11 +10,12 @@ from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationError, model_validator
+from pydantic import Field, StrictInt, ValidationError, model_validator
 
 from weaves.colour import Colour, linear_rgb
 from weaves.draft import smallest_period
 from weaves.errors import nearest
+from weaves.validation import Frozen
 from weaves.yarn import Yarn
 
 MOST_COLOURS: Final = 256
@@ -41,10 +42,8 @@ class ThreadColours(NamedTuple):
     diffuse_transmission: npt.NDArray[np.float64]
 
 
-class PaletteColour(BaseModel):
+class PaletteColour(Frozen):
     """A colour of threads; what is not given is that of the yarn."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     diffuse: Colour
     """Colour k_d of the light scattered many times and sent back."""
@@ -64,7 +63,7 @@ class PaletteColour(BaseModel):
         return Yarn.model_validate(yarn.model_dump() | given)
 
 
-class ColourOrder(BaseModel):
+class ColourOrder(Frozen):
     """The colours of single ends and picks.
 
     Examples
@@ -76,8 +75,6 @@ class ColourOrder(BaseModel):
     >>> order.threads("picks")
     ()
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     palette: dict[Annotated[str, Field(min_length=1, max_length=60)], PaletteColour] = Field(
         min_length=1, max_length=MOST_COLOURS

@@ -13,9 +13,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
+from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from weaves.errors import BadInput
+from weaves.validation import Frozen
 
 LARGEST_REPEAT = 128
 """Most ends, and most picks, of a repeat."""
@@ -224,10 +225,8 @@ def smallest_period(values: npt.NDArray[np.generic], axis: int = 0) -> int:
     return next(periods, 0)
 
 
-class Family(BaseModel):
+class Family(Frozen):
     """Draft of a fabric file; each weave family is a subclass, chosen by the key `family`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     def build(self) -> Draft:
         """Weave the draft."""

@@ -15,8 +15,6 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     Strict,
@@ -28,7 +26,7 @@ from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
 from weaves.families import Basket, BrokenTwill, Herringbone, Plain, Rib, Sateen, Satin, Twill
-from weaves.validation import read_toml, validated
+from weaves.validation import Frozen, read_toml, validated
 from weaves.yarn import Yarn
 
 PRESETS = Path(__file__).parent / "presets"
@@ -51,7 +49,7 @@ YarnCount = Annotated[float, Strict(), Field(ge=0.1, le=1000)]
 """Yarns per centimetre."""
 
 
-class Fabric(BaseModel):
+class Fabric(Frozen):
     """A woven fabric.
 
     Examples
@@ -62,8 +60,6 @@ class Fabric(BaseModel):
     >>> denim.model_copy(update={"name": "thin_denim", "optical_thickness": 0.5}).optical_thickness
     0.5
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     name: Annotated[str, AfterValidator(_file_name)]
     """Letters, digits, - and _: it becomes part of file names."""

@@ -23,8 +23,6 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     StrictBool,
     StrictInt,
@@ -36,6 +34,7 @@ from weaves.draft import Draft, Matrix, cells
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.families import basket, broken_twill, herringbone, plain, rib, sateen, satin, twill, valid_moves
+from weaves.validation import Frozen
 from weaves.yarn import Number, Yarn
 
 FamilyName = Literal[
@@ -80,10 +79,8 @@ Range = tuple[Number, Number]
 Roughness = Annotated[Range, AfterValidator(_range_of("roughness"))]
 
 
-class Ranges(BaseModel):
+class Ranges(Frozen):
     """Ranges [lowest, highest] of the parameters of the yarns, drawn for each yarn separately."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     roughness_warp: Roughness = (0.01, 0.49)
     """Roughness of the warp, uniform in its square root."""
@@ -99,10 +96,8 @@ class Ranges(BaseModel):
     """Fibre angle, degrees; one value for both yarns, which a mill spins alike."""
 
 
-class Population(BaseModel):
+class Population(Frozen):
     """A set of random fabrics."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     count: StrictInt = Field(default=0, ge=0, le=100_000)
     """Number of fabrics."""

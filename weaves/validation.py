@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from weaves.errors import BadInput, brief, nearest, one_line
 from weaves.reading import MOST_TEXT, read_text
@@ -26,6 +26,12 @@ MOST_DEPTH: Final = 16
 # none that goes back, keep the search itself linear.
 _PART = r"""(?:(?<![\w-])[\w-]++|"(?:\\.|[^"\\\n]){0,99}+"|'[^'\n]{0,99}+')"""
 _LONG_KEY = re.compile(rf"(?:{_PART}[ \t]{{0,99}}+\.[ \t]{{0,99}}+){{{MOST_DEPTH}}}")
+
+
+class Frozen(BaseModel):
+    """Data from outside or for an identity: fixed, without other keys, every number finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import Field, Strict, model_validator
 
 from weaves.colour import Colour, Rgb, linear_rgb
+from weaves.validation import Frozen
 
 Number = Annotated[float, Strict()]
 
 
-class Yarn(BaseModel):
+class Yarn(Frozen):
     """One family of yarns, warp or weft."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     width: Number = Field(default=1.0, ge=0.05, le=1)
     """Gap scale g: width of the yarn in yarn spacings; below 1 the cloth has gaps."""

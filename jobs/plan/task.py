@@ -14,7 +14,6 @@ from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
-    ConfigDict,
     SerializationInfo,
     SerializerFunctionWrapHandler,
     WrapSerializer,
@@ -23,6 +22,7 @@ from pydantic import (
 
 from pipeline.fingerprint import IDENTITY, fingerprint
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 _Kind = TypeVar("_Kind")
 
@@ -43,10 +43,8 @@ Places = Annotated[tuple[str, ...], PLACE]
 """Several of them."""
 
 
-class TaskPart(BaseModel):
+class TaskPart(Frozen):
     """A part of a task: typed fields, without its places in an identity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     @model_serializer(mode="wrap")
     def _without_places(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:

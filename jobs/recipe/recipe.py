@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, StrictStr, model_validator
+from pydantic import AfterValidator, Field, StrictInt, StrictStr, model_validator
 
 from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.queries import QueryOptions
@@ -22,6 +22,7 @@ from reports.added_metric import AddedMetric
 from reports.options import BenchOptions, RuntimeName
 from weaves.fabric import Fabric
 from weaves.population import Population
+from weaves.validation import Frozen
 
 if TYPE_CHECKING:
     from pipeline.shards.extra_rows import ExtraRows
@@ -38,11 +39,7 @@ def _not_too_many(population: Population) -> Population:
     return population
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
-
-
-class Rows(_Section):
+class Rows(Frozen):
     """Queries for each fabric."""
 
     train: StrictInt = Field(ge=1, le=10**10)
@@ -55,7 +52,7 @@ class Rows(_Section):
     """For the benchmark, each named fabric and each of the unseen population; no model ever reads them."""
 
 
-class DatasetOptions(_Section):
+class DatasetOptions(Frozen):
     """Data set of a recipe: computed once, for all models."""
 
     seen: tuple[StrictStr, ...] = Field(min_length=1)
@@ -88,7 +85,7 @@ class DatasetOptions(_Section):
         return self.training_truth or self.truth if split == "train" else self.truth
 
 
-class ModelRecipe(_Section):
+class ModelRecipe(Frozen):
     """A model and how it is trained; in TOML the options stand beside the table ``training``.
 
     An entry with the key ``recipe`` names a model of another recipe, which trains it (`jobs.recipe.trained_by`).
@@ -153,7 +150,7 @@ class ModelRecipe(_Section):
         return bench.model_copy(update={"runtimes": runtimes})
 
 
-class RecipeFile(_Section):
+class RecipeFile(Frozen):
     """A recipe's TOML file, key by key."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]

@@ -23,13 +23,13 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.mitsuba.bsdf import BSDF
 from pipeline.mitsuba.worn import PIXEL
 from pipeline.scenes.loading import has_uv
 from weaves.errors import BadInput
-from weaves.validation import validated
+from weaves.validation import Frozen, validated
 
 INTEGRATOR: Final = "twillight_path"
 """Name of the plugin."""
@@ -45,10 +45,8 @@ FLAGS: Final = ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals")
 """Flags of Dr.Jit that are off inside."""
 
 
-class PathOptions(BaseModel):
+class PathOptions(Frozen):
     """Properties of the integrator; they mean what they mean for Mitsuba's `path`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     max_depth: int = Field(default=-1, ge=-1)
     """Longest path; 1 shows lights only, 2 light scattered once; -1: no limit."""

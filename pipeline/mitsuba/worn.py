@@ -24,7 +24,7 @@ from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.analytic.importance.lobes import Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
@@ -42,6 +42,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
+from weaves.validation import Frozen
 
 RUN: Final = 2**14
 """Rows that a thread answers at a time."""
@@ -62,10 +63,8 @@ _FLAT = 1e-6  # least |cosine| of a light
 Part = TypeVar("Part")
 
 
-class ClothOptions(BaseModel):
+class ClothOptions(Frozen):
     """Cloth of a shape, the method that evaluates it, and the size of its footprints."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     fabric: str
     """A preset, or the path of a fabric's TOML."""

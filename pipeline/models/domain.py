@@ -19,13 +19,13 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict
 
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 PHYSICS: Final = ("footprint", "frame", "normaliser", "shadows", "variation")
 """Options of the truth that define the learnt quantity; the other options set its accuracy."""
@@ -40,10 +40,8 @@ AVERAGED: Final = 0.5
 """Standard deviation of a footprint that sees the average of the repeat, in repeats."""
 
 
-class Domain(BaseModel):
+class Domain(Frozen):
     """Queries, physics and yarns that a model was trained on."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     queries: QueryOptions
     """Distribution of the queries."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     SerializationInfo,
     SerializerFunctionWrapHandler,
@@ -17,6 +15,7 @@ from pydantic import (
 from pipeline import versions
 from pipeline.fingerprint import IDENTITY
 from pipeline.shards.extra_rows import ExtraRows
+from weaves.validation import Frozen
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
 """A name that is valid in file names and task ids."""
@@ -40,10 +39,8 @@ def setting_of(k: int | None) -> str:
     return "" if k is None else f"k = {k}"
 
 
-class Design(BaseModel):
+class Design(Frozen):
     """A design: options, and choices that are no options but part of its identity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     fixed: ClassVar[tuple[str, ...]] = ()
     """Names of the choices of its design that are no options; identities and cards state them beside the options."""

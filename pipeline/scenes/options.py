@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from weaves.validation import Frozen
 
 View = Literal["sphere", "plane"]
 """The views of one fabric: cloth on a sphere, and on a plane running to the horizon."""
 
 
-class PixelOptions(BaseModel):
+class PixelOptions(Frozen):
     """Footprints of pixels, and where they are cut."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     pixel_sigma: float = Field(default=0.5, gt=0, le=4)
     """Standard deviation of the pixel's Gaussian, in pixels."""

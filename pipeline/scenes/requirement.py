@@ -11,21 +11,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.errors import BadInput
+from weaves.validation import Frozen
 
 _RARE = 5e-4  # share of the queries beyond either end of a range
 _ROUND = 1.05  # ratio of a footprint's axes up to which it counts as round
 _STEEPEST = 89.9  # degrees
 
 
-class Requirement(BaseModel):
+class Requirement(Frozen):
     """Queries of a scene, summarised."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     scene: str
     """Name of the scene."""

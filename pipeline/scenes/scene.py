@@ -14,7 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from weaves.validation import Frozen
 
 PREFIX: Final = "fabric_"
 """Beginning of the id of a BSDF that represents a cloth."""
@@ -23,10 +25,8 @@ Yarns = Annotated[float, Field(gt=0, le=1e7)]
 Length = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class Cloth(BaseModel):
+class Cloth(Frozen):
     """Cloth of the shapes with one BSDF id."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     fabric: str = ""
     """A preset, or the path of a fabric's TOML; left out: the preset that the BSDF's id names."""
@@ -36,10 +36,8 @@ class Cloth(BaseModel):
     """Angle from u to the weft, in degrees, as the front shows it."""
 
 
-class Scene(BaseModel):
+class Scene(Frozen):
     """A scene and its frames: the camera moves, everything else stays."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,60}$")
     """Letters, digits, - and _: it becomes part of file names."""

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
@@ -18,6 +18,7 @@ from pipeline.shader.tables import ClothTables, Place
 from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 GOLDEN: Final = "golden.json"
 
@@ -32,11 +33,7 @@ _FILES: Final = {
 _CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
-
-
-class Buffer(_Model):
+class Buffer(Frozen):
     """A buffer that the shader reads."""
 
     files: dict[str, str]
@@ -49,7 +46,7 @@ class Buffer(_Model):
     """Arrays in it, after the scalars."""
 
 
-class PlacedLayer(_Model):
+class PlacedLayer(Frozen):
     """A layer: outputs = activation(biases + inputs times weights)."""
 
     network: str
@@ -62,7 +59,7 @@ class PlacedLayer(_Model):
     """Function of each output."""
 
 
-class Networks(_Model):
+class Networks(Frozen):
     """The networks of a model, in the buffer `weights`. Offsets are in elements, shapes in numbers."""
 
     name: str
@@ -81,7 +78,7 @@ class Networks(_Model):
     """Inputs of the ONNX form, each of N rows; its output is `components`, (N, 4)."""
 
 
-class Colours(_Model):
+class Colours(Frozen):
     """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
 
     Means if threads differ in colour.
@@ -123,7 +120,7 @@ CONVENTIONS: Final = [
 """Axes, directions, cosine and colours."""
 
 
-class Descriptor(_Model):
+class Descriptor(Frozen):
     """Content of `soft_nodes.json`."""
 
     model: str = "soft_nodes"
@@ -160,13 +157,13 @@ class Descriptor(_Model):
     """Buffers, by the name that they have in the source."""
     network: Networks | None = None
     """Networks, of a model that has some."""
-    source: list[str] = []
+    source: list[str] = Field(default_factory=list)
     """Files of the source."""
-    languages: dict[str, list[str]] = {}
+    languages: dict[str, list[str]] = Field(default_factory=dict)
     """Files that slangc made, by language."""
     golden: str = GOLDEN
     """Queries with their answers."""
-    files: dict[str, str] = {}
+    files: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of every file, by path; that of this file is of its other keys."""
 
 

@@ -15,22 +15,21 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.fingerprint import stream_seed
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 if TYPE_CHECKING:
     from pipeline.truth.query import Answers
 
 
-class AngularSamples(BaseModel):
+class AngularSamples(Frozen):
     """Which angular samples of a fabric's texels are computed, and how."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     kind: Literal["angular_samples"] = "angular_samples"
     """Kind of the rows."""

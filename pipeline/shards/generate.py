@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from pipeline import versions
 from pipeline.fingerprint import stream_seed
@@ -15,14 +15,13 @@ from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 
 
-class ShardTask(BaseModel):
+class ShardTask(Frozen):
     """Everything that a shard of the data set's own rows depends on, and the fabric's name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     fabric: Fabric
     """The fabric; its colours and source do not enter the numbers."""
@@ -49,10 +48,8 @@ class ShardTask(BaseModel):
         return _identity(self)
 
 
-class ExtraShardTask(BaseModel):
+class ExtraShardTask(Frozen):
     """Everything that a shard of extra rows depends on, and the fabric's name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     fabric: Fabric
     """The fabric; its colours and source do not enter the numbers."""

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError
+from pydantic import BaseModel, FailFast, Field, ValidationError
 
 from pipeline.atomic import atomic_write
 from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
@@ -26,6 +26,7 @@ from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.reading import MIB, read_json
+from weaves.validation import Frozen
 
 Role = Literal["seen", "population", "unseen", "unseen_population"]
 Split = Literal["train", "validation", "test"]
@@ -38,10 +39,8 @@ _LINES: Final = json.JSONEncoder(sort_keys=True, separators=(",\n   ", ": "))
 _MOST_FABRICS: Final = 110_000  # a population has at most 100,000
 
 
-class ShardEntry(BaseModel):
+class ShardEntry(Frozen):
     """One shard of a data set."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,80}\.parquet$")]
     """Name within the data set's folder."""
@@ -59,10 +58,8 @@ class ShardEntry(BaseModel):
     """Hash of the file's bytes."""
 
 
-class Manifest(BaseModel):
+class Manifest(Frozen):
     """The contents of a data set folder."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     name: str
     """Name of its recipe."""
@@ -131,10 +128,8 @@ def _encoded(shard: ShardEntry) -> str:
     return f"  {{\n   {_LINES.encode(shard.model_dump())[1:-1]}\n  }}"
 
 
-class PublishedFile(BaseModel):
+class PublishedFile(Frozen):
     """One file of a published data set."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     file: Annotated[str, Field(pattern=r"^([A-Za-z0-9_-]{1,80}/){0,3}[A-Za-z0-9_.-]{1,80}$")]
     """Path within the folder."""
@@ -146,14 +141,12 @@ class PublishedFile(BaseModel):
     """Role of its fabrics; None for files without rows."""
     split: Split | None = None
     """Split of its rows."""
-    rows: dict[str, int] = {}
+    rows: dict[str, int] = Field(default_factory=dict)
     """Number of rows of each of its fabrics."""
 
 
-class Published(BaseModel):
+class Published(Frozen):
     """The contents of a published data set."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     name: str
     """Name of its recipe."""

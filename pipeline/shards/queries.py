@@ -11,18 +11,17 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
+from weaves.validation import Frozen
 
 _DRAWS = 8  # numbers reserved for each row; Philox yields four a step
 _SHAPES = 1 << 64  # added to the key: the stream of what makes a query other than round, flat, and lit from the front
 
 
-class QueryOptions(BaseModel):
+class QueryOptions(Frozen):
     """The distribution of queries."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     sigma: tuple[float, float] = (0.05, 32.0)
     """Range of the footprint's standard deviation, in yarn spacings; drawn log-uniformly."""

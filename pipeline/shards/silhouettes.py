@@ -14,12 +14,13 @@ from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.fingerprint import stream_seed
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
+from weaves.validation import Frozen
 
 RAYS_A_COSINE: Final = 16
 """A grazing cosine takes some fifty rays to find, so each row has so many times fewer of them than `points`."""
@@ -33,14 +34,12 @@ _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 Double = npt.NDArray[np.float64]
 
 
-class SilhouetteRows(BaseModel):
+class SilhouetteRows(Frozen):
     """Which queries about a fabric's silhouette are answered, and how.
 
     Centres are uniform in the repeat, footprints log-uniform, curvatures uniform in their root up to the largest, and
     so are tangents, up to a little beyond the steepest view that was found to touch the cloth.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     kind: Literal["opacity", "grazing_cosine"]
     """Target: the opacity, or mean and variance of the grazing cosine over the footprint."""

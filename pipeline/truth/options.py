@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from weaves.validation import Frozen
 
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
 
@@ -18,10 +20,8 @@ TABLE_SIGMA: Final = 1.25 / 32
 """Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
 
 
-class TruthOptions(BaseModel):
+class TruthOptions(Frozen):
     """Options of the ground truth: how one patch BSDF value is computed."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     estimator: EstimatorName = "auto"
     """Estimator of all values; see pipeline.truth.estimator."""

@@ -10,8 +10,6 @@ from pathlib import PurePath
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     SerializationInfo,
     SerializerFunctionWrapHandler,
@@ -20,6 +18,7 @@ from pydantic import (
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.options import Name, Options
+from weaves.validation import Frozen
 
 ADDED_MODEL: Final = "added"
 """The value of `model` of all methods from outside."""
@@ -36,10 +35,8 @@ Limit = Annotated[float, Field(gt=0, le=86_400)]
 _PLACES: Final = ("source", "folder", "limit")
 
 
-class AddedCode(BaseModel):
+class AddedCode(Frozen):
     """A class or function from outside the package."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     source: str = Field(max_length=4096)
     """``module:name``, or the absolute path of a file with ``:name``."""
