@@ -1,7 +1,8 @@
-"""Versions of all numbers. Whoever changes numbers for the same input raises the version that covers them.
+"""Versions of all numbers but the measurements', which `reports/catalogue.toml` has.
 
-Versions are part of the identity of every task whose result depends on them; the git revision is not. They stand apart
-from the code that they cover so that a plan needs no compiler.
+Whoever changes numbers for the same input raises the version that covers them. Versions are part of the identity of
+every task whose result depends on them; the git revision is not. They stand apart from the code that they cover so
+that a plan needs no compiler.
 """
 
 from __future__ import annotations
@@ -31,9 +32,6 @@ FALLBACK: Final = 8
 
 SCENES: Final = 1
 """The shipped scenes, and the queries of any scene."""
-
-BENCH: Final = 5
-"""Measurements of methods and of the truth; also written into every Record."""
 
 SCENE_BENCH: Final = 4
 """Measurements in scenes and the files they write (`reports.measure.scene`)."""

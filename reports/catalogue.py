@@ -10,6 +10,8 @@ import tomllib
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
+from pipeline.models.added.added_code import AddedFunction
+
 Better = Literal["lower", "higher", "near 0", ""]
 """Direction of a better value; empty where none is better."""
 
@@ -60,12 +62,31 @@ class MetricRow(NamedTuple):
     """True if it is a column of its table as it is."""
 
 
+_CONTENT: Final = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+BENCH: Final[int] = _CONTENT.pop("version")
+"""Version of the measurements of methods and of the truth; also written into every Record."""
+
 METRICS: Final = {
     name: MetricRow(name, table=table, **entry)
-    for table, entries in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items()
+    for table, entries in _CONTENT.items()
     for name, entry in entries.items()
 }
 """All metrics by name, in the order of the file."""
+
+
+class AddedMetric(AddedFunction):
+    """A metric from outside: a function of a method's answers on the held-out queries of a fabric."""
+
+    better: Better
+    """Direction of a better value."""
+    format: Format
+    """How tables print a value."""
+
+    @property
+    def row(self) -> MetricRow:
+        """Its row of the catalogue."""
+        return MetricRow(ADDED + self.name, self.title, self.definition, self.unit, self.better, self.format)
 
 
 def columns_of(table: str) -> list[str]:

@@ -20,11 +20,10 @@ from typing import Annotated, Final, Literal
 import pandas as pd
 from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
 
-from pipeline import versions
 from pipeline.atomic import atomic_write
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
-from reports.catalogue import ADDED, METRICS, metric_row
+from reports.catalogue import ADDED, BENCH, METRICS, metric_row
 from reports.error import Error
 from reports.options import Role
 from weaves.errors import BadInput
@@ -82,8 +81,8 @@ class Provenance(Frozen):
     """Of a method or metric from outside: distribution or file, its version, and the SHA-256 of its code."""
     machine: str = ""
     """Machine, where Records of several are in one file (`reports.machines`)."""
-    version: int = versions.BENCH
-    """Version of the measurements (`pipeline.versions.BENCH`)."""
+    version: int = BENCH
+    """Version of the measurements (`reports.catalogue.BENCH`)."""
 
 
 class Record(Frozen):

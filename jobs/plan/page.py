@@ -15,10 +15,9 @@ from jobs.plan.measurements.truth_images import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from pipeline import versions
 from pipeline.models.added.added_code import AddedMethod
-from reports.added_metric import AddedMetric
-from reports.catalogue import enter
+from reports import catalogue
+from reports.catalogue import AddedMetric, enter
 from reports.options import BenchOptions, Role
 from reports.page.content import ModelNote
 from weaves.fabric import Fabric
@@ -92,7 +91,7 @@ class Page(Task):
 
     def versions(self) -> dict[str, int]:
         """Return the version of the benchmark."""
-        return {"bench": versions.BENCH}
+        return {"bench": catalogue.BENCH}
 
     def run(self, out: Path, progress: Progress) -> None:
         """Write it."""

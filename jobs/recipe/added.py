@@ -15,7 +15,7 @@ from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, 
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import ADD
 from pipeline.models.catalogue import CLASSES, REPLACED_MODELS
-from reports.added_metric import AddedMetric
+from reports.catalogue import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
 

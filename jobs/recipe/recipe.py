@@ -18,7 +18,7 @@ from pipeline.models.catalogue import ModelOptions
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
-from reports.added_metric import AddedMetric
+from reports.catalogue import AddedMetric
 from reports.options import BenchOptions, RuntimeName
 from weaves.fabric import Fabric
 from weaves.population import Population

@@ -26,8 +26,7 @@ from pipeline.shards.manifest import Manifest
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
-from reports.added_metric import AddedMetric
-from reports.catalogue import enter
+from reports.catalogue import AddedMetric, enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors, most_error
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side

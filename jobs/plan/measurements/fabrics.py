@@ -12,7 +12,7 @@ from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
 from jobs.plan.measurements.truth_images import TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline.scenes.options import View
-from reports.added_metric import AddedMetric
+from reports.catalogue import AddedMetric
 from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Progress, Stage, Task, held
 from pipeline import versions
 from pipeline.models.added.added_code import AddedMethod
-from reports.added_metric import AddedMetric
+from reports import catalogue
+from reports.catalogue import AddedMetric
 from reports.options import RunOptions
 from weaves.fabric import Fabric
 
@@ -44,7 +45,7 @@ class Measurement(Task):
 
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
-    """Its code among `pipeline.versions`, beside that of its models and of their ways to run."""
+    """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
     seconds: ClassVar[float] = 1.0
     """Estimated seconds on one core."""
     timed: ClassVar[bool] = False
@@ -119,7 +120,8 @@ class Measurement(Task):
         code |= {"bound"} if any(one.bounds for one in ways) else set()
         code |= {"fallback"} if any(one.wished_errors for one in ways) else set()
         models = {model.options.name: model.options.version for model in held(self, Trained)}
-        return {name: getattr(versions, name.upper()) for name in code} | models
+        numbers = {**vars(versions), "BENCH": catalogue.BENCH}
+        return {name: numbers[name.upper()] for name in code} | models
 
     def without(self, names: Sequence[str]) -> Self | None:
         """Return the measurement without some methods from outside; None if it measures one model alone."""

@@ -11,7 +11,7 @@ from pydantic import Field, TypeAdapter
 from jobs.plan.measurements.studies import Study
 from jobs.plan.plan import KINDS, plan
 from jobs.recipe.load import load_recipe
-from reports.added_metric import AddedMetric
+from reports.catalogue import AddedMetric
 from reports.options import StudyName
 from reports.record import read_records
 from reports.truth import finding, path_traced, sampling, stability
