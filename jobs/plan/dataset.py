@@ -6,9 +6,9 @@ are part of the models' identities and not of the data set's: another model chan
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from jobs.plan.task import Places, Progress, Stage, Task
 from jobs.recipe.recipe import Recipe
@@ -18,6 +18,9 @@ from pipeline.fingerprint import fingerprint
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 from pipeline.truth.options import TruthOptions
+
+if TYPE_CHECKING:
+    from pipeline.shards.manifest import ShardEntry
 
 DATASETS: Final = "datasets"
 """Folder of all data sets, relative to the output folder."""
@@ -43,11 +46,6 @@ class Shard(Task):
     """Role of the fabric in the data set (`pipeline.shards.manifest`)."""
     folders: Places
     """Folders of the data sets that hold the shard."""
-
-    @property
-    def is_extra(self) -> bool:
-        """True if single models alone read its rows."""
-        return isinstance(self.shard, ExtraShardTask)
 
     @property
     def group(self) -> str:
@@ -86,6 +84,21 @@ class Shard(Task):
         """Return the identity that the shard itself holds."""
         return self.shard.identity()
 
+    def entry(self, sha256: str) -> ShardEntry:
+        """Return its entry in a manifest."""
+        from pipeline.shards.manifest import ShardEntry
+
+        shard = self.shard
+        return ShardEntry(
+            file=Path(self.products[0]).name,
+            fabric=shard.fabric.name,
+            kind=shard.kind,
+            split=shard.split,
+            start=shard.start,
+            rows=shard.rows,
+            sha256=sha256,
+        )
+
     def run(self, out: Path, progress: Progress) -> None:
         """Write the shard to its first folder and link it into the others."""
         from pipeline.shards.generate import generate_shard
@@ -96,52 +109,31 @@ class Shard(Task):
             link(first, other)
 
 
-def shards(recipe: Recipe) -> list[Shard]:
-    """Return all shards of a recipe's data set, in the order of its fabrics, splits and rows; extra rows last."""
-    rows: list[tuple[str, AnyShardTask]] = [*_own_rows(recipe), *_extra_rows(recipe)]
-    parts = [Shard(shard=shard, role=role, folders=()) for role, shard in rows]
-    folder = f"{DATASETS}/{recipe.name}-{fingerprint(sorted(part.id for part in parts if not part.is_extra), 8)}"
-    return [part.model_copy(update={"folders": (folder,)}) for part in parts]
+class DataSet:
+    """The data set of a recipe: its shards in the order of fabrics, splits and rows, extra rows last."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        parts = [Shard(shard=shard, role=role, folders=()) for role, shard in _rows(recipe)]
+        own = sorted(part.id for part in parts if not isinstance(part.shard, ExtraShardTask))
+        self.fingerprint = fingerprint(own)
+        """Of its own rows."""
+        self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"
+        """Relative to the output folder."""
+        self.shards = [part.model_copy(update={"folders": (self.folder,)}) for part in parts]
 
 
-def fingerprint_of(parts: Sequence[Shard]) -> str:
-    """Return the data set's fingerprint: that of its own rows' shards, in whatever order."""
-    return fingerprint(sorted(part.id for part in parts if not part.is_extra))
-
-
-def folder_of(parts: Sequence[Shard]) -> str:
-    """Return the data set's folder, relative to the output folder."""
-    return parts[0].folders[0]
-
-
-def _own_rows(recipe: Recipe) -> Iterator[tuple[str, ShardTask]]:
-    """Cut every fabric's splits into shards, each with the role of its fabric."""
+def _rows(recipe: Recipe) -> Iterator[tuple[str, AnyShardTask]]:
+    """Cut the rows of every fabric into shards, each with the role of its fabric."""
     dataset = recipe.dataset
-    for role, fabric, split, total in recipe.own_rows():
-        for start, count in _cut(total, dataset.shard_rows):
-            shard = ShardTask(
-                fabric=fabric,
-                split=split,
-                start=start,
-                rows=count,
-                seed=dataset.seed,
-                queries=dataset.queries,
-                truth=dataset.truth_of(split),
-            )
-            yield role, shard
-
-
-def _extra_rows(recipe: Recipe) -> Iterator[tuple[str, ExtraShardTask]]:
-    """Cut every fabric's extra rows into shards, each with the role of its fabric."""
-    for role, fabric, extra, total in recipe.extra_rows():
-        for start, count in _cut(total, recipe.dataset.shard_rows):
-            yield role, ExtraShardTask(fabric=fabric, extra=extra, start=start, rows=count)
-
-
-def _cut(total: int, most: int) -> Iterator[tuple[int, int]]:
-    """Yield the start and the number of rows of each shard."""
-    for start in range(0, total, most):
-        yield start, min(most, total - start)
+    for role, fabric, kind, total in (*recipe.own_rows(), *recipe.extra_rows()):
+        for start in range(0, total, dataset.shard_rows):
+            part: dict[str, Any] = {"fabric": fabric, "start": start, "rows": min(dataset.shard_rows, total - start)}
+            if isinstance(kind, str):
+                truth = dataset.truth_of(kind)
+                yield role, ShardTask(**part, split=kind, seed=dataset.seed, queries=dataset.queries, truth=truth)
+            else:
+                yield role, ExtraShardTask(**part, extra=kind)
 
 
 def _points(shard: AnyShardTask) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from jobs.plan.dataset import fingerprint_of
-from jobs.plan.measurements.measurement import Measurement, Picture
+from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.scenes import SceneShot
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
@@ -19,7 +19,7 @@ from pipeline.models.added.added_code import AddedMethod
 from reports import catalogue
 from reports.catalogue import AddedMetric, enter
 from reports.options import BenchOptions, Role
-from reports.page.content import ModelNote
+from reports.page.content import ModelNote, PictureFile
 from weaves.fabric import Fabric
 
 
@@ -48,10 +48,33 @@ class Page(Task):
     """Files of Records of the measurements."""
     timing: Place
     """File of the Records of times; the machine beside it is the page's."""
-    pictures: Annotated[tuple[Picture, ...], PLACE]
+    pictures: Annotated[tuple[PictureFile, ...], PLACE]
     """Pictures of the measurements."""
     live: Annotated[dict[str, str], PLACE]
     """Live page of each fabric that has one, by the fabric's name."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects, benches: Sequence[Measurement]) -> Page:
+        """Return the page of all measurements."""
+        recipe = subjects.recipe
+        shots = [task for task in benches if isinstance(task, SceneShot)]
+        return cls(
+            recipe=recipe.name,
+            about=recipe.about,
+            dataset=f"{recipe.name}, {subjects.dataset.fingerprint}",
+            fabrics=(*subjects.fabrics, *subjects.unseen_population),
+            models=tuple(
+                _note(recipe, model, first.trainings, shots)
+                for model, first in zip(recipe.models, subjects.first_models, strict=True)
+            ),
+            options=recipe.bench,
+            metrics=recipe.metrics,
+            measured=tuple(task.id for task in benches),
+            records=tuple(task.records for task in benches if task.records),
+            timing=next(task.records for task in benches if isinstance(task, TimeOfMethods)),
+            pictures=tuple(picture for task in benches for picture in task.pictures),
+            live={task.fabric.name: task.products[0] for task in benches if isinstance(task, LivePage)},
+        )
 
     @property
     def group(self) -> str:
@@ -95,7 +118,7 @@ class Page(Task):
 
     def run(self, out: Path, progress: Progress) -> None:
         """Write it."""
-        from reports.page.content import PageInput, PictureFile
+        from reports.page.content import PageInput
         from reports.page.page import write_page
         from reports.record import read_machine, read_records
 
@@ -116,33 +139,10 @@ class Page(Task):
                 for record in read_records(out / path for path in self.records)
             ],
             machine=read_machine(out / self.timing),
-            pictures=[PictureFile(p.fabric, p.scene, p.method, p.setting, out / p.path) for p in self.pictures],
+            pictures=[replace(picture, path=out / picture.path) for picture in self.pictures],
             live={fabric: out / path for fabric, path in self.live.items()},
         )
         write_page(out / self.folder, content, progress)
-
-
-def page_of(subjects: Subjects, benches: Sequence[Measurement]) -> Page:
-    """Return the page of all measurements."""
-    recipe = subjects.recipe
-    shots = [task for task in benches if isinstance(task, SceneShot)]
-    return Page(
-        recipe=recipe.name,
-        about=recipe.about,
-        dataset=f"{recipe.name}, {fingerprint_of(subjects.shards)}",
-        fabrics=tuple((one.fabric, one.role) for one in (*subjects.fabrics, *subjects.unseen_population)),
-        models=tuple(
-            _note(recipe, model, first.trainings, shots)
-            for model, first in zip(recipe.models, subjects.first_models, strict=True)
-        ),
-        options=recipe.bench,
-        metrics=recipe.metrics,
-        measured=tuple(task.id for task in benches),
-        records=tuple(task.records for task in benches if task.records),
-        timing=next(task.records for task in benches if isinstance(task, TimeOfMethods)),
-        pictures=tuple(picture for task in benches for picture in task.pictures),
-        live={task.fabric.name: task.products[0] for task in benches if isinstance(task, LivePage)},
-    )
 
 
 def _note(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from jobs.plan.dataset import Shard, shards
+from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric, OnUnseenPopulation, TruthNoise
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.models import AtExtremes, Latents
@@ -17,9 +17,9 @@ from jobs.plan.measurements.studies import Study
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.measurements.truth_images import LivePage, TruthEdge, TruthFrames, TruthPicture
-from jobs.plan.page import page_of
+from jobs.plan.page import Page
 from jobs.plan.task import Task
-from jobs.plan.training import trainings
+from jobs.plan.training import Training
 from jobs.recipe.recipe import Recipe
 
 KINDS: Final[tuple[type[Measurement], ...]] = (
@@ -45,19 +45,19 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
 
 def plan(recipe: Recipe) -> list[Task]:
     """Return the tasks of a recipe."""
-    parts = {id(one): shards(one) for one in recipe.together}
-    own = parts[id(recipe)]
-    rows, trained = list(own), {}
+    datasets = {id(one): DataSet(one) for one in recipe.together}
+    own = datasets[id(recipe)]
+    rows, trained = list(own.shards), {}
     for model in (model for model in recipe.models if model.learns):
-        trainer = recipe.trainer_of(model)
-        trained[model.options.name] = trainings(trainer, model, parts[id(trainer)])
+        dataset = datasets[id(recipe.trainer_of(model))]
+        trained[model.options.name] = Training.planned(dataset, model)
         # Of another recipe's rows those that its model learns from; they are the same for every seed.
         read = {need for task in trained[model.options.name][0].values() for need in task.needs}
-        rows += [part for part in parts[id(trainer)] if part.id in read]
+        rows += [part for part in dataset.shards if part.id in read]
     subjects = Subjects(recipe, own, trained)
     benches = [task for kind in KINDS for task in kind.planned(subjects)]
     every = [task for seeds in trained.values() for tasks in seeds for task in tasks.values()]
-    return [*_once(rows), *every, *benches, page_of(subjects, benches)]
+    return [*_once(rows), *every, *benches, Page.planned(subjects, benches)]
 
 
 def _once(parts: Iterable[Shard]) -> list[Shard]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
-from jobs.plan.dataset import Shard, folder_of
+from jobs.plan.dataset import DataSet
 from jobs.plan.task import Made, Place, Progress, Stage, Task
-from jobs.recipe.recipe import ModelRecipe, Recipe
+from jobs.recipe.recipe import ModelRecipe
 from pipeline import versions
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.catalogue import ModelOptions
@@ -34,6 +33,35 @@ class Training(Task):
     dataset: Place
     """Folder of the data set."""
 
+    @classmethod
+    def planned(cls, dataset: DataSet, model: ModelRecipe) -> list[dict[str, Training]]:
+        """Return the trainings of a model on a data set, in the order of their seeds.
+
+        Of each seed one under the key "", or one a fabric for a model of a single material.
+        """
+        recipe = dataset.recipe
+        groups = {"": [fabric.name for fabric in (*recipe.seen, *recipe.population)]}
+        if model.of_one_material:
+            groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
+        splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
+        parts = [part for part in dataset.shards if part.shard.split in splits]
+        rows = {
+            key: tuple(part.id for part in parts if part.shard.fabric.name in names) for key, names in groups.items()
+        }
+        return [
+            {
+                key: cls(
+                    options=single.options,
+                    training=single.training,
+                    fabrics=tuple(names),
+                    shards=rows[key],
+                    dataset=dataset.folder,
+                )
+                for key, names in groups.items()
+            }
+            for single in model.single
+        ]
+
     @property
     def group(self) -> str:
         """Name of the model."""
@@ -43,7 +71,8 @@ class Training(Task):
     def title(self) -> str:
         """Name of the model and its fabrics."""
         fabrics = self._fabric or f"{len(self.fabrics)} fabrics"
-        return f"{self.options.name} on {fabrics}{seed_title(self.training.seed)}"
+        seed = f", seed {self.training.seed}" if self.training.seed else ""
+        return f"{self.options.name} on {fabrics}{seed}"
 
     @property
     def products(self) -> tuple[str, ...]:
@@ -98,40 +127,6 @@ class Training(Task):
 
             return run_apart(_train, self, out, progress=progress)
         return _train(self, out, progress)
-
-
-def seed_title(seed: int) -> str:
-    """Return the end of a task's title that tells the trainings of a model apart; empty for seed 0."""
-    return f", seed {seed}" if seed else ""
-
-
-def trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> list[dict[str, Training]]:
-    """Return the trainings of a model, in the order of their seeds.
-
-    Of each seed one under the key "", or one a fabric for a model of a single material.
-    """
-    return [_trainings(recipe, single, parts) for single in model.single]
-
-
-def _trainings(recipe: Recipe, model: ModelRecipe, parts: Sequence[Shard]) -> dict[str, Training]:
-    """Return the trainings of a model with one seed."""
-    if model.of_one_material:
-        groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
-    else:
-        groups = {"": [fabric.name for fabric in (*recipe.seen, *recipe.population)]}
-    return {key: _training(model, fabrics, parts) for key, fabrics in groups.items()}
-
-
-def _training(model: ModelRecipe, fabrics: Sequence[str], parts: Sequence[Shard]) -> Training:
-    splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
-    read = [part for part in parts if part.shard.fabric.name in fabrics and part.shard.split in splits]
-    return Training(
-        options=model.options,
-        training=model.training,
-        fabrics=tuple(fabrics),
-        shards=tuple(part.id for part in read),
-        dataset=folder_of(parts),
-    )
 
 
 def _train(task: Training, out: Path, progress: Progress) -> None:

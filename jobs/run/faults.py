@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
-from jobs.plan.dataset import Shard, shards
+from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
 from jobs.plan.task import Stage, Task
 from jobs.recipe.recipe import Recipe
 from jobs.run.ledger import Ledger
-from jobs.run.manifest_file import ManifestFile, entry_of
+from jobs.run.manifest_file import ManifestFile
 from jobs.run.reasons import CHANGED, NEVER, reasons
 from jobs.run.receipt import Product
 from pipeline.cores import cores
@@ -69,7 +69,7 @@ def faults(
     unknown = {fault.task.id: fault.task for fault in found if fault.task and ledger.state(fault.task) != "done"}
     bad = {Path(path).name for task in unknown.values() for path in task.products}
     for one in recipe.together:
-        found += _manifest_faults(ManifestFile(one, shards(one), ledger), ledger.out, bad)
+        found += _manifest_faults(ManifestFile(DataSet(one), ledger), ledger.out, bad)
     return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in found})
 
 
@@ -142,7 +142,7 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
 def _value_faults(part: Shard, path: Path, sha256: str) -> list[str]:
     from pipeline.shards.check import check_values
 
-    return check_values(path, entry_of(part, sha256), part.shard.fabric.weave.repeat)
+    return check_values(path, part.entry(sha256), part.shard.fabric.weave.repeat)
 
 
 def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[Fault]:
@@ -221,10 +221,9 @@ def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]
     from pipeline.shards.manifest import FILE
     from reports.page.files import read_files
 
-    for one in recipe.together:
-        parts = shards(one)
-        yield from (path for part in parts for path in part.products)
-        yield from {f"{folder}/{FILE}" for part in parts for folder in part.folders}
+    for dataset in map(DataSet, recipe.together):
+        yield from (path for part in dataset.shards for path in part.products)
+        yield f"{dataset.folder}/{FILE}"
     for task in tasks:
         yield from task.products
         if isinstance(task, Page):

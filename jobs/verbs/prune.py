@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from jobs.console import MOST_SENTENCES, size, table_of
-from jobs.plan.dataset import DATASETS, shards
+from jobs.plan.dataset import DATASETS, DataSet
 from jobs.plan.plan import plan
 from jobs.plan.task import Stage
 from jobs.recipe.load import load_recipe
@@ -86,7 +86,7 @@ def _needed(recipes: Sequence[str], out: Path, add: Sequence[str]) -> set[str]:
         recipe = load_recipe(name, add)
         tasks = plan(recipe)
         needed.update(own_files(recipe, tasks, out))
-        ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in shards(one)}
+        ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in DataSet(one).shards}
         needed.update(f"ledger/{id}{ending}" for id in ids for ending in (".json", ".failed.json"))
         # What a stopped training goes on from.
         folders = [task.folder for task in tasks if hasattr(task, "folder")] if is_local(out) else []

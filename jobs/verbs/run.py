@@ -9,12 +9,11 @@ from typing import Any
 from rich.table import Table
 
 from jobs.console import duration, number, table_of
-from jobs.plan.dataset import Shard, shards
+from jobs.plan.dataset import DataSet
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
-from jobs.recipe.recipe import Recipe
 from jobs.run.compiling import compile_group, kernel_groups
 from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
@@ -65,7 +64,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
     console = Terminal()
     ledger = Ledger(out)
     with ledger.store.held():
-        manifests = [ManifestFile(one, _shards(one, tasks), ledger) for one in recipe.together]
+        manifests = [ManifestFile(DataSet(one), ledger) for one in recipe.together]
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
         if "bench" in stages:
@@ -116,12 +115,6 @@ def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
     timed = [task for task in tasks if task.slots == "all" and task.id in page.needs]
     if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
         ledger.store.remove(page.products[0])
-
-
-def _shards(recipe: Recipe, tasks: Sequence[Task]) -> list[Shard]:
-    """Return the shards of a recipe's data set, those of the plan where they are equal, so that none is kept twice."""
-    planned = {(task.id, task.folders): task for task in tasks if isinstance(task, Shard)}
-    return [planned.get((part.id, part.folders), part) for part in shards(recipe)]
 
 
 def summary_of(records: Sequence[Path]) -> Any:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from jobs.plan.dataset import folder_of, shards
+from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from tests.jobs import made_up
 
@@ -31,7 +31,7 @@ train = 65536
 def test_a_killed_run_leaves_nothing_and_is_continued(tmp_path):
     (tmp_path / "tiny.toml").write_text(RECIPE)
     made_up.finished(tmp_path / "tiny.toml", tmp_path / "out", ["generate"])
-    folder = tmp_path / "out" / folder_of(shards(load_recipe(tmp_path / "tiny.toml")))
+    folder = tmp_path / "out" / DataSet(load_recipe(tmp_path / "tiny.toml")).folder
     whole, target, staging = tmp_path / "whole", tmp_path / "target", tmp_path / ".tmp-target"
     command = [sys.executable, "-m", "jobs.cli", "publish", str(folder), "--licence", "MIT", "--to"]
 

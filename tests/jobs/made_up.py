@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jobs.plan.dataset import Shard, shards
+from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES
@@ -75,7 +75,7 @@ def finished(recipe, out, stages=STAGES):
     tasks = plan(loaded)
     execute(tasks, Ledger(out), stages=stages)
     for one in loaded.together:
-        ManifestFile(one, shards(one), Ledger(out)).save()
+        ManifestFile(DataSet(one), Ledger(out)).save()
     return tasks
 
 

@@ -27,7 +27,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from jobs.plan.dataset import Shard, shards
+from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.plan import plan
 from jobs.plan.task import Progress
 from jobs.recipe.load import load_recipe
@@ -107,11 +107,10 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
         ShortShard.__module__ = "measure_driver"
         tasks = [ShortShard.model_construct(**dict(part)) for part in parts if isinstance(part, Shard)]
         parts.clear()
-        own = shards(recipe)
 
         def run() -> None:
             ledger = Ledger(folder / "out")
-            manifest = ManifestFile(recipe, own, ledger)
+            manifest = ManifestFile(DataSet(recipe), ledger)
             manifest.save()
             quiet = Console(file=io.StringIO())
             summary = execute(

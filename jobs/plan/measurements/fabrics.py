@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from jobs.plan.measurements.measurement import Measurement, Picture
+from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
 from jobs.plan.measurements.truth_images import TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline.scenes.options import View
 from reports.catalogue import AddedMetric
 from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
+from reports.page.content import PictureFile
 
 if TYPE_CHECKING:
     from reports.record import Record
@@ -36,11 +37,13 @@ class TruthNoise(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric."""
         bench = subjects.recipe.bench
-        for subject in subjects.fabrics:
+        for fabric, role in subjects.fabrics:
             yield cls(
-                **vars(subject),
+                fabric=fabric,
+                role=role,
+                dataset=subjects.held_out(fabric),
                 errors=select(ErrorOptions, bench),
-                frames=TruthFrames.of(subject.fabric, subjects.recipe).made,
+                frames=TruthFrames.of(fabric, subjects.recipe).made,
                 frame_options=select(FrameOptions, bench),
             )
 
@@ -81,14 +84,16 @@ class OnFabric(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric, model that answers for it, and seed; pictures are made of the first seed alone."""
         recipe, bench = subjects.recipe, subjects.recipe.bench
-        for subject in subjects.fabrics:
-            frames, edge = TruthFrames.of(subject.fabric, recipe), TruthEdge.of(subject.fabric, recipe)
-            views = {view: picture.made for view, picture in TruthPicture.of(subject.fabric, bench).items()}
-            for model, trained in subjects.answering([subject.fabric.name]):
+        for fabric, role in subjects.fabrics:
+            frames, edge = TruthFrames.of(fabric, recipe), TruthEdge.of(fabric, recipe)
+            views = {view: picture.made for view, picture in TruthPicture.of(fabric, bench).items()}
+            for model, trained in subjects.answering([fabric.name]):
                 yield cls(
                     model=trained,
                     ways=model.ways(bench),
-                    **vars(subject),
+                    fabric=fabric,
+                    role=role,
+                    dataset=subjects.held_out(fabric),
                     errors=select(ErrorOptions, bench),
                     frames=frames.made,
                     frame_options=select(FrameOptions, bench),
@@ -100,17 +105,17 @@ class OnFabric(Measurement):
                 )
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureFile, ...]:
         """A picture a view and setting shown."""
         return tuple(
-            Picture(self.fabric.name, view, self.model.options.name, setting, self.picture(setting, view))
+            PictureFile(self.fabric.name, view, self.model.options.name, setting, self.picture(setting, view))
             for setting in self.shown
             for view in self.views
         )
 
-    def picture(self, setting: str, view: View) -> str:
+    def picture(self, setting: str, view: View) -> Path:
         """Return the path of the picture of a setting."""
-        return "-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr"
+        return Path("-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr")
 
     @property
     def cost(self) -> float:
@@ -164,14 +169,13 @@ class OnUnseenPopulation(Measurement):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a seed and model that answers for all of the fabrics: models of one material do not."""
-        fabrics = tuple(subject.fabric for subject in subjects.unseen_population)
-        names, bench = [fabric.name for fabric in fabrics], subjects.recipe.bench
-        for model, trained in subjects.answering(names) if names else ():
+        fabrics, bench = subjects.recipe.unseen_population, subjects.recipe.bench
+        for model, trained in subjects.answering([fabric.name for fabric in fabrics]) if fabrics else ():
             yield cls(
                 model=trained,
                 ways=model.ways(bench),
                 fabrics=fabrics,
-                dataset=subjects.dataset(names),
+                dataset=subjects.held_out(*fabrics),
                 errors=select(ErrorOptions, bench),
             )
 
@@ -217,7 +221,7 @@ class ErrorsBySize(Measurement):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model and seed after its first."""
-        dataset = subjects.dataset([subject.fabric.name for subject in subjects.fabrics])
+        dataset = subjects.held_out(*(fabric for fabric, _ in subjects.fabrics))
         for model in subjects.models:
             if not model.is_first:
                 yield cls(model=model.whole, dataset=dataset, seed=subjects.recipe.bench.seed)
@@ -248,12 +252,14 @@ class OfAddedMetric(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a metric, fabric, model that answers for it, and seed."""
         for metric in subjects.recipe.metrics:
-            for subject in (*subjects.fabrics, *subjects.unseen_population):
-                for _, trained in subjects.answering([subject.fabric.name]):
+            for fabric, role in (*subjects.fabrics, *subjects.unseen_population):
+                for _, trained in subjects.answering([fabric.name]):
                     yield cls(
                         metric=metric,
                         model=trained,
-                        **vars(subject),
+                        fabric=fabric,
+                        role=role,
+                        dataset=subjects.held_out(fabric),
                         errors=select(ErrorOptions, subjects.recipe.bench),
                     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
@@ -16,6 +15,7 @@ from pipeline.models.added.added_code import AddedMethod
 from reports import catalogue
 from reports.catalogue import AddedMetric
 from reports.options import RunOptions
+from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -23,21 +23,6 @@ if TYPE_CHECKING:
 
 _SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
 """Fields that say what is measured, in the order of a title."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture that a measurement writes."""
-
-    fabric: str
-    """Empty for a scene, which has cloths of its own."""
-    scene: str
-    """View of the fabric, or name of the scene."""
-    method: str
-    """``truth`` for the reference."""
-    setting: str
-    path: str
-    """Relative to the output folder."""
 
 
 class Measurement(Task):
@@ -50,6 +35,8 @@ class Measurement(Task):
     """Estimated seconds on one core."""
     timed: ClassVar[bool] = False
     """True if it measures time, so that nothing may run beside it."""
+    endings: ClassVar[tuple[str, ...]] = ()
+    """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
     if TYPE_CHECKING:
 
@@ -87,17 +74,24 @@ class Measurement(Task):
     @property
     def records(self) -> str:
         """File of its Records; empty if it has none."""
-        return f"{self.stem}.json"
+        return "" if self.endings else f"{self.stem}.json"
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
-        """Pictures that it writes."""
+    def pictures(self) -> tuple[PictureFile, ...]:
+        """Pictures that it writes, relative to the output folder."""
         return ()
 
     @property
     def products(self) -> tuple[str, ...]:
-        """Records, the machine they were measured on, pictures."""
-        return (self.records, f"{self.stem}.machine.json", *(picture.path for picture in self.pictures))
+        """Files that others read; or Records, the machine they were measured on, pictures."""
+        if self.endings:
+            return tuple(f"{self.stem}{ending}" for ending in self.endings)
+        return (self.records, f"{self.stem}.machine.json", *(str(picture.path) for picture in self.pictures))
+
+    @property
+    def made(self) -> Made:
+        """The file that other measurements read."""
+        return Made(task=self.id, path=self.products[0])
 
     @property
     def slots(self) -> Literal["one", "all"]:
@@ -184,28 +178,6 @@ class Measurement(Task):
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Return the Records; pictures are written."""
         raise NotImplementedError
-
-
-class Reference(Measurement):
-    """Files that other measurements or the page read; there are no Records."""
-
-    endings: ClassVar[tuple[str, ...]] = (".exr",)
-    """Of the files; the first one is what others read."""
-
-    @property
-    def records(self) -> str:
-        """No Records."""
-        return ""
-
-    @property
-    def products(self) -> tuple[str, ...]:
-        """A file an ending."""
-        return tuple(f"{self.stem}{ending}" for ending in self.endings)
-
-    @property
-    def made(self) -> Made:
-        """The file, as other measurements read it."""
-        return Made(task=self.id, path=self.products[0])
 
 
 def _label(subject: object) -> str:

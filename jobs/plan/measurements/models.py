@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.subjects import FabricSubject, Subjects, Trained
+from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Progress, Uncoloured
 from pipeline.models.domain import PHYSICS
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
 from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH, LATENT_PAIRS, Role
-from weaves.fabric import load_fabric
+from weaves.fabric import Fabric, load_fabric
 
 if TYPE_CHECKING:
     from reports.record import Record
@@ -35,14 +35,14 @@ class AtExtremes(Measurement):
         """Yield one a model and seed, on the first fabric of each role that it answers for."""
         physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
         for model in subjects.models:
-            known: dict[Role, FabricSubject] = {}
-            for subject in subjects.fabrics:
-                if model.on([subject.fabric.name]):
-                    known.setdefault(subject.role, subject)
-            if trained := model.on([one.fabric.name for one in known.values()]) if known else None:
+            known: dict[Role, Fabric] = {}
+            for fabric, role in subjects.fabrics:
+                if model.on([fabric.name]):
+                    known.setdefault(role, fabric)
+            if trained := model.on([fabric.name for fabric in known.values()]) if known else None:
                 yield cls(
                     model=trained,
-                    fabrics=tuple((one.fabric, role) for role, one in known.items()),
+                    fabrics=tuple((fabric, role) for role, fabric in known.items()),
                     truth=EXTREME_TRUTH.model_copy(update=physics),
                 )
 

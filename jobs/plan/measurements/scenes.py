@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
-from jobs.plan.measurements.measurement import Measurement, Picture, Reference
+from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Place, Progress, TaskPart
 from pipeline.fingerprint import file_sha256
@@ -16,6 +16,7 @@ from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.scene import Cloth
 from pipeline.scenes.sources import files, worn
 from reports.options import RepeatOptions, SceneBenchOptions, SceneErrorOptions, ShotOptions, select
+from reports.page.content import PictureFile
 from weaves.fabric import Fabric, load_fabric
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class SceneCloth(TaskPart):
     """Angle from u to the weft, in degrees."""
 
 
-class SceneShot(Reference):
+class SceneShot(Measurement):
     """The frames of a scene: queries with the truth's answers, and pictures. All recipes and models share them."""
 
     kind: Literal["scene truth"] = "scene truth"
@@ -80,9 +81,9 @@ class SceneShot(Reference):
         return [cls.of(name, select(ShotOptions, options)) for name in options.names]
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureFile, ...]:
         """The truth's frames."""
-        return (Picture("", self.scene, "truth", "", f"{self.stem}.exr"),)
+        return (PictureFile("", self.scene, "truth", "", Path(self.products[1])),)
 
     @property
     def fabrics(self) -> list[str]:
@@ -147,14 +148,14 @@ class OnScene(Measurement):
         return (*super().subjects, *(setting_of(k) for k in self.model.options.settings))
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureFile, ...]:
         """The frames of every setting shown."""
         name = self.model.options.name
-        return tuple(Picture("", self.scene, name, setting, self.picture(setting)) for setting in self.shown)
+        return tuple(PictureFile("", self.scene, name, setting, self.picture(setting)) for setting in self.shown)
 
-    def picture(self, setting: str) -> str:
+    def picture(self, setting: str) -> Path:
         """Return the path of the frames of a setting."""
-        return "-".join(filter(None, (self.stem, setting.replace(" = ", "")))) + ".exr"
+        return Path("-".join(filter(None, (self.stem, setting.replace(" = ", "")))) + ".exr")
 
     @property
     def cost(self) -> float:

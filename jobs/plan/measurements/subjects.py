@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Self
 
-from jobs.plan.dataset import Shard, fingerprint_of, folder_of
+from jobs.plan.dataset import DataSet
 from jobs.plan.task import PLACE, Made, Place, TaskPart
-from jobs.plan.training import Training, seed_title
+from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint, setting_of
@@ -60,7 +60,7 @@ class Trained(TaskPart):
     @property
     def title(self) -> str:
         """Name of the model, with the seed of its training where that is not 0."""
-        return f"{self.options.name}{seed_title(self.seed)}"
+        return f"{self.options.name}, seed {self.seed}" if self.seed else self.options.name
 
     @property
     def settings(self) -> list[Self]:
@@ -112,15 +112,6 @@ class Trained(TaskPart):
 
 
 @dataclass(frozen=True)
-class FabricSubject:
-    """A named fabric, its role, and its test rows."""
-
-    fabric: Fabric
-    role: Role
-    dataset: HeldOutRows
-
-
-@dataclass(frozen=True)
 class ModelSubject:
     """A model of the recipe, trained with one seed."""
 
@@ -162,22 +153,19 @@ class Subjects:
     """Fabrics, models, rows and networks that the measurements of a recipe use."""
 
     recipe: Recipe
-    shards: Sequence[Shard]
-    """The data set."""
+    dataset: DataSet
     trainings: Mapping[str, Sequence[Mapping[str, Training]]]
     """Trainings by the model's name, then one mapping from fabrics a seed."""
 
-    @cached_property
-    def fabrics(self) -> list[FabricSubject]:
-        """The named fabrics: the seen ones, then the unseen ones."""
-        seen = [FabricSubject(fabric, "seen", self.dataset([fabric.name])) for fabric in self.recipe.seen]
-        return seen + [FabricSubject(fabric, "unseen", self.dataset([fabric.name])) for fabric in self.recipe.unseen]
+    @property
+    def fabrics(self) -> list[tuple[Fabric, Role]]:
+        """The named fabrics with their roles: the seen ones, then the unseen ones."""
+        return [(one, "seen") for one in self.recipe.seen] + [(one, "unseen") for one in self.recipe.unseen]
 
-    @cached_property
-    def unseen_population(self) -> list[FabricSubject]:
+    @property
+    def unseen_population(self) -> list[tuple[Fabric, Role]]:
         """The random unseen fabrics."""
-        fabrics = self.recipe.unseen_population
-        return [FabricSubject(fabric, "unseen", self.dataset([fabric.name])) for fabric in fabrics]
+        return [(fabric, "unseen") for fabric in self.recipe.unseen_population]
 
     @cached_property
     def models(self) -> list[ModelSubject]:
@@ -199,16 +187,15 @@ class Subjects:
         """Return the models of all seeds that answer for all of some fabrics, with the networks that do."""
         return [(model, trained) for model in self.models if (trained := model.on(fabrics))]
 
-    def dataset(self, names: Sequence[str]) -> HeldOutRows:
+    def held_out(self, *fabrics: Fabric) -> HeldOutRows:
         """Return the test rows of fabrics."""
-        rows = [
-            part.id
-            for name in names
-            for part in self.shards
-            if part.shard.fabric.name == name and part.shard.split == "test"
-        ]
-        return HeldOutRows(fingerprint=self._fingerprint, rows=tuple(rows), folder=folder_of(self.shards))
+        rows = tuple(id for fabric in fabrics for id in self._test_rows[fabric.name])
+        return HeldOutRows(fingerprint=self.dataset.fingerprint, rows=rows, folder=self.dataset.folder)
 
     @cached_property
-    def _fingerprint(self) -> str:
-        return fingerprint_of(self.shards)
+    def _test_rows(self) -> Mapping[str, Sequence[str]]:
+        rows: dict[str, list[str]] = {fabric.name: [] for fabric in self.recipe.fabrics}
+        for part in self.dataset.shards:
+            if part.shard.split == "test":
+                rows[part.shard.fabric.name].append(part.id)
+        return rows

@@ -54,7 +54,7 @@ class TimeOfMethods(Measurement):
         bench = subjects.recipe.bench
         yield cls(
             models=tuple(TimedModel(ways=one.ways(bench), **dict(one.whole)) for one in subjects.first_models),
-            dataset=subjects.dataset([subject.fabric.name for subject in subjects.fabrics]),
+            dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
             options=select(TimingOptions, bench),
         )
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Literal, Self
 
 from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
-from jobs.plan.measurements.measurement import Measurement, Picture, Reference
+from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.task import Coloured, Progress
 from jobs.recipe.recipe import Recipe
@@ -15,16 +15,18 @@ from pipeline import versions
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.truth.options import TruthOptions
 from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
+from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 10.0, 512, 5
 
 
-class TruthPicture(Reference):
+class TruthPicture(Measurement):
     """The truth's picture of a fabric in one view."""
 
     kind: Literal["truth picture"] = "truth picture"
     code: ClassVar = ("truth", "bench")
+    endings: ClassVar = (".exr",)
     fabric: Coloured
     scene: View
     extent: tuple[int, int]
@@ -38,8 +40,8 @@ class TruthPicture(Reference):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric and view."""
-        for subject in subjects.fabrics:
-            yield from cls.of(subject.fabric, subjects.recipe.bench).values()
+        for fabric, _ in subjects.fabrics:
+            yield from cls.of(fabric, subjects.recipe.bench).values()
 
     @classmethod
     def of(cls, fabric: Fabric, bench: PictureOptions) -> dict[View, Self]:
@@ -48,9 +50,9 @@ class TruthPicture(Reference):
         return {view: cls(scene=view, extent=bench.size(view), **same) for view in bench.views}
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureFile, ...]:
         """The picture."""
-        return (Picture(self.fabric.name, self.scene, "truth", "", f"{self.stem}.exr"),)
+        return (PictureFile(self.fabric.name, self.scene, "truth", "", Path(self.products[0])),)
 
     @property
     def cost(self) -> float:
@@ -72,11 +74,12 @@ class TruthPicture(Reference):
         render_truth(self.fabric, self.scene, options, out / self.products[0])
 
 
-class TruthFrames(Reference):
+class TruthFrames(Measurement):
     """The truth's frames of a fabric on the moving plane, for aliasing."""
 
     kind: Literal["truth frames"] = "truth frames"
     code: ClassVar = ("truth", "bench")
+    endings: ClassVar = (".exr",)
     fabric: Coloured
     options: FrameOptions
     """Options of the frames and of the truth."""
@@ -84,8 +87,8 @@ class TruthFrames(Reference):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric."""
-        for subject in subjects.fabrics:
-            yield cls.of(subject.fabric, subjects.recipe)
+        for fabric, _ in subjects.fabrics:
+            yield cls.of(fabric, subjects.recipe)
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> Self:
@@ -105,11 +108,12 @@ class TruthFrames(Reference):
         render_frames(self.fabric, self.options, out / self.products[0])
 
 
-class TruthEdge(Reference):
+class TruthEdge(Measurement):
     """The truth's edge of a cloth cylinder, for silhouettes."""
 
     kind: Literal["truth edge"] = "truth edge"
     code: ClassVar = ("truth", "bench")
+    endings: ClassVar = (".exr",)
     fabric: Coloured
     options: EdgeOptions
     """Cylinder, camera, light and truth."""
@@ -117,8 +121,8 @@ class TruthEdge(Reference):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric, where the recipe's queries are of curved cloth."""
-        for subject in subjects.fabrics:
-            if edge := cls.of(subject.fabric, subjects.recipe):
+        for fabric, _ in subjects.fabrics:
+            if edge := cls.of(fabric, subjects.recipe):
                 yield edge
 
     @classmethod
@@ -139,7 +143,7 @@ class TruthEdge(Reference):
         render_edge(self.fabric, self.options, out / self.products[0])
 
 
-class LivePage(Reference):
+class LivePage(Measurement):
     """The live page of a fabric: cloth that the reader turns, in the browser, beside pictures of the truth."""
 
     kind: Literal["live page"] = "live page"
@@ -152,9 +156,9 @@ class LivePage(Reference):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one for each fabric that the recipe lists."""
         chosen = subjects.recipe.bench.live
-        for subject in subjects.fabrics:
-            if subject.fabric.name in chosen.fabrics:
-                yield cls(fabric=subject.fabric, pixels=chosen.pixels)
+        for fabric, _ in subjects.fabrics:
+            if fabric.name in chosen.fabrics:
+                yield cls(fabric=fabric, pixels=chosen.pixels)
 
     @property
     def cost(self) -> float:

@@ -9,10 +9,11 @@ from typing import Any, Final
 
 import tomli_w
 
-from jobs.plan.dataset import shards
+from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.verbs.publish.contents import POPULATIONS, own_shards
 from pipeline.atomic import atomic_write
+from pipeline.shards.generate import ShardTask
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput, brief
 
@@ -41,13 +42,13 @@ def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
             text = _recipe(manifest, models)
             atomic_write(Path(name) / FILE, text.encode(), durable=False)
             try:
-                planned = shards(load_recipe(Path(name) / FILE))
+                planned = DataSet(load_recipe(Path(name) / FILE)).shards
             except BadInput as error:
                 if models:  # which do not know these queries
                     continue
                 key = f"{error.key} = {brief(error.value)}" if error.key else "its fabrics"
                 raise BadInput(str(folder), "", f"is of another version ({key})", "generate it again") from error
-            parts = [part.shard for part in planned if not part.is_extra]
+            parts = [part.shard for part in planned if isinstance(part.shard, ShardTask)]
             if {(part.fabric.name, part.split, part.start, part.rows) for part in parts} == present:
                 return {**fabrics, FILE: text}
     raise BadInput(str(folder), "", "its rows are not those of a recipe of this version", "generate it again")

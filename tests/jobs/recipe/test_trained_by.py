@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from jobs.cli import main
-from jobs.plan.dataset import shards
+from jobs.plan.dataset import DataSet
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
@@ -230,7 +230,7 @@ def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
 def test_a_recipe_whose_models_are_all_taught_elsewhere_draws_test_rows_alone(asks):
     recipe = asks()
     alone = dataclasses.replace(recipe, models=recipe.models[-1:])
-    assert {part.shard.split for part in shards(alone)} == {"test"}
+    assert {part.shard.split for part in DataSet(alone).shards} == {"test"}
 
 
 def test_a_recipe_may_pass_on_what_a_third_one_trains(asks, files):

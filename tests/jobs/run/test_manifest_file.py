@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from jobs.plan.dataset import shards
+from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run import manifest_file
 from jobs.run.executor import execute
@@ -26,8 +26,8 @@ def clock(monkeypatch):
 def made(files, tmp_path, clock):
     """A manifest, and a function that notes a shard as made."""
     recipe = load_recipe(files.write())
-    parts = shards(recipe)
-    manifest = ManifestFile(recipe, parts, Ledger(tmp_path / "out"))
+    dataset = DataSet(recipe)
+    parts, manifest = dataset.shards, ManifestFile(dataset, Ledger(tmp_path / "out"))
 
     def add(part):
         manifest.add(part, {part.products[0].rpartition("/")[2]: Product(sha256="ab" * 32, bytes=1)})

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from jobs.cli import main
-from jobs.plan.dataset import folder_of, shards
+from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
@@ -25,14 +25,14 @@ def parts(tmp_path, monkeypatch, capsys):
     for first, name in enumerate("ab"):
         out = tmp_path / name
         made_up.execute(tasks[first:10:2], Ledger(out))
-        ManifestFile(recipe, shards(recipe), Ledger(out)).save()
+        ManifestFile(DataSet(recipe), Ledger(out)).save()
 
     def merge(*tokens):
         code = main(["merge", *tokens])
         told = capsys.readouterr()
         return code, " ".join(told.out.split()), told.err
 
-    merge.tasks, merge.folder = tasks, folder_of(shards(recipe))
+    merge.tasks, merge.folder = tasks, DataSet(recipe).folder
     return merge
 
 

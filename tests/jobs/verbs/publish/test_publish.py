@@ -16,7 +16,7 @@ import yaml
 
 import twillight
 from jobs.cli import main
-from jobs.plan.dataset import fingerprint_of, folder_of, shards
+from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.verbs.publish import publish as verb
 from pipeline.fingerprint import file_sha256
@@ -67,7 +67,7 @@ def write_dataset(folder, more=""):
     (folder / "own.toml").write_text(own, encoding="utf-8")
     (folder / "wide.toml").write_text(RECIPE.format(more=more), encoding="utf-8")
     made_up.finished(folder / "wide.toml", folder / "out", ["generate"])
-    return folder / "out" / folder_of(shards(load_recipe(folder / "wide.toml")))
+    return folder / "out" / DataSet(load_recipe(folder / "wide.toml")).folder
 
 
 @pytest.fixture(scope="module")
@@ -221,8 +221,8 @@ def test_the_citation_has_what_the_format_requires(published):
 def test_the_recipe_generates_the_same_rows(more, tmp_path):
     folder = write_dataset(tmp_path / "made", more)
     assert main(["publish", str(folder), "--to", str(tmp_path / "shelf"), "--licence", "CC0-1.0"]) == 0
-    again = shards(load_recipe(tmp_path / "shelf" / "recipe.toml"))
-    assert fingerprint_of(again) == Manifest.load(folder).fingerprint
+    again = DataSet(load_recipe(tmp_path / "shelf" / "recipe.toml"))
+    assert again.fingerprint == Manifest.load(folder).fingerprint
 
 
 def test_fabrics_are_those_of_the_data_set(published, dataset):
