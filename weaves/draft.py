@@ -7,7 +7,6 @@ first. A float is a run of cells, cyclic in the repeat, over which one yarn stay
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -64,63 +63,12 @@ class Draft:
         picks, ends = self.warp_over.shape
         return ends, picks
 
-    @classmethod
-    def from_rows(cls, rows: Sequence[str], name: str = "matrix") -> Draft:
-        """Read a drawing, ``#`` for warp over and ``.`` for weft over, the last pick first.
-
-        Raises
-        ------
-        BadInput
-            If a row has other letters or another length than the first.
-        """
-        for row in rows:
-            if not row or len(row) != len(rows[0]) or set(row) - set("#."):
-                raise BadInput(name, "rows", row, "rows of equal length are needed, of # (warp over) and . (weft over)")
-        return cls(np.array([[letter == "#" for letter in row] for row in reversed(rows)], dtype=np.bool_), name)
-
-    @classmethod
-    def from_tie_up(
-        cls,
-        threading: Sequence[int],
-        tie_up: Sequence[Sequence[bool | int]],
-        treadling: Sequence[int],
-        name: str = "loom",
-    ) -> Draft:
-        """Weave a loom plan: pick j raises the shafts tied to its treadle, end i rises with its shaft.
-
-        Parameters
-        ----------
-        threading : ints (ends,)
-            Shaft of each end, from 1.
-        tie_up : bools (treadles, shafts)
-            Shafts that each treadle lifts.
-        treadling : ints (picks,)
-            Treadle of each pick, from 1.
-
-        Raises
-        ------
-        BadInput
-            If a shaft or treadle does not exist.
-        """
-        shafts = len(tie_up[0]) if tie_up else 0
-        if not shafts or any(len(treadle) != shafts for treadle in tie_up):
-            raise BadInput(name, "tie_up", tie_up, "one row per treadle is needed, all with one entry per shaft")
-        for key, chosen, most in (("threading", threading, shafts), ("treadling", treadling, len(tie_up))):
-            if not chosen or not all(1 <= number <= most for number in chosen):
-                raise BadInput(name, key, list(chosen), f"numbers from 1 to {most} are needed")
-        lifted = np.array(tie_up, dtype=np.bool_)
-        return cls(lifted[np.array(treadling) - 1][:, np.array(threading) - 1], name)
-
-    def mirrored(self) -> Draft:
-        """Return the back side: seen from behind, left and right swap and the other yarn is on top."""
-        return Draft(~self.warp_over[:, ::-1], f"{self.name}, back")
-
     def rolled(self, ends: int, picks: int) -> Draft:
         """Return this cloth with the repeat shifted by `ends` to the left and `picks` down."""
         return Draft(np.roll(self.warp_over, (picks, ends), axis=(0, 1)), self.name)
 
     def rows(self) -> list[str]:
-        """Return the drawing that `from_rows` reads."""
+        """Return the drawing that `Matrix` reads."""
         return ["".join("#" if over else "." for over in pick) for pick in self.warp_over[::-1]]
 
     def text(self) -> str:
@@ -226,7 +174,10 @@ def smallest_period(values: npt.NDArray[np.generic], axis: int = 0) -> int:
 
 
 class Family(Frozen):
-    """Draft of a fabric file; each weave family is a subclass, chosen by the key `family`."""
+    """Draft of a fabric file; each subclass is a weave family, or several."""
+
+    family: str
+    """Name of the family."""
 
     def build(self) -> Draft:
         """Weave the draft."""
@@ -246,21 +197,36 @@ class Matrix(Family):
     """The drawdown, last pick first: # for warp over, . for weft over."""
 
     def build(self) -> Draft:
-        """Weave the drawn draft."""
-        return Draft.from_rows(self.rows)
+        """Weave the drawn draft; BadInput if a row has other letters or another length than the first."""
+        for row in self.rows:
+            if not row or len(row) != len(self.rows[0]) or set(row) - set("#."):
+                allowed = "rows of equal length are needed, of # (warp over) and . (weft over)"
+                raise BadInput("matrix", "rows", row, allowed)
+        return Draft(np.array([[letter == "#" for letter in row] for row in reversed(self.rows)]), "matrix")
 
 
 class Loom(Family):
-    """Any draft, as a loom is set up for it."""
+    """Any draft, as a loom is set up: pick j raises the shafts tied to its treadle, end i rises with its shaft."""
 
     family: Literal["loom"] = "loom"
-    threading: tuple[StrictInt, ...]
+    threading: tuple[StrictInt, ...] = Field(min_length=1)
     """Shaft of each end, from 1."""
     tie_up: tuple[tuple[StrictBool | StrictInt, ...], ...]
     """One row per treadle: 1 for each shaft that it lifts, else 0."""
-    treadling: tuple[StrictInt, ...]
+    treadling: tuple[StrictInt, ...] = Field(min_length=1)
     """Treadle of each pick, from 1."""
 
     def build(self) -> Draft:
-        """Weave the draft of the loom."""
-        return Draft.from_tie_up(self.threading, self.tie_up, self.treadling)
+        """Weave the draft of the loom; BadInput if a shaft or treadle does not exist."""
+        shafts = len(self.tie_up[0]) if self.tie_up else 0
+        if not shafts or any(len(treadle) != shafts for treadle in self.tie_up):
+            allowed = "one row per treadle is needed, all with one entry per shaft"
+            raise BadInput("loom", "tie_up", self.tie_up, allowed)
+        for key, chosen, most in (
+            ("threading", self.threading, shafts),
+            ("treadling", self.treadling, len(self.tie_up)),
+        ):
+            if not all(1 <= number <= most for number in chosen):
+                raise BadInput("loom", key, list(chosen), f"numbers from 1 to {most} are needed")
+        lifted = np.array(self.tie_up, dtype=np.bool_)
+        return Draft(lifted[np.array(self.treadling) - 1][:, np.array(self.threading) - 1], "loom")

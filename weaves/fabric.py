@@ -25,17 +25,17 @@ from pydantic import (
 from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
-from weaves.families import Basket, BrokenTwill, Herringbone, Plain, Rib, Sateen, Satin, Twill
+from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill
 from weaves.validation import Frozen, read_toml, validated
 from weaves.yarn import Yarn
 
 PRESETS = Path(__file__).parent / "presets"
 
 Weave = Annotated[
-    Plain | Rib | Basket | Twill | BrokenTwill | Herringbone | Satin | Sateen | Matrix | Loom,
+    Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | Loom,
     Field(discriminator="family"),
 ]
-"""The weave families; a file chooses one by `family`, which is also the name of its function."""
+"""The weave families; a file chooses one by `family`."""
 
 
 def _file_name(name: str) -> str:

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from functools import cache
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import (
@@ -30,10 +30,10 @@ from pydantic import (
     model_validator,
 )
 
-from weaves.draft import Draft, Matrix, cells
+from weaves.draft import Draft, Family, Matrix, cells
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-from weaves.families import basket, broken_twill, herringbone, plain, rib, sateen, satin, twill, valid_moves
+from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill, valid_moves
 from weaves.validation import Frozen
 from weaves.yarn import Number, Yarn
 
@@ -126,7 +126,7 @@ class Population(Frozen):
 
     @model_validator(mode="after")
     def _drafts_left(self) -> Population:
-        known = [candidate.draft.name for candidates in _catalogue().values() for candidate in candidates]
+        known = [weave.build().name for weaves in _catalogue().values() for weave in weaves]
         for name in self.exclude:
             if name not in known:
                 near = get_close_matches(name, known, n=3) or ["plain", "twill 4/4", "satin 8/3"]
@@ -220,54 +220,47 @@ def _irregular(population: Population, index: int) -> Draft:
             return draft
 
 
-class Candidate(NamedTuple):
-    """A draft, and the straight twill that it rearranges if it is a broken twill or a herringbone (else itself)."""
-
-    draft: Draft
-    origin: Draft
-
-
 @cache
-def _catalogue() -> dict[FamilyName, list[Candidate]]:
-    """List every draft that a population can hold, by family, without the irregular ones."""
-    steps = [(n, total - n) for total in range(3, LONGEST_TWILL + 1) for n in range(1, total)]
-    satins = [(ends, move) for ends in SATIN_ENDS for move in valid_moves(ends)]
-    groups = (2, 3, 4)
-    drafts: dict[FamilyName, list[Draft]] = {
-        "plain": [plain()],
-        "rib": [rib(1, group) for group in groups] + [rib(group, 1) for group in groups],
-        "basket": [basket(ends, picks) for ends in groups for picks in groups],
-        "twill": [twill([n], [m], side) for side in ("right", "left") for n, m in steps],
-        "satin": [satin(*numbers) for numbers in satins],
-        "sateen": [sateen(*numbers) for numbers in satins],
-    }
-    catalogue = {
-        family: [Candidate(draft, draft) for draft in family_drafts] for family, family_drafts in drafts.items()
-    }
-    breakable = [(n, m) for n, m in steps if n + m >= 4]
-    catalogue["broken_twill"] = [Candidate(broken_twill([n], [m]), twill([n], [m])) for n, m in breakable]
-    catalogue["herringbone"] = [Candidate(herringbone([n], [m]), twill([n], [m])) for n, m in steps]
-    large = [weave(ends, move) for weave in (satin, sateen) for ends in LARGE_SATIN_ENDS for move in valid_moves(ends)]
+def _catalogue() -> dict[FamilyName, list[Family]]:
+    """List every weave that a population can hold, by family, without the irregular ones."""
+    steps = [((n,), (total - n,)) for total in range(3, LONGEST_TWILL + 1) for n in range(1, total)]
     # The two pairs of steps in one order only: the other order is the same cloth, begun elsewhere.
-    pairs = [
-        (first, second)
-        for first, second in itertools.combinations(itertools.product(range(1, LONGEST_TWILL), repeat=2), 2)
-        if sum(first) + sum(second) <= LONGEST_TWILL
-    ]
-    compound = [
-        twill([first[0], second[0]], [first[1], second[1]], side)
-        for side in ("right", "left")
-        for first, second in pairs
-    ]
-    catalogue["large_satin"] = [Candidate(draft, draft) for draft in large]
-    catalogue["compound_twill"] = [Candidate(draft, draft) for draft in compound]
-    return catalogue
+    pairs = itertools.combinations(itertools.product(range(1, LONGEST_TWILL), repeat=2), 2)
+    compound = [tuple(zip(*pair, strict=True)) for pair in pairs if sum(map(sum, pair)) <= LONGEST_TWILL]
+    groups = (2, 3, 4)
+
+    def twills(numbers: Iterable[tuple[tuple[int, ...], ...]]) -> list[Family]:
+        return [Twill(over=over, under=under, direction=d) for d in ("right", "left") for over, under in numbers]
+
+    def satins(family: Literal["satin", "sateen"], sizes: Iterable[int]) -> list[Family]:
+        return [Satin(family=family, ends=ends, move=move) for ends in sizes for move in valid_moves(ends)]
+
+    return {
+        "plain": [Plain()],
+        "rib": [*(Rib(ends=1, picks=n) for n in groups), *(Rib(ends=n, picks=1) for n in groups)],
+        "basket": [Basket(ends=ends, picks=picks) for ends in groups for picks in groups],
+        "twill": twills(steps),
+        "satin": satins("satin", SATIN_ENDS),
+        "sateen": satins("sateen", SATIN_ENDS),
+        "broken_twill": [Twill(family="broken_twill", over=n, under=m) for n, m in steps if sum(n + m) >= 4],
+        "herringbone": [Herringbone(over=n, under=m) for n, m in steps],
+        "large_satin": satins("satin", LARGE_SATIN_ENDS) + satins("sateen", LARGE_SATIN_ENDS),
+        "compound_twill": twills(compound),
+    }
 
 
 @cache
 def _known() -> set[tuple[tuple[int, int], bytes]]:
     """Return the canonical forms of all drafts of the catalogue."""
-    return {draft.canonical() for drafts in _catalogue().values() for draft, _ in drafts}
+    return {weave.build().canonical() for weaves in _catalogue().values() for weave in weaves}
+
+
+def _is_one_of(weave: Family, banned: set[tuple[tuple[int, int], bytes]]) -> bool:
+    """Return whether a weave, or the straight twill that it rearranges, is one of some canonical forms."""
+    forms = {weave.build().canonical()}
+    if isinstance(weave, Twill | Herringbone):
+        forms.add(Twill(over=weave.over, under=weave.under).build().canonical())
+    return not banned.isdisjoint(forms)
 
 
 @cache
@@ -276,17 +269,10 @@ def _allowed(families: tuple[FamilyName, ...], exclude: tuple[str, ...]) -> list
 
     Irregular drafts are not listed.
     """
-    everything = [candidate for candidates in _catalogue().values() for candidate in candidates]
-    banned = {draft.canonical() for draft, _ in everything if draft.name in exclude}
+    drafts = [weave.build() for weaves in _catalogue().values() for weave in weaves]
+    banned = {draft.canonical() for draft in drafts if draft.name in exclude}
     left = [
-        (
-            family,
-            [
-                draft
-                for draft, origin in _catalogue().get(family, ())
-                if not banned or banned.isdisjoint({draft.canonical(), origin.canonical()})
-            ],
-        )
+        (family, [w.build() for w in _catalogue().get(family, ()) if not (banned and _is_one_of(w, banned))])
         for family in families
     ]
     return [(family, drafts) for family, drafts in left if drafts or family == "irregular"]

@@ -10,7 +10,7 @@ from scipy import stats
 
 from weaves.draft import cells
 from weaves.fabric import Fabric
-from weaves.families import broken_twill, herringbone, twill
+from weaves.families import Herringbone, Twill
 from weaves.population import FamilyName, Population, Ranges, population_fabrics
 
 RANGES = ("plain", "twill", "satin", "irregular")
@@ -41,7 +41,9 @@ def test_known_value():
 
 def test_excluded_drafts_do_not_occur_in_any_disguise():
     """Of 200 twills some are 4/4, straight, broken or herringbone (checked); with the exclusion, none."""
-    banned = {draft.canonical() for draft in (twill([4], [4]), broken_twill([4], [4]), herringbone([4], [4]))}
+    four = {"over": 4, "under": 4}
+    weaves = (Twill(**four), Twill(family="broken_twill", **four), Herringbone(**four))
+    banned = {weave.build().canonical() for weave in weaves}
     families: tuple[FamilyName, ...] = ("twill", "broken_twill", "herringbone")
 
     def occurs(exclude):
