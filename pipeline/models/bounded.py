@@ -22,16 +22,13 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.method import CHUNK_ROWS, Method, refuse_other
+from pipeline.models.method import Method, in_chunks, refuse_other
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 _OTHER_YARN = [1, 0, 3, 2]  # of each component, the same one of the other yarn
-
-BOUNDED, UNBOUNDED = "bounded", "unbounded"
-"""Settings of the methods that `counterpart` returns."""
 
 
 class Bounded:
@@ -45,7 +42,7 @@ class Bounded:
 
     def __init__(self, method: Method) -> None:
         self._method = method
-        self.name, self.setting = method.name, " ".join(filter(None, (method.setting, BOUNDED)))
+        self.name, self.setting = method.name, " ".join(filter(None, (method.setting, "bounded")))
         self._tables = PerFabric(tabulate)
 
     def covers(self, fabric: Fabric) -> bool:
@@ -59,12 +56,9 @@ class Bounded:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
-        refuse_other(queries, self.name, ("stretch",))
+        refuse_other(queries, f"the method {self.name} answers", ("stretch",))
         result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
-        for start in range(0, len(result), CHUNK_ROWS):
-            rows = slice(start, start + CHUNK_ROWS)
-            result[rows] = limited(result[rows], read_queries(table, queries.take(rows)).bounds)
-        return result
+        return limited(result, in_chunks(queries, lambda part: read_queries(table, part).bounds))
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes and those of the table."""

@@ -14,12 +14,13 @@ The domain is on the model card. It limits two uses of a model.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.models.method import faults, refuse_other
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -62,16 +63,6 @@ class Domain(Frozen):
                 name: (min(min(n[name]) for n in numbers), max(max(n[name]) for n in numbers)) for name in numbers[0]
             },
         )
-
-    @classmethod
-    def joined(cls, domains: Sequence[Domain]) -> Domain:
-        """Return the domain of networks that know one fabric each, trained on queries of the same distribution."""
-        first = domains[0]
-        yarns = {
-            name: (min(one.yarns[name][0] for one in domains), max(one.yarns[name][1] for one in domains))
-            for name in first.yarns
-        }
-        return first.model_copy(update={"yarns": yarns})
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -117,18 +108,11 @@ class Domain(Frozen):
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""
-        if found := self.faults(queries, model):
-            row = min(found)
-            column, value, allowed = found[row]
-            raise BadInput("queries", f"{len(found)} rows; first row {row}: {column}", value, allowed)
+        refuse_other(queries, f"the model {model} was trained for", self.kinds)
 
     def faults(self, queries: Queries, model: str) -> dict[int, tuple[str, object, str]]:
         """Return the fault of each query of a kind not trained on, in the form of `pipeline.truth.query.faults`."""
-        found: dict[int, tuple[str, object, str]] = {}
-        for rows, column, values, allowed in self._strangers(queries):
-            for row in np.flatnonzero(rows).tolist():
-                found.setdefault(row, (column, values[row].tolist(), f"the model {model} was trained {allowed} only"))
-        return found
+        return faults(queries, f"the model {model} was trained for", self.kinds)
 
     def refuse_fabric(self, fabric: Fabric, model: str) -> None:
         """Refuse a fabric whose yarns lie outside those trained on."""
@@ -155,26 +139,18 @@ class Domain(Frozen):
             if theirs[name] != own:
                 raise BadInput("truth", name, theirs[name], f"the model {model} was trained with {name} = {own!r}")
 
-    def _strangers(self, queries: Queries) -> Iterator[tuple[Any, str, Any, str]]:
-        yield queries.wo[:, 2] < 0, "wo", queries.wo, "for viewers in front of the cloth"
-        if self.queries.behind == 0.0:
-            yield queries.wi[:, 2] < 0, "wi", queries.wi, "for light from the viewer's side"
-        if self.queries.stretch == 1.0:
-            stretched = np.abs(queries.sigma_minor - queries.sigma) > 1e-3 * queries.sigma
-            yield stretched, "sigma_minor", queries.sigma_minor, "for round footprints (sigma_minor = sigma)"
-        if self.queries.curvature == (0.0, 0.0):
-            yield queries.curvature > 0, "curvature", queries.curvature, "for flat cloth (curvature = 0)"
 
+def domain_of(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
+    """Return the domain on the cards of a network, or of several that know one fabric each; None if there is none.
 
-def domain_of(card: Mapping[str, Any]) -> Domain | None:
-    """Return the domain on a model card, if there is one."""
-    return Domain.model_validate(card["domain"]) if "domain" in card else None
-
-
-def joined_domain(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
-    """Return the domain of networks that know one fabric each, from their cards."""
-    found = [domain for domain in map(domain_of, cards) if domain is not None]
-    return Domain.joined(found) if found else None
+    The several were trained on queries of the same distribution.
+    """
+    domains = [Domain.model_validate(card["domain"]) for card in cards if "domain" in card]
+    if not domains:
+        return None
+    ranges = {name: [domain.yarns[name] for domain in domains] for name in domains[0].yarns}
+    yarns = {name: (min(low for low, _ in own), max(high for _, high in own)) for name, own in ranges.items()}
+    return domains[0].model_copy(update={"yarns": yarns})
 
 
 def _size(queries: Queries) -> npt.NDArray[np.float64]:

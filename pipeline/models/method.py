@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -51,28 +51,44 @@ class EstimatesErrors(Method, Protocol):
         """Return the method at a wished relative error, above 0 and below 1: other answers where it is exceeded."""
 
 
-def refuse_other(queries: Queries, method: str, kinds: Collection[str] = ()) -> None:
-    """Refuse queries that are neither plain nor of some `kinds`: a BadInput that names row and column.
+def faults(queries: Queries, who: str, kinds: Collection[str] = ()) -> dict[int, tuple[str, object, str]]:
+    """Return the fault of each query that is neither plain nor of some `kinds`: its column, value, and what is allowed.
 
     Plain queries are of flat cloth, round footprints, and lit from the front; others are of the kinds ``stretch``,
-    ``behind`` and ``curvature``.
+    ``behind`` and ``curvature``. `who` begins the sentence: "the method x answers".
     """
-    stretch, behind, curvature = (kind in kinds for kind in ("stretch", "behind", "curvature"))
-    for name, rows, allowed in (
-        ("wo", queries.wo[:, 2] < 0, "viewers in front of the cloth"),
-        ("wi", (queries.wi[:, 2] < 0) & (not behind), "light from the viewer's side"),
-        (
-            "sigma_minor",
-            (np.abs(queries.sigma_minor - queries.sigma) > _ROUND * queries.sigma) & (not stretch),
-            "round footprints (sigma_minor = sigma)",
-        ),
-        ("curvature", (queries.curvature > 0) & (not curvature), "flat cloth (curvature = 0)"),
+    stretched = np.abs(queries.sigma_minor - queries.sigma) > _ROUND * queries.sigma
+    found: dict[int, tuple[str, object, str]] = {}
+    for kind, name, strange, allowed in (
+        ("", "wo", queries.wo[:, 2] < 0, "viewers in front of the cloth"),
+        ("behind", "wi", queries.wi[:, 2] < 0, "light from the viewer's side"),
+        ("stretch", "sigma_minor", stretched, "round footprints (sigma_minor = sigma)"),
+        ("curvature", "curvature", queries.curvature > 0, "flat cloth (curvature = 0)"),
     ):
-        if rows.any():
-            row = int(np.flatnonzero(rows)[0])
-            value = getattr(queries, name)[row].tolist()
-            where = f"{int(rows.sum())} rows; first row {row}: {name}"
-            raise BadInput("queries", where, value, f"the method {method} answers {allowed} only")
+        if kind not in kinds and strange.any():
+            values = getattr(queries, name)
+            for row in np.flatnonzero(strange).tolist():
+                found.setdefault(row, (name, values[row].tolist(), f"{who} {allowed} only"))
+    return found
+
+
+def refuse_other(queries: Queries, who: str, kinds: Collection[str] = ()) -> None:
+    """Refuse queries with `faults`: a BadInput that names the first row and its column."""
+    if found := faults(queries, who, kinds):
+        row = min(found)
+        column, value, allowed = found[row]
+        raise BadInput("queries", f"{len(found)} rows; first row {row}: {column}", value, allowed)
+
+
+def in_chunks(
+    queries: Queries, read: Callable[[Queries], npt.NDArray[np.float32]], width: int = 4
+) -> npt.NDArray[np.float32]:
+    """Return what is read for N queries, (N, width), `CHUNK_ROWS` rows at a time."""
+    result = np.empty((len(queries.u), width), np.float32)
+    for start in range(0, len(result), CHUNK_ROWS):
+        rows = slice(start, start + CHUNK_ROWS)
+        result[rows] = read(queries.take(rows))
+    return result
 
 
 def in_repeat(queries: Queries, repeat: tuple[int, int]) -> Queries:

@@ -1,38 +1,36 @@
-"""Interfaces of networks: `Trainable`, which the training loop trains, and `PerQuery`, which runs for every query.
+"""Networks: `Trainable`, which the training loop trains, and `NetworkMethod`, which a trained one answers by.
 
 Batches are torch tensors. A fabric is encoded once; the rest of a network maps a few numbers of each query and of the
-fabric to the four components. As a separate module it can be compiled, exported or quantised
+fabric to the four components (`PerQuery`). As a separate module it can be compiled, exported or quantised
 (`pipeline.models.runtimes`) without a new training.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import Any, ClassVar, Final, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import CHUNK_ROWS, Method
+from pipeline.compiled.arrays import Float32
+from pipeline.fingerprint import fingerprint
+from pipeline.models.domain import Domain, domain_of
+from pipeline.models.method import Method, in_chunks, in_repeat
+from pipeline.models.options import Options
+from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
-
-GPU_CHUNK = 2**18
-"""Rows of one inference on a GPU."""
-
-KNOWN = ("u", "v", "sigma", "wi", "wo")
-"""Columns of round footprints of flat cloth, the inputs of the published networks."""
 
 Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
 """Cards and weights of trained models."""
 
-Net = TypeVar("Net", bound=nn.Module)
-
-Columns = tuple[npt.NDArray[np.float32], ...]
+Columns = tuple[Float32, ...]
 """Arrays of N rows."""
+
+_ANY: Final = ""  # key of a network that answers for any fabric
 
 
 class Batch(NamedTuple):
@@ -67,14 +65,12 @@ class Batch(NamedTuple):
     transparency: Tensor
 
 
-class Trainable(Protocol):
-    """A torch module that the training loop can train; the module's file describes what it learns.
-
-    A network from outside needs `loss` alone (`pipeline.models.added.network`).
-    """
+class Trainable(nn.Module):
+    """What the training loop can train: subclasses have a `loss`, and the rest as far as they need it."""
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; `random` is a pure function of seed and step."""
+        raise NotImplementedError
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean of targets (M, 4): a leaky ReLU can stall far from it."""
@@ -83,10 +79,48 @@ class Trainable(Protocol):
         """Adjust scheduled parameters at `progress` in [0, 1)."""
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return the optimiser's parameter groups with their peak learning rates."""
+        """Return the optimiser's parameter groups with their peak learning rates: one, if nothing else is said."""
+        return [{"params": list(self.parameters()), "lr": rate}]
+
+    def counts(self) -> dict[str, int]:
+        """Return the numbers of parameters of the network's parts."""
+        return {}
 
     def architecture(self) -> dict[str, Any]:
         """Describe layers and parameter counts for the model card."""
+        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
+        total = sum(weight.numel() for weight in self.parameters())
+        return {"parameters": {**self.counts(), "total": total}, "layers": layers}
+
+    def call(self, function: str) -> AbstractContextManager[None]:
+        """Return the guard of a call of one of its functions; it does nothing for a network of the package."""
+        return nullcontext()
+
+
+class QueryNetwork(Trainable):
+    """A network that answers each query by itself, from what it makes of a fabric once."""
+
+    options: Any
+    """The design, with the method's name."""
+    columns: ClassVar[tuple[str, ...]] = ("u", "v", "sigma", "wi", "wo")
+    """Columns of the queries that it reads, centres as shares of the repeat; here those of round footprints of flat
+    cloth, the inputs of the published networks."""
+
+    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
+        """Return all that is computed once for a fabric, the constants of its queries; nothing by default."""
+        return ()
+
+    def components(self, *inputs: Tensor) -> Tensor:
+        """Return components (N, 4) from the columns of N queries and the constants of a fabric."""
+        raise NotImplementedError
+
+    def stored(self, constants: tuple[Tensor, ...]) -> int:
+        """Return how many numbers a renderer stores for a fabric with these constants; all weights by default."""
+        return sum(weight.numel() for weight in self.parameters())
+
+
+Net = TypeVar("Net", bound=QueryNetwork)
+Weighed = TypeVar("Weighed", bound=nn.Module)
 
 
 class PerQuery(NamedTuple):
@@ -100,6 +134,12 @@ class PerQuery(NamedTuple):
     """Takes the inputs, as tensors, then the constants; returns the components (N, 4)."""
     constants: tuple[Tensor, ...] = ()
     """Inputs of the module for the fabric. Fabrics whose constants have equal shapes may share the module."""
+
+    def answered(self, queries: Queries, run: Callable[..., Tensor] | None = None) -> Float32:
+        """Return the components of N queries, (N, 4), by the module or by what runs in its place."""
+        self.refuse(queries)
+        run = run or self.module
+        return evaluated(queries, self.inputs, lambda *inputs: run(*inputs, *self.constants))
 
 
 @runtime_checkable
@@ -132,11 +172,6 @@ class Answering(nn.Module):
         return self._answer(*given)
 
 
-def columns_of(queries: Queries, names: Sequence[str] = KNOWN) -> Columns:
-    """Return columns of queries by their names."""
-    return tuple(np.array(getattr(queries, name), np.float32) for name in names)
-
-
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Let torch compute on the thread that calls it, for callers that have one thread a core themselves."""
@@ -148,45 +183,101 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def loaded(network: Net, weights: dict[str, Tensor]) -> Net:
+def loaded(network: Weighed, weights: dict[str, Tensor]) -> Weighed:
     """Return a network with these weights; RuntimeError if they do not fit."""
     network.load_state_dict(weights)
     return network
 
 
-def in_chunks(
-    queries: Queries,
-    answer: Callable[..., Tensor],
-    device: torch.device,
-    columns: Sequence[str] = KNOWN,
-    width: int = 4,
-) -> npt.NDArray[np.float32]:
-    """Evaluate queries in chunks, without gradients.
+def evaluated(
+    queries: Queries, inputs: Callable[[Queries], Columns], answer: Callable[..., Tensor], width: int = 4
+) -> Float32:
+    """Evaluate N queries in chunks, without gradients: float32 (N, width).
+
+    `answer` takes the inputs of some queries as tensors.
+    """
+    with torch.inference_mode():
+        return in_chunks(queries, lambda part: answer(*map(torch.from_numpy, inputs(part))).numpy(), width)
+
+
+class NetworkMethod(Generic[Net]):
+    """Trained networks as a method: one that answers for any fabric, or one for each fabric.
 
     Parameters
     ----------
-    queries : Queries
-        N queries.
-    answer : callable
-        Takes the columns as float32 tensors (rows,) or (rows, 3) on `device`; returns (rows, width).
-    device : torch.device
-        Device of `answer`.
-    columns : sequence of str
-        Columns that `answer` takes.
-    width : int
-        Values per query.
-
-    Returns
-    -------
-    float32 (N, width)
+    networks : QueryNetwork or mapping
+        Trained weights: one network, or from the fingerprint of a fabric's optics to its network.
+    domain : Domain, optional
+        Domain of the training; any query if left out.
     """
-    result = np.empty((len(queries.u), width), np.float32)
-    arrays = [getattr(queries, name) for name in columns]
-    chunk = CHUNK_ROWS if device.type == "cpu" else GPU_CHUNK
-    with torch.inference_mode():
-        for start in range(0, len(result), chunk):
-            rows = slice(start, start + chunk)
-            # A copy: torch cannot hold arrays that are read-only, as those of a mapped file are.
-            tensors = [torch.from_numpy(np.array(column[rows], np.float32)).to(device) for column in arrays]
-            result[rows] = answer(*tensors).numpy(force=True)
-    return result
+
+    def __init__(self, networks: Net | Mapping[str, Net], domain: Domain | None = None) -> None:
+        self._networks = networks if isinstance(networks, Mapping) else {_ANY: networks}
+        self._modules = {key: Answering(network, network.components) for key, network in self._networks.items()}
+        self.options = next(iter(self._networks.values())).options
+        self.name, self.setting, self.domain = self.options.name, "", domain
+        self._parts = PerFabric(self._encoded)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return whether a network was trained for any fabric, or for this one."""
+        return self._key(fabric) in self._networks
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Encode the fabric, once."""
+        self._parts.of(fabric)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
+        return self._parts.of(fabric).answered(queries)
+
+    def per_query(self, fabric: Fabric) -> PerQuery:
+        """Return the part that runs for every query; all fabrics of a network share its module."""
+        return self._parts.of(fabric)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of what a renderer needs of the network, and of what it made of the fabric, float32."""
+        return 4 * self.network_of(fabric).stored(self._parts.of(fabric).constants)
+
+    def network_of(self, fabric: Fabric) -> Net:
+        """Return the network of a fabric that is covered."""
+        return self._networks[self._key(fabric)]
+
+    def refuse(self, queries: Queries) -> None:
+        """Refuse queries of kinds not trained on."""
+        if self.domain is not None:
+            self.domain.refuse(queries, self.name)
+
+    def _key(self, fabric: Fabric) -> str:
+        return _ANY if _ANY in self._networks else fingerprint(fabric.optics())
+
+    def _encoded(self, fabric: Fabric) -> PerQuery:
+        with torch.no_grad():
+            return self._part(fabric, self.network_of(fabric).encoded(fabric))
+
+    def _part(self, fabric: Fabric, constants: tuple[Tensor, ...]) -> PerQuery:
+        """Return the part for queries about a fabric with these constants."""
+        module, names, repeat = self._modules[self._key(fabric)], self.network_of(fabric).columns, fabric.weave.repeat
+
+        def inputs(queries: Queries) -> Columns:
+            near = in_repeat(queries, repeat)
+            return tuple(np.array(getattr(near, name), np.float32) for name in names)
+
+        return PerQuery(self.refuse, inputs, module, constants)
+
+
+def restored(
+    options: Options, trained: Trained, make: Callable[[tuple[int, int]], Net]
+) -> tuple[dict[str, Net], Domain | None]:
+    """Return what a `NetworkMethod` is made of: trained networks, and their joint domain.
+
+    `make` returns an untrained network; a network of one material is made for the repeat (ends, picks) of its fabric.
+    """
+    networks = {}
+    for card, weights in trained:
+        key, repeat = _ANY, (0, 0)
+        if options.of_one_material:
+            (fabric,) = card["fabrics"]
+            key, (ends, picks) = fabric["optics"], fabric["repeat"]
+            repeat = (ends, picks)
+        networks[key] = loaded(make(repeat), weights)
+    return networks, domain_of([card for card, _ in trained])

@@ -29,7 +29,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import CHUNK_ROWS, Method
+from pipeline.models.method import Method
 from pipeline.models.network import PerQuery, Portable
 from pipeline.models.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -259,8 +259,7 @@ class RunBy:
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries outside the domain."""
         part, program = self._ready.of(fabric)
-        part.refuse(queries)
-        return _answered(part, program, queries)
+        return part.answered(queries, program.run)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes, less what smaller weights save."""
@@ -284,23 +283,13 @@ class RunBy:
     def _compare(self, fabric: Fabric, part: PerQuery, program: _Program, queries: Queries) -> None:
         """Compare values with the method's own."""
         own = self._method.predict(fabric, queries)
-        difference = np.linalg.norm(_answered(part, program, queries) - own)
+        difference = np.linalg.norm(part.answered(queries, program.run) - own)
         error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
         if not error <= RUNTIME_TOLERANCE:
             raise WorkFailed(
                 f"{self.name} by {self._runtime} on {fabric.name}: answers differ from the method's own by "
                 f"{error:.1e}, beyond {RUNTIME_TOLERANCE:g}"
             )
-
-
-def _answered(part: PerQuery, program: _Program, queries: Queries) -> npt.NDArray[np.float32]:
-    result = np.empty((len(queries.u), 4), np.float32)
-    with torch.inference_mode():
-        for start in range(0, len(result), CHUNK_ROWS):
-            rows = slice(start, start + CHUNK_ROWS)
-            inputs = (torch.from_numpy(column) for column in part.inputs(queries.take(rows)))
-            result[rows] = program.run(*inputs, *part.constants).numpy()
-    return result
 
 
 def runs(method: Method, names: Iterable[str]) -> list[Method]:

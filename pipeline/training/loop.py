@@ -22,7 +22,6 @@ from torch import nn
 
 from pipeline import versions
 from pipeline.fingerprint import IDENTITY, fingerprint
-from pipeline.models.added.network import calls_of
 from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
@@ -87,8 +86,7 @@ def train(
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
         extra = [[manifest.read_extra(manifest_folder, name, one) for name in fabrics] for one in options.extra_rows]
-        network: Any = build_network(options, members, extra)
-        call = calls_of(network)
+        network = build_network(options, members, extra)
         del extra
         stride = max(len(rows.table) // _START_ROWS, 1)
         network.start_at(torch.from_numpy(rows.table[::stride, TARGET].copy()))
@@ -110,7 +108,7 @@ def train(
             _set_rate(optimiser, peaks, rate_factor(step, training))
             network.schedule(step / training.steps)
             batch, random = batches.step(step), order.random(step)
-            with call("loss"):
+            with network.call("loss"):
                 with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                     loss = learnt(batch, random)
                 norm = _descend(network, optimiser, loss, training.gradient_clip)
@@ -121,7 +119,7 @@ def train(
             if done % interval == 0 or done == training.steps:
                 state.mark(done)
             if watched is not None and (done % looks == 0 or done == training.steps):
-                with state.averaged(), call("loss"):
+                with state.averaged(), network.call("loss"):
                     held_out_loss = float(network.loss(watched, order.random(_WATCH)))
                 state.offer(done, held_out_loss)
                 error, noise = _noted(state, held_out, held_out_loss)

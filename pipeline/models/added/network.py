@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,9 @@ from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported
-from pipeline.models.domain import joined_domain
+from pipeline.models.domain import domain_of
 from pipeline.models.method import Method
-from pipeline.models.network import Batch, Trained
+from pipeline.models.network import Batch, Trainable, Trained
 from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
@@ -33,13 +33,13 @@ Calls = Callable[[str], AbstractContextManager[None]]
 """Marks a call of a function, given by its name, and turns its faults into sentences."""
 
 
-class GuardedNetwork(nn.Module):
-    """A network from outside with the interface of `pipeline.models.network.Trainable`.
+class GuardedNetwork(Trainable):
+    """A network from outside behind a guard; of its functions ``loss`` is needed, the others have defaults.
 
     Parameters
     ----------
     network : nn.Module
-        The network; of its functions ``loss`` is needed, the others have defaults.
+        The network.
     name : str
         Name of the method in tables.
     fabrics : sequence of Fabric
@@ -50,7 +50,11 @@ class GuardedNetwork(nn.Module):
 
     def __init__(self, network: nn.Module, name: str, fabrics: Sequence[Fabric], call: Calls) -> None:
         super().__init__()
-        self.network, self.name, self.fabrics, self.call = network, name, fabrics, call
+        self.network, self.name, self.fabrics, self._call = network, name, fabrics, call
+
+    def call(self, function: str) -> AbstractContextManager[None]:
+        """Return the guard of a call of one of its functions."""
+        return self._call(function)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; torch's own random numbers depend on seed and step alone, too."""
@@ -66,27 +70,26 @@ class GuardedNetwork(nn.Module):
         return loss
 
     def start_at(self, target: Tensor) -> None:
-        """Show the network some targets (M, 4) before the first step; nothing by default."""
+        """Show the network some targets (M, 4) before the first step."""
         with self.call("start_at"):
-            self._own("start_at", lambda target: None)(target)
+            self._own("start_at", super().start_at)(target)
 
     def schedule(self, progress: float) -> None:
-        """Adjust scheduled parameters; nothing by default."""
+        """Adjust scheduled parameters."""
         with self.call("schedule"):
-            self._own("schedule", lambda progress: None)(progress)
+            self._own("schedule", super().schedule)(progress)
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return the optimiser's parameter groups; by default all parameters learn at the same rate."""
+        """Return the optimiser's parameter groups."""
         with self.call("parameter_groups"):
-            default = [{"params": list(self.network.parameters()), "lr": rate}]
-            groups: list[dict[str, Any]] = self._own("parameter_groups", lambda rate: default)(rate)
+            groups: list[dict[str, Any]] = self._own("parameter_groups", super().parameter_groups)(rate)
             torch.optim.AdamW(groups)  # refuses what is no group here, where the fault has a name
             return groups
 
     def architecture(self) -> dict[str, Any]:
         """Return parameters and layers for the model card, what the network says of itself, and its fabrics."""
-        layers = {name: list(weight.shape) for name, weight in self.network.named_parameters()}
-        counted = {"parameters": {"total": sum(weight.numel() for weight in self.network.parameters())}}
+        counted = super().architecture()
+        layers = {name.removeprefix("network."): shape for name, shape in counted["layers"].items()}
         with self.call("architecture"):
             own = dict(self._own("architecture", dict)())
             json.dumps(own, allow_nan=False)
@@ -131,11 +134,6 @@ class PerFabricMethod:
         return self._known.of(fabric).bytes_stored(fabric)
 
 
-def calls_of(network: nn.Module) -> Calls:
-    """Return the guard of a network's functions; that of a network of the package does nothing."""
-    return network.call if isinstance(network, GuardedNetwork) else lambda function: nullcontext()
-
-
 def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwork:
     """Return an untrained network from outside.
 
@@ -174,7 +172,7 @@ def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
         with network.call("load"):
             method.load(network.network.eval())
         methods[fingerprint(fabrics[0].optics())] = method
-    domain = joined_domain([card for card, _ in trained])
+    domain = domain_of([card for card, _ in trained])
     (*_, last) = methods.values()
     return Guarded(PerFabricMethod(methods) if options.of_one_material else last, options, root, domain=domain)
 

@@ -66,7 +66,7 @@ class Analytic(Generic[Table]):
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4). BadInput for kinds of queries that it does not know."""
-        refuse_other(queries, self.name, self._kinds)
+        refuse_other(queries, f"the method {self.name} answers", self._kinds)
         return self._answer(fabric, queries, seed)
 
     def bytes_stored(self, fabric: Fabric) -> int:

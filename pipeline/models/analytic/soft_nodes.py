@@ -9,7 +9,6 @@ tabulated at the first such query.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -17,7 +16,7 @@ from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
-from pipeline.models.method import CHUNK_ROWS
+from pipeline.models.method import in_chunks
 from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -69,7 +68,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         from pipeline.analytic.soft_nodes.nodes import tabulate
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
-            return _in_chunks(lambda part: read_queries(table, part).components, queries, 4)
+            return in_chunks(queries, lambda part: read_queries(table, part).components)
 
         super().__init__(
             SoftNodesOptions(name=name), level, PerFabric(lambda fabric: tabulate(fabric, level=level)), read
@@ -82,7 +81,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         from pipeline.analytic.soft_nodes.features import read_behind
 
         table = self.table_for(fabric, queries)
-        return _in_chunks(lambda part: read_behind(table, part), queries, 5)
+        return in_chunks(queries, lambda part: read_behind(table, part), 5)
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
@@ -103,12 +102,3 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         result[behind] = self.behind(fabric, queries.take(behind))[:, :4]
         result[~behind] = self._answer(fabric, queries.take(~behind), seed)
         return result
-
-
-def _in_chunks(read: Callable[[Queries], Float32], queries: Queries, width: int) -> Float32:
-    """Read `width` numbers a query, `CHUNK_ROWS` rows at a time."""
-    result = np.empty((len(queries.u), width), np.float32)
-    for start in range(0, len(result), CHUNK_ROWS):
-        rows = slice(start, start + CHUNK_ROWS)
-        result[rows] = read(queries.take(rows))
-    return result

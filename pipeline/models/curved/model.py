@@ -21,8 +21,7 @@ four components, specular ones in log space, counts of texels and steps. The pap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -31,12 +30,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.curved import CurvedOptions
-from pipeline.models.method import in_repeat
-from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks
-from pipeline.models.networks.layers import perceptron, to_components, to_network, weighted_error
-from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid, read_pyramid, shifted
-from pipeline.models.one_material import OneMaterial, restored
+from pipeline.models.network import Batch, NetworkMethod, Trained, evaluated, restored
+from pipeline.models.networks.layers import component_error, perceptron, to_components, to_network
+from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.opacity import has_gaps
 from pipeline.truth.options import TruthOptions
@@ -113,10 +111,8 @@ class CurvedNetwork(TextureNetwork):
 
     Parameters
     ----------
-    options : CurvedOptions
-        The design.
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings.
+    options, repeat : CurvedOptions, tuple of int
+        As of any `TextureNetwork`.
     silhouettes : SilhouetteData, optional
         Training rows of the opacity; needed for training only.
     fall : float
@@ -124,6 +120,7 @@ class CurvedNetwork(TextureNetwork):
     """
 
     textures: ClassVar[tuple[str, ...]] = ("opacity_levels", "depth", "levels")
+    columns: ClassVar[tuple[str, ...]] = (*View._fields, "wi")
     options: CurvedOptions
     fall: Tensor
 
@@ -134,8 +131,8 @@ class CurvedNetwork(TextureNetwork):
         silhouettes: SilhouetteData | None = None,
         fall: float = _NO_FALL,
     ) -> None:
-        super().__init__()
-        self.options, self.repeat, self.silhouettes = options, repeat, silhouettes
+        super().__init__(options, repeat)
+        self.silhouettes = silhouettes
         self.register_buffer("fall", torch.tensor(fall, dtype=torch.float32))
         shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)
         channels, hidden, view = options.channels, options.hidden, _view_inputs(options)
@@ -145,7 +142,7 @@ class CurvedNetwork(TextureNetwork):
         self.levels = random_pyramid(channels, shapes)
         self.decoder = perceptron(channels + view + _axes(options), hidden, _LAYERS, 4)
         self.depth = None
-        self.offset: nn.Sequential | None = None
+        self.offset = None
         if options.offset:
             self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
             self.offset = perceptron(channels + view, hidden, _LAYERS, 1)
@@ -153,13 +150,14 @@ class CurvedNetwork(TextureNetwork):
     def forward(self, view: View, wi: Tensor) -> Tensor:
         """Answer in network space, (n, 4), for light from wi (n, 3)."""
         seen = self._view(view)
-        u, v = view.u, view.v
-        if self.offset is not None and self.depth is not None:
-            here = self._read([self.depth], u, v, view.sigma)
-            u, v = shifted(self.offset(torch.cat([here, seen], dim=-1)), u, v, view.wo, self.repeat)
-        features = self._read(list(self.levels), u, v, view.sigma)
+        u, v = self.moved(view.u, view.v, view.sigma, view.wo, seen)
+        features = self.read(list(self.levels), u, v, view.sigma)
         output: Tensor = self.decoder(torch.cat([features, seen, wi[:, : _axes(self.options)]], dim=-1))
         return output
+
+    def components(self, *inputs: Tensor) -> Tensor:
+        """Return the components (n, 4) of the reflectance, without the opacity."""
+        return to_components(self(View(*inputs[:-1]), inputs[-1]), self.options.log_k)
 
     def cover(self, view: View) -> Tensor:
         """Return the opacity in [0, 1], (n,)."""
@@ -189,7 +187,7 @@ class CurvedNetwork(TextureNetwork):
         view = View(*(column.flatten(0, 1) for column in columns))
         target = to_network(batch.target.flatten(0, 1), options.log_k)
         output = self(view, batch.wi.flatten(0, 1))
-        error = weighted_error(output, target, options.specular_weight, options.diffuse_weight)
+        error = component_error(output, target, options)
         if self.silhouettes is None or options.silhouette_weight == 0:
             return error
         return error + options.silhouette_weight * self._edge_loss(*self.silhouettes.draw(len(view.u), random))
@@ -204,7 +202,7 @@ class CurvedNetwork(TextureNetwork):
 
     def _silhouette(self, view: View) -> Tensor:
         texels = self.options.silhouette_texels_per_yarn
-        features = self._read(list(self.opacity_levels), view.u, view.v, view.sigma, texels)
+        features = self.read(list(self.opacity_levels), view.u, view.v, view.sigma, texels)
         if self.options.silhouette == "grazing":
             # The edge lies in a direction, not at an angle: of the view its azimuth alone.
             level = functional.normalize(view.wo * view.wo.new_tensor([1.0, 1.0, 0.0]), dim=-1, eps=1e-6)
@@ -221,11 +219,6 @@ class CurvedNetwork(TextureNetwork):
             seen.append((square / (square + 2.0 * curvature * (1.0 - square)).clamp_min(1e-12)).sqrt())
         return torch.cat(seen, dim=-1)
 
-    def _read(self, levels: list[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels: int = 0) -> Tensor:
-        finest = self.options.texels_per_yarn
-        texels = texels or finest
-        return read_pyramid(levels, u, v, sigma, texels, self.blur * texels / finest)
-
 
 def _axes(options: CurvedOptions) -> int:
     return 3 if options.directions == "vector" else 2
@@ -235,61 +228,29 @@ def _view_inputs(options: CurvedOptions) -> int:
     return _axes(options) + (2 if options.curvature_input == "touch" else 1)
 
 
-class Curved(OneMaterial[CurvedNetwork]):
+class Curved(NetworkMethod[CurvedNetwork]):
     """Trained materials for curved surfaces, one network for each fabric."""
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
-        network = self._checked_network(fabric, queries)
-        return self._in_chunks(fabric, queries, partial(_components, network), 4)
-
-    def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return the reflectance of the fabric's network, without its opacity."""
-        network, repeat = self.network_of(fabric), fabric.weave.repeat
-
-        def refuse(queries: Queries) -> None:
-            self._checked_network(fabric, queries)
-
-        def answer(*inputs: Tensor) -> Tensor:
-            return _components(network, View(*inputs[:-1]), inputs[-1])
-
-        names = (*View._fields, "wi")
-        module = Answering(network, answer)
-        return PerQuery(refuse, lambda queries: columns_of(in_repeat(queries, repeat), names), module)
-
-    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def missed(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
-        network = self._checked_network(fabric, queries)
-        return self._in_chunks(fabric, queries, lambda view, _: (1.0 - network.cover(view)).unsqueeze(-1), 1)[:, 0]
-
-    def _steepest(self, fabric: Fabric) -> float:
-        """Return the largest curvature that the fabric's network answers for, in 1/yarn spacings."""
-        limit = self.network_of(fabric).options.largest_curvature
-        return limit if self.domain is None else min(limit, self.domain.queries.curvature[1])
-
-    def _checked_network(self, fabric: Fabric, queries: Queries) -> CurvedNetwork:
-        """Return the fabric's network; BadInput for queries that it was not trained on."""
+        self.refuse(queries)
         network = self.network_of(fabric)
+
+        def through(*inputs: Tensor) -> Tensor:
+            return (1.0 - network.cover(View(*inputs[:-1]))).unsqueeze(-1)
+
+        return evaluated(queries, self.per_query(fabric).inputs, through, 1)[:, 0]
+
+    def refuse(self, queries: Queries) -> None:
+        """Refuse queries of kinds not trained on, and those of cloth that bends more than any trained on."""
+        super().refuse(queries)
+        limit: float = self.options.largest_curvature
         if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-        limit = self._steepest(fabric)
+            limit = min(limit, self.domain.queries.curvature[1])
         beyond = np.flatnonzero(queries.curvature > limit * (1.0 + 1e-6))
         if beyond.size:
             where, value = f"curvature[{beyond[0]}]", float(queries.curvature[beyond[0]])
             raise BadInput("queries", where, value, f"the model {self.name} was trained up to {limit:g} only")
-        return network
-
-    def _in_chunks(
-        self, fabric: Fabric, queries: Queries, answer: Callable[[View, Tensor], Tensor], width: int
-    ) -> npt.NDArray[np.float32]:
-        """Answer some rows at a time, without gradients."""
-        columns = (*View._fields, "wi")
-        near = in_repeat(queries, fabric.weave.repeat)
-        return in_chunks(near, lambda *inputs: answer(View(*inputs[:-1]), inputs[-1]), self._device, columns, width)
-
-
-def _components(network: CurvedNetwork, view: View, wi: Tensor) -> Tensor:
-    return to_components(network(view, wi), network.options.log_k)
 
 
 def build(
@@ -304,5 +265,4 @@ def build(
 
 def restore(options: CurvedOptions, trained: Trained) -> list[Curved]:
     """Return one method that holds all trained fabrics."""
-    networks, domain = restored(trained, lambda repeat: CurvedNetwork(options, repeat))
-    return [Curved(options.name, networks, domain)]
+    return [Curved(*restored(options, trained, lambda repeat: CurvedNetwork(options, repeat)))]

@@ -8,13 +8,16 @@ diffuse pair.
 from __future__ import annotations
 
 import itertools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+
+from pipeline.models.network import QueryNetwork
+from pipeline.models.options import ComponentLossOptions
 
 SPECULAR = slice(0, 2)
 DIFFUSE = slice(2, 4)
@@ -68,7 +71,7 @@ class Residual(nn.Module):
         return activate(x + self.second(activate(self.first(x))))
 
 
-class EncoderDecoder(nn.Module):
+class EncoderDecoder(QueryNetwork):
     """A network of two parts, which subclasses create.
 
     Attributes
@@ -82,21 +85,14 @@ class EncoderDecoder(nn.Module):
     encoder: nn.Module
     decoder: nn.Module
 
-    def schedule(self, progress: float) -> None:
-        """Change nothing over the training."""
+    def counts(self) -> dict[str, int]:
+        """Return the numbers of parameters of both parts."""
+        parts = {"encoder": self.encoder, "decoder": self.decoder}
+        return {part: sum(weight.numel() for weight in module.parameters()) for part, module in parts.items()}
 
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return one group: all weights learn at the same rate."""
-        return [{"params": list(self.parameters()), "lr": rate}]
-
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        counts = {
-            part: sum(weight.numel() for weight in module.parameters())
-            for part, module in (("encoder", self.encoder), ("decoder", self.decoder))
-        }
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        return {"parameters": counts | {"total": sum(counts.values())}, "layers": layers}
+    def stored(self, constants: tuple[Tensor, ...]) -> int:
+        """Return the numbers of the decoder and of what was encoded; the encoder is not needed to render."""
+        return self.counts()["decoder"] + sum(constant.numel() for constant in constants)
 
 
 def to_network(components: Tensor, log_k: float) -> Tensor:
@@ -112,7 +108,15 @@ def to_components(output: Tensor, log_k: float) -> Tensor:
     return torch.cat([specular, output[..., DIFFUSE]], dim=-1).clamp_min_(0.0)
 
 
-def weighted_error(output: Tensor, target: Tensor, specular_weight: float, diffuse_weight: float) -> Tensor:
+def component_error(output: Tensor, target: Tensor, options: ComponentLossOptions) -> Tensor:
     """Return the weighted mean squared error of outputs (..., 4), both in network space."""
     squared = (output - target).square()
-    return specular_weight * squared[..., SPECULAR].mean() + diffuse_weight * squared[..., DIFFUSE].mean()
+    return (
+        options.specular_weight * squared[..., SPECULAR].mean() + options.diffuse_weight * squared[..., DIFFUSE].mean()
+    )
+
+
+def start_at_mean(last: nn.Linear, target: Tensor, log_k: float) -> None:
+    """Set the biases of a last layer to the mean of target components (M, 4), in network space."""
+    with torch.no_grad():
+        last.bias[:4].copy_(to_network(target, log_k).mean(dim=0))

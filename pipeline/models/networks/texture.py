@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.networks.layers import to_network
+from pipeline.models.network import QueryNetwork
+from pipeline.models.networks.layers import start_at_mean
 from pipeline.models.options import TextureOptions
 
 _FEATURE_SCALE = 0.1  # standard deviation of the first features
@@ -144,36 +145,42 @@ def read_texture(
     return functional.embedding_bag(texels, table, per_sample_weights=share, mode="sum")
 
 
-class TextureNetwork(nn.Module):
+class TextureNetwork(QueryNetwork):
     """Textures of one fabric, and perceptrons that read them; subclasses create the parts named here.
+
+    Parameters
+    ----------
+    options : TextureOptions
+        The design.
+    repeat : tuple of int
+        Extent of the fabric's repeat in x and y, in yarn spacings.
 
     Attributes
     ----------
     textures : tuple of str
         Names of those parts that are textures.
-    options : TextureOptions
-        The design.
     decoder : nn.Sequential
         Puts out the four components in network space.
     depth : nn.Parameter or None
         The offset texture.
+    offset : nn.Sequential or None
+        Perceptron from the offset texture and the view to the depth.
     """
 
     textures: ClassVar[tuple[str, ...]]
     options: TextureOptions
     decoder: nn.Sequential
     depth: nn.Parameter | None
+    offset: nn.Sequential | None
 
-    def __init__(self) -> None:
+    def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()
+        self.options, self.repeat = options, repeat
         self._blur = 0.0  # standard deviation, in finest texels
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target."""
-        with torch.no_grad():
-            last = self.decoder[-1]
-            assert isinstance(last, nn.Linear)
-            last.bias.copy_(to_network(target, self.options.log_k).mean(dim=0))
+        start_at_mean(cast(nn.Linear, self.decoder[-1]), target, self.options.log_k)
 
     def schedule(self, progress: float) -> None:
         """Halve the blur again and again, and freeze the offset texture, at `progress` in [0, 1)."""
@@ -184,25 +191,29 @@ class TextureNetwork(nn.Module):
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
         """Return two groups: perceptrons at `rate`, textures faster."""
-        named = list(self.named_parameters())
-        perceptrons = [weight for name, weight in named if not self._is_texture(name)]
-        textures = [weight for name, weight in named if self._is_texture(name)]
+        perceptrons, textures = self._parts()
         return [{"params": perceptrons, "lr": rate}, {"params": textures, "lr": rate * self.options.texture_rate}]
 
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        total = sum(math.prod(shape) for shape in layers.values())
-        textures = sum(math.prod(shape) for name, shape in layers.items() if self._is_texture(name))
-        return {
-            "parameters": {"textures": textures, "perceptrons": total - textures, "total": total},
-            "layers": layers,
-        }
+    def counts(self) -> dict[str, int]:
+        """Return the numbers of parameters of perceptrons and textures."""
+        perceptrons, textures = (sum(weight.numel() for weight in part) for part in self._parts())
+        return {"textures": textures, "perceptrons": perceptrons}
 
-    @property
-    def blur(self) -> float:
-        """Standard deviation, in finest texels, that textures are read with: 0 unless in training."""
-        return self._blur if self.training else 0.0
+    def read(self, levels: Sequence[Tensor], u: Tensor, v: Tensor, sigma: Tensor, texels: int = 0) -> Tensor:
+        """Read a pyramid as `read_pyramid`, blurred in training; `texels` a yarn, as in the options if left out."""
+        finest = self.options.texels_per_yarn
+        texels = texels or finest
+        blur = self._blur * (texels / finest) if self.training else 0.0
+        return read_pyramid(levels, u, v, sigma, texels, blur)
 
-    def _is_texture(self, name: str) -> bool:
-        return name.split(".")[0] in self.textures
+    def moved(self, u: Tensor, v: Tensor, sigma: Tensor, wo: Tensor, seen: Tensor) -> tuple[Tensor, Tensor]:
+        """Return centres u, v shifted by the learnt depth, if there is one; `seen` are its inputs for the viewer."""
+        if self.offset is None or self.depth is None:
+            return u, v
+        here = self.read([self.depth], u, v, sigma)
+        return shifted(self.offset(torch.cat([here, seen], dim=-1)), u, v, wo, self.repeat)
+
+    def _parts(self) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
+        """Return the parameters of perceptrons and of textures."""
+        named = [(name.split(".")[0] in self.textures, weight) for name, weight in self.named_parameters()]
+        return [weight for texture, weight in named if not texture], [weight for texture, weight in named if texture]

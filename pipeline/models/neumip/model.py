@@ -17,28 +17,24 @@ a mask. So are the counts of texels, queries and steps; the published training t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import in_repeat
-from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks
+from pipeline.compiled.arrays import Float32
+from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
     LinearLayer,
+    component_error,
     layers_of,
     perceptron,
     to_components,
     to_network,
-    weighted_error,
 )
-from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid, read_pyramid, shifted
+from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid
 from pipeline.models.neumip import NeumipOptions
-from pipeline.models.one_material import OneMaterial, restored
-from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 LAYERS: Final = 3
@@ -46,39 +42,33 @@ LAYERS: Final = 3
 
 
 class NeumipNetwork(TextureNetwork):
-    """Textures and perceptrons of one fabric.
-
-    Parameters
-    ----------
-    options : NeumipOptions
-        The design.
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings.
-    """
+    """Textures and perceptrons of one fabric."""
 
     textures: ClassVar[tuple[str, ...]] = ("levels", "depth")
     options: NeumipOptions
 
     def __init__(self, options: NeumipOptions, repeat: tuple[int, int]) -> None:
-        super().__init__()
-        self.options, self.repeat = options, repeat
-        self.shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)  # (rows, columns), finest first
-        self.levels = random_pyramid(options.channels, self.shapes)
+        super().__init__(options, repeat)
+        shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)  # (rows, columns), finest first
+        self.levels = random_pyramid(options.channels, shapes)
         self.decoder = perceptron(options.channels + 4, options.hidden, LAYERS, 4)
         self.depth = None
-        self.offset: nn.Sequential | None = None
+        self.offset = None
         if options.offset:
-            self.depth = nn.Parameter(torch.zeros(options.channels, *self.shapes[0]))
+            self.depth = nn.Parameter(torch.zeros(options.channels, *shapes[0]))
             self.offset = perceptron(options.channels + 2, options.hidden, LAYERS, 1)
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); u, v (n,) are shares of the repeat, sigma is in yarn spacings."""
-        if self.offset is not None and self.depth is not None:
-            here = read_pyramid([self.depth], u, v, sigma, self.options.texels_per_yarn, self.blur)
-            u, v = shifted(self.offset(torch.cat([here, wo[:, :2]], dim=-1)), u, v, wo, self.repeat)
-        features = self._read_pyramid(u, v, sigma)
+        u, v = self.moved(u, v, sigma, wo, wo[:, :2])
+        features = self.read(list(self.levels), u, v, sigma)
         output: Tensor = self.decoder(torch.cat([features, wi[:, :2], wo[:, :2]], dim=-1))
         return output
+
+    def components(self, *inputs: Tensor) -> Tensor:
+        """Return the components (n, 4); with `ignore_curvature` 0 where the light is behind the tangent plane."""
+        components = to_components(self(*inputs), self.options.log_k)
+        return components * (inputs[3][:, 2:] > 0.0) if self.options.ignore_curvature else components
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""
@@ -90,14 +80,8 @@ class NeumipNetwork(TextureNetwork):
             # A mean over the rows lit from the front; the others weigh nothing.
             front = (batch.wi.flatten(0, 1)[:, 2:] > 0.0).to(target.dtype)
             share = front.mean().clamp_min(1e-6)
-            masked = weighted_error(
-                front * self(*flat), front * target, options.specular_weight, options.diffuse_weight
-            )
-            return masked / share
-        return weighted_error(self(*flat), target, options.specular_weight, options.diffuse_weight)
-
-    def _read_pyramid(self, u: Tensor, v: Tensor, sigma: Tensor) -> Tensor:
-        return read_pyramid(list(self.levels), u, v, sigma, self.options.texels_per_yarn, self.blur)
+            return component_error(front * self(*flat), front * target, options) / share
+        return component_error(self(*flat), target, options)
 
 
 class Parts(NamedTuple):
@@ -118,26 +102,14 @@ class Parts(NamedTuple):
     """
 
     options: NeumipOptions
-    levels: list[npt.NDArray[np.float32]]
-    depth: npt.NDArray[np.float32] | None
+    levels: list[Float32]
+    depth: Float32 | None
     offset: list[LinearLayer]
     decoder: list[LinearLayer]
 
 
-class Neumip(OneMaterial[NeumipNetwork]):
+class Neumip(NetworkMethod[NeumipNetwork]):
     """Trained textures, one network for each fabric."""
-
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
-        self._refuse(queries)
-        answer = partial(_components, self.network_of(fabric))
-        return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
-
-    def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return all of the fabric's network."""
-        network, repeat = self.network_of(fabric), fabric.weave.repeat
-        module = Answering(network, partial(_components, network))
-        return PerQuery(self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), module)
 
     def parts(self, fabric: Fabric) -> Parts:
         """Return the fabric's textures and layers."""
@@ -150,19 +122,10 @@ class Neumip(OneMaterial[NeumipNetwork]):
             layers_of(network.decoder),
         )
 
-    def _refuse(self, queries: Queries) -> None:
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
 
-
-def _texels(texture: Tensor) -> npt.NDArray[np.float32]:
+def _texels(texture: Tensor) -> Float32:
     """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
     return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
-
-
-def _components(network: NeumipNetwork, *columns: Tensor) -> Tensor:
-    components = to_components(network(*columns), network.options.log_k)
-    return components * (columns[3][:, 2:] > 0.0) if network.options.ignore_curvature else components
 
 
 def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
@@ -173,5 +136,4 @@ def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
 
 def restore(options: NeumipOptions, trained: Trained) -> list[Neumip]:
     """Return one method that holds all trained fabrics."""
-    networks, domain = restored(trained, lambda repeat: NeumipNetwork(options, repeat))
-    return [Neumip(options.name, networks, domain)]
+    return [Neumip(*restored(options, trained, lambda repeat: NeumipNetwork(options, repeat)))]

@@ -7,7 +7,14 @@ component:
     features 40 -> width -> width -> 4,   component = 2 sigmoid(x) times that of the soft nodes
 
 A second, smaller network estimates the error of this answer, and of one by the finest soft nodes (`error_network`).
-Both decide who answers a query where a largest error is wished (`adaptive`).
+Within a wished error (`Adaptive`) each query gets the cheapest of three answers whose estimated error is small enough:
+
+    1  soft nodes corrected by the network        estimated by the network
+    2  the finest soft nodes                      estimated by the network
+    3  the fallback, sums over a node table       not estimated: the answer of what is left
+
+Errors are root mean squares over many queries, relative to a grey cloth's colour: single errors may be larger. Light
+from behind has no estimate; the finest soft nodes answer it, and all that the network is not trained for.
 
 Factors lie between 0 and 2 and begin at 1: an untrained network is the soft nodes, and colours, highlights and the
 repeat of a cloth need not be learnt. With `bound` no component exceeds the soft nodes' answer without shadows of the
@@ -21,10 +28,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -38,17 +44,19 @@ from pipeline.analytic.soft_nodes.features import (
     read_queries,
 )
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
-from pipeline.models.analytic.soft_nodes import SoftNodes
+from pipeline.compiled.arrays import Float32
+from pipeline.models.analytic.soft_nodes import Level, SoftNodes
 from pipeline.models.domain import Domain, domain_of
+from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import CHUNK_ROWS, refuse_other
-from pipeline.models.network import Answering, Batch, Columns, PerQuery
+from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, loaded
 from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage import SelvageOptions
-from pipeline.models.selvage.adaptive import Adaptive
-from pipeline.models.selvage.error_network import FLOOR, ErrorNetwork, colour_weights
+from pipeline.models.selvage.error_network import FINEST, FLOOR, OWN, ErrorNetwork, colour_weights
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 LARGEST_FACTOR: Final = 2.0
@@ -56,6 +64,7 @@ LARGEST_FACTOR: Final = 2.0
 
 _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
 _LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
+_ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 _COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
 
 
@@ -75,7 +84,7 @@ class _Read(NamedTuple):
         return _Read(features[:, EXCHANGED.tolist()] * sign, *(x[:, list(_COMPONENTS)] for x in others))
 
 
-class SelvageNetwork(nn.Module):
+class SelvageNetwork(Trainable):
     """The correcting network, with the cloth it is trained on.
 
     Parameters
@@ -136,21 +145,6 @@ class SelvageNetwork(nn.Module):
         loss: Tensor = (squared / (target @ colours + options.dark)).mean()
         return loss
 
-    def start_at(self, target: Tensor) -> None:
-        """Change nothing: the network starts at the soft nodes."""
-
-    def schedule(self, progress: float) -> None:
-        """Change nothing over the training."""
-
-    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
-        """Return one group: all weights learn at the same rate."""
-        return [{"params": list(self.parameters()), "lr": rate}]
-
-    def architecture(self) -> dict[str, Any]:
-        """Count parameters and name the layers."""
-        layers = {name: list(weight.shape) for name, weight in self.named_parameters()}
-        return {"parameters": {"total": sum(weight.numel() for weight in self.parameters())}, "layers": layers}
-
     def _normalised(self, features: Tensor) -> Tensor:
         """Return features of mean 0 and deviation 1 over the training queries."""
         return (features - self.mean) * self.scale
@@ -160,12 +154,8 @@ class SelvageNetwork(nn.Module):
         found = []
         for row, fabric in enumerate(batch.fabric.tolist()):
             queries = Queries(*(getattr(batch, name)[row].numpy(force=True) for name in Queries._fields))
-            found.append(
-                (
-                    *read_queries(self._tables[fabric], queries),
-                    read_queries(self._finest[fabric], queries).components,
-                )
-            )
+            finest = read_queries(self._finest[fabric], queries).components
+            found.append((*read_queries(self._tables[fabric], queries), finest))
         parts = (torch.from_numpy(np.concatenate(columns)) for columns in zip(*found, strict=True))
         return _Read(*(part.to(batch.u.device) for part in (*parts, batch.target.flatten(0, 1))))
 
@@ -189,6 +179,37 @@ class _Cloth(NamedTuple):
     estimate_bias: Tensor
 
 
+class _Folded:
+    """A perceptron for many queries of one fabric; the normalisation and all that the fabric alone decides are folded.
+
+    Parameters
+    ----------
+    layers : list of nn.Linear
+        Its layers.
+    network : SelvageNetwork
+        The network with the normalisation.
+    """
+
+    def __init__(self, layers: Sequence[nn.Module], network: SelvageNetwork) -> None:
+        first, *others = (layer for layer in layers if isinstance(layer, nn.Linear))
+        with torch.no_grad():
+            weight = first.weight * network.scale
+            transposed, self._bias = weight.t().contiguous(), first.bias - weight @ network.mean
+            self.of_query, self._of_fabric = transposed[:OF_QUERY].contiguous(), transposed[OF_QUERY:]
+            self.others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
+
+    def bias(self, own: Tensor) -> Tensor:
+        """Return the bias of the first layer for a fabric of these features."""
+        return self._bias + own @ self._of_fabric
+
+    def __call__(self, features: Tensor, bias: Tensor) -> Tensor:
+        """Return the outputs from OF_QUERY features of n queries and the bias of their fabric."""
+        x = torch.addmm(bias, features, self.of_query)
+        for weight, shift in self.others:
+            x = torch.addmm(shift, functional.leaky_relu_(x, SLOPE), weight)
+        return x
+
+
 class Selvage:
     """A trained network that answers for any fabric; it tabulates each once.
 
@@ -210,18 +231,8 @@ class Selvage:
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
         self._nodes = SoftNodes(network.options.level, self.name)
-        # Transposed weights; the normalisation folds into the first layer.
-        layers = [layer for layer in (*network.hidden, network.last) if isinstance(layer, nn.Linear)]
-        first, *others = layers
-        with torch.no_grad():
-            weight = first.weight * network.scale
-            self._first = weight.t().contiguous(), first.bias - weight @ network.mean
-            self._others = [(layer.weight.t().contiguous(), layer.bias.clone()) for layer in others]
-            weight = network.errors.hidden.weight * network.scale
-            self._estimating = weight.t().contiguous(), network.errors.hidden.bias - weight @ network.mean
-            self._estimates = network.errors.last.weight.t().contiguous(), network.errors.last.bias.clone()
-        self._of_query = self._first[0][:OF_QUERY].contiguous()
-        self._estimating_of_query = self._estimating[0][:OF_QUERY].contiguous()
+        self._correction = _Folded([*network.hidden, network.last], network)
+        self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
         self._answering = Answering(self._network, self._components)
 
     def covers(self, fabric: Fabric) -> bool:
@@ -232,13 +243,13 @@ class Selvage:
         """Tabulate the fabric, once."""
         self._cloths.of(fabric)
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries that it does not know.
 
         Light from behind is answered by the soft nodes alone.
         """
         behind = queries.wi[:, 2] < 0.0
-        refuse_other(queries, self.name, ("stretch", "behind", "curvature"))
+        self._refuse(queries, *SelvageOptions.without_training)
         if not behind.any():
             return self._corrected(fabric, queries)
         result = np.empty((len(behind), 4), np.float32)
@@ -246,11 +257,11 @@ class Selvage:
         result[~behind] = self._corrected(fabric, queries.take(~behind))
         return result
 
-    def outside_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
         return self._nodes.predict(fabric, queries)
 
-    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
         return self._nodes.transparency(fabric, looks)
 
@@ -269,8 +280,9 @@ class Selvage:
 
         The first weights include the normalisation, the first biases all that the fabric alone decides.
         """
-        first = (self._of_query, self._cloths.of(fabric).bias)
-        return [LinearLayer(weight.numpy(), bias.numpy()) for weight, bias in (first, *self._others)]
+        correction = self._correction
+        first = (correction.of_query, self._cloths.of(fabric).bias)
+        return [LinearLayer(weight.numpy(), bias.numpy()) for weight, bias in (first, *correction.others)]
 
     @property
     def options(self) -> SelvageOptions:
@@ -285,17 +297,15 @@ class Selvage:
 
     def _components(self, features: Tensor, components: Tensor, bounds: Tensor, bias: Tensor) -> Tensor:
         """Answer from features, components and bounds of the soft nodes, and the bias of the fabric."""
-        x = torch.addmm(bias, features, self._of_query)
-        for weight, shift in self._others:
-            x = torch.addmm(shift, functional.leaky_relu(x, SLOPE), weight)
-        answer = LARGEST_FACTOR * torch.sigmoid(x.float()) * components
+        factors = LARGEST_FACTOR * torch.sigmoid(self._correction(features, bias).float())
+        answer = factors * components
         return torch.minimum(answer, bounds) if self.bound else answer
 
-    def _refuse(self, queries: Queries) -> None:
-        """Refuse queries of kinds that the network does not know."""
-        refuse_other(queries, self.name, ("stretch",))
+    def _refuse(self, queries: Queries, *kinds: str) -> None:
+        """Refuse queries of other kinds than these and flat cloth lit from the front."""
+        refuse_other(queries, f"the method {self.name} answers", ("stretch", *kinds))
 
-    def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    def with_errors(self, fabric: Fabric, queries: Queries) -> tuple[Float32, Float32]:
         """Answer N queries lit from the front, and estimate errors as those of flat cloth.
 
         Returns
@@ -304,7 +314,7 @@ class Selvage:
             Components; relative errors of a grey cloth's colour, root mean squares, of these components and of those by
             the finest soft nodes (`error_network`).
         """
-        refuse_other(queries, self.name, ("stretch", "curvature"))
+        self._refuse(queries, "curvature")
         errors = np.empty((len(queries.u), 2), np.float32)
         return self._corrected(fabric, queries, errors), errors
 
@@ -312,9 +322,7 @@ class Selvage:
         """Return the method that answers by more nodes where the estimated error exceeds a relative error."""
         return Adaptive(self, self._network.options.finest, error)
 
-    def _corrected(
-        self, fabric: Fabric, queries: Queries, errors: npt.NDArray[np.float32] | None = None
-    ) -> npt.NDArray[np.float32]:
+    def _corrected(self, fabric: Fabric, queries: Queries, errors: Float32 | None = None) -> Float32:
         """Answer by the soft nodes and the network; write estimated `errors` (N, 2), if an array is given."""
         cloth = self._cloths.of(fabric)
         table = self._nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
@@ -322,20 +330,11 @@ class Selvage:
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK_ROWS):
                 rows = slice(start, start + CHUNK_ROWS)
-                features, components, bounds = read_queries(table, queries.take(rows))
-                of_query = torch.from_numpy(features)[:, :OF_QUERY]
-                x = torch.addmm(cloth.bias, of_query, self._of_query)
-                for weight, shift in self._others:
-                    x = torch.addmm(shift, functional.leaky_relu_(x, SLOPE), weight)
-                x.sigmoid_().mul_(LARGEST_FACTOR)
-                np.multiply(x.numpy(), components, out=result[rows])
-                if self.bound:
-                    np.minimum(result[rows], bounds, out=result[rows])
+                features, components, bounds = map(torch.from_numpy, read_queries(table, queries.take(rows)))
+                of_query = features[:, :OF_QUERY]
+                result[rows] = self._components(of_query, components, bounds, cloth.bias).numpy()
                 if errors is not None:
-                    hidden = torch.addmm(cloth.estimate_bias, of_query, self._estimating_of_query)
-                    weight, shift = self._estimates
-                    logarithms = torch.addmm(shift, functional.leaky_relu_(hidden, SLOPE), weight)
-                    errors[rows] = logarithms.mul_(0.5).exp_().numpy()
+                    errors[rows] = self._estimate(of_query, cloth.estimate_bias).mul_(0.5).exp_().numpy()
         return result
 
     def bytes_stored(self, fabric: Fabric) -> int:
@@ -346,8 +345,76 @@ class Selvage:
         """Return a fabric's table, and the biases of the first layers with all that the fabric alone decides."""
         table = tabulate(fabric, level=self._network.options.level)
         own = torch.from_numpy(cloth_features(table))
-        biases = (bias + own @ weight[OF_QUERY:] for weight, bias in (self._first, self._estimating))
-        return _Cloth(table, *biases)
+        return _Cloth(table, self._correction.bias(own), self._estimate.bias(own))
+
+
+class Adaptive:
+    """A trained `selvage` that answers by more nodes where its error would exceed the wished one.
+
+    Parameters
+    ----------
+    selvage : Selvage
+        Answers first, and estimates errors.
+    finest : int
+        Level of detail of the soft nodes that answer second.
+    error : float
+        Wished relative error, above 0 and below 1; BadInput if it is another number.
+    """
+
+    without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
+    """Kinds of queries that need no training: the soft nodes know them."""
+    turns: ClassVar[bool] = SelvageOptions.turns
+
+    def __init__(self, selvage: Selvage, finest: Level, error: float) -> None:
+        if not 0.0 < error < 1.0:
+            raise BadInput(selvage.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
+        self.name, self.setting, self.domain = selvage.name, f"error {100 * error:g} %", selvage.domain
+        self.error = error
+        self._selvage, self._finest = selvage, SoftNodes(finest, selvage.name)
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return True: any fabric can be tabulated."""
+        return True
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""
+        self._selvage.prepare(fabric)
+        self._finest.prepare(fabric)
+        fallback_answers(fabric, _ANY, 0)
+
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
+        """Answer N queries, float32 (N, 4). BadInput for kinds of queries that the soft nodes do not know."""
+        behind = queries.wi[:, 2] < 0.0
+        if not behind.any():
+            return self._answers(fabric, queries, seed)
+        result = np.empty((len(behind), 4), np.float32)
+        result[behind] = self._finest.predict(fabric, queries.take(behind))
+        result[~behind] = self._answers(fabric, queries.take(~behind), seed)
+        return result
+
+    def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
+        """Answer N queries that the network is not trained for, float32 (N, 4), by the finest soft nodes."""
+        return self._finest.predict(fabric, queries)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the transparency of N footprints, float32 (N,), by the finest soft nodes."""
+        return self._finest.transparency(fabric, looks)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the bytes of both tables and of the network; the tables of the fallback are shared by all methods."""
+        return self._selvage.bytes_stored(fabric) + self._finest.bytes_stored(fabric)
+
+    def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Answer queries with the light in front."""
+        result, errors = self._selvage.with_errors(fabric, queries)
+        too_far = errors[:, OWN] > self.error
+        finer = too_far & (errors[:, FINEST] <= self.error)
+        left = too_far & ~finer
+        if finer.any():
+            result[finer] = self._finest.predict(fabric, queries.take(finer))
+        if left.any():
+            result[left] = fallback_answers(fabric, queries.take(left), seed)
+        return result
 
 
 def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
@@ -355,11 +422,6 @@ def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
     return SelvageNetwork(options, fabrics)
 
 
-def restore(options: SelvageOptions, trained: Sequence[tuple[dict[str, Any], dict[str, Tensor]]]) -> list[Selvage]:
+def restore(options: SelvageOptions, trained: Trained) -> list[Selvage]:
     """Return the method of a trained network."""
-    methods = []
-    for card, weights in trained:
-        network = SelvageNetwork(options)
-        network.load_state_dict(weights)
-        methods.append(Selvage(network, domain_of(card)))
-    return methods
+    return [Selvage(loaded(SelvageNetwork(options), weights), domain_of([card])) for card, weights in trained]

@@ -29,13 +29,17 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import in_repeat
-from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks, loaded
-from pipeline.models.networks.layers import EncoderDecoder, perceptron, to_components, to_network, weighted_error
+from pipeline.models.network import Batch, NetworkMethod, Trained, restored
+from pipeline.models.networks.layers import (
+    EncoderDecoder,
+    component_error,
+    perceptron,
+    start_at_mean,
+    to_components,
+    to_network,
+)
 from pipeline.models.networks.texture import level_shapes, read_pyramid
-from pipeline.models.per_fabric import PerFabric
-from pipeline.models.unified_btf import BtfOptions, UnifiedBtfOptions
+from pipeline.models.unified_btf import BtfOptions
 from pipeline.models.unified_btf.set_encoder import (
     DIRECTION_NUMBERS,
     SetEncoder,
@@ -47,7 +51,6 @@ from pipeline.models.unified_btf.set_encoder import (
     read_texels,
 )
 from pipeline.shards.queries import QueryOptions
-from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -70,6 +73,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
         Samples of the training fabrics, addressed by index in batches; none for inference.
     """
 
+    options: BtfOptions
     encoder: SetEncoder
     decoder: nn.Sequential
 
@@ -100,6 +104,16 @@ class UnifiedBtfNetwork(EncoderDecoder):
         output: Tensor = self.decoder(torch.cat([latent, angles_of(wi, wo, self.options.angles)], dim=-1))
         return output
 
+    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
+        """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
+        texels = read_texels(angular_samples(fabric, self.options), self.options)
+        return tuple(level.contiguous() for level in averaged(self.encode(texels)))
+
+    def components(self, *inputs: Tensor) -> Tensor:
+        """Return components (n, 4) from the columns of queries and the levels of a pyramid."""
+        u, v, sigma, wi, wo, *pyramid = inputs
+        return to_components(self.decode(self.read(pyramid, u, v, sigma), wi, wo), self.options.log_k)
+
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""
         options = self.options
@@ -120,15 +134,14 @@ class UnifiedBtfNetwork(EncoderDecoder):
             latents.append(self.read(pyramid, u, v, batch.sigma[position]))
         output = self.decode(torch.cat(latents), batch.wi.flatten(0, 1), batch.wo.flatten(0, 1))
         target = to_network(batch.target.flatten(0, 1), options.log_k)
-        return weighted_error(output, target, options.specular_weight, options.diffuse_weight)
+        return component_error(output, target, options)
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, the last weights small, and the scale of samples to that of targets."""
-        output = to_network(target, self.options.log_k)
+        last = self.decoder[-1]
+        assert isinstance(last, nn.Linear)
+        start_at_mean(last, target, self.options.log_k)
         with torch.no_grad():
-            last = self.decoder[-1]
-            assert isinstance(last, nn.Linear)
-            last.bias.copy_(output.mean(dim=0))
             last.weight.mul_(0.1)
             self.encoder.scale.copy_(1.0 / target.square().mean(dim=0).sqrt().clamp_min(1e-6))
 
@@ -144,74 +157,6 @@ def averaged(latents: Tensor) -> list[Tensor]:
     return [finest, *(functional.adaptive_avg_pool2d(finest, shape) for shape in coarser)]
 
 
-class UnifiedBtf:
-    """A trained network that answers for any fabric; it computes and encodes the samples of each once.
-
-    Parameters
-    ----------
-    network : UnifiedBtfNetwork
-        Trained weights.
-    domain : Domain, optional
-        Domain of the training; any query if left out.
-    device : torch.device
-        Device of the computation.
-    """
-
-    def __init__(
-        self, network: UnifiedBtfNetwork, domain: Domain | None = None, device: torch.device | None = None
-    ) -> None:
-        self.name, self.setting, self.domain = network.options.name, "", domain
-        self._device = device or torch.device("cpu")
-        self._network = network.eval().to(self._device)
-        self._pyramids = PerFabric(self._encode)
-        self._answering = Answering(self._network, self._components)
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return True: any fabric can be encoded."""
-        return True
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Compute the fabric's samples and encode them, once: one forward pass, no optimisation."""
-        self._pyramids.of(fabric)
-
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
-        self._refuse(queries)
-        pyramid = self._pyramids.of(fabric)
-
-        def answer(*columns: Tensor) -> Tensor:
-            return self._components(*columns, *pyramid)
-
-        return in_chunks(in_repeat(queries, fabric.weave.repeat), answer, self._device)
-
-    def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return the decoder; the levels of the pyramid are its constants, so that fabrics of one repeat share it."""
-        pyramid, repeat = self._pyramids.of(fabric), fabric.weave.repeat
-        return PerQuery(
-            self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), self._answering, tuple(pyramid)
-        )
-
-    def _components(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor, *pyramid: Tensor) -> Tensor:
-        output = self._network.decode(self._network.read(list(pyramid), u, v, sigma), wi, wo)
-        return to_components(output, self._network.options.log_k)
-
-    def _refuse(self, queries: Queries) -> None:
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of the decoder and of the fabric's latents, float32; the encoder is not needed to render."""
-        weights = sum(weight.numel() for weight in self._network.decoder.parameters())
-        return 4 * (weights + sum(level.numel() for level in self._pyramids.of(fabric)))
-
-    def _encode(self, fabric: Fabric) -> list[Tensor]:
-        network = self._network
-        samples = angular_samples(fabric, network.options)
-        with torch.no_grad():
-            texels = read_texels(samples, network.options).to(self._device)
-            return [level.contiguous() for level in averaged(network.encode(texels))]
-
-
 def build(
     options: BtfOptions, fabrics: Sequence[Fabric], samples: Sequence[Mapping[str, npt.NDArray[Any]]]
 ) -> UnifiedBtfNetwork:
@@ -220,19 +165,12 @@ def build(
     return UnifiedBtfNetwork(options, [read_samples(fabric, options, columns) for fabric, columns in pairs])
 
 
-def restore(options: UnifiedBtfOptions, trained: Trained) -> list[UnifiedBtf]:
-    """Return the method that a trained network is."""
-    return [UnifiedBtf(*restored(options, card, weights)) for card, weights in trained]
-
-
-def restored(
-    options: BtfOptions, card: dict[str, Any], weights: dict[str, Tensor]
-) -> tuple[UnifiedBtfNetwork, Domain | None]:
-    """Return a trained network and its domain; BadInput if its samples are answered by other physics than its rows."""
-    network, domain = loaded(UnifiedBtfNetwork(options), weights), domain_of(card)
+def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[UnifiedBtfNetwork]]:
+    """Return the method that trained networks are; BadInput if samples are answered by other physics than rows."""
+    networks, domain = restored(options, trained, lambda _: UnifiedBtfNetwork(options))
     if domain is not None:
         domain.refuse_truth(options.truth, options.name)
         # Whatever else the rows held: footprints are read as round, and the cloth as flat.
         plain = QueryOptions(**domain.queries.model_dump(include={"sigma", "directions", "max_angle"}))
         domain = domain.model_copy(update={"queries": plain})
-    return network, domain
+    return [NetworkMethod(networks, domain)]

@@ -21,18 +21,22 @@ a picture of the repeat, and the decoder sees it from the queried place (pipelin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.domain import Domain, domain_of
-from pipeline.models.method import in_repeat
-from pipeline.models.network import Answering, Batch, PerQuery, Trained, columns_of, in_chunks, loaded
-from pipeline.models.networks.layers import SLOPE, EncoderDecoder, to_components, to_network, weighted_error
-from pipeline.models.per_fabric import PerFabric
+from pipeline.compiled.arrays import Float32
+from pipeline.models.network import Batch, NetworkMethod, Trained, evaluated, restored
+from pipeline.models.networks.layers import (
+    SLOPE,
+    EncoderDecoder,
+    component_error,
+    start_at_mean,
+    to_components,
+    to_network,
+)
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.decoder import Decoder, encode_patch
 from pipeline.models.woven.encoder import Encoder, WovenInputs, read_cloth
@@ -53,6 +57,7 @@ class WovenNetwork(EncoderDecoder):
         Training fabrics, addressed by index in batches; none for inference.
     """
 
+    options: WovenOptions
     encoder: Encoder
     decoder: Decoder
 
@@ -100,6 +105,25 @@ class WovenNetwork(EncoderDecoder):
         output: Tensor = self.decoder(latent, where, patch, wi, wo)
         return output
 
+    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
+        """Encode a fabric; return its latent and its placement."""
+        cloth = read_cloth([fabric], self.options)
+        return self.encode(cloth), *cloth.placement
+
+    def components(self, *inputs: Tensor) -> Tensor:
+        """Return components (n, 4) from the columns of queries, and the latent and placement of a fabric."""
+        output = self.outputs(*inputs)
+        return to_components(Placement(*inputs[6:]).swap(output[..., :4])[0], self.options.log_k)
+
+    def outputs(self, *inputs: Tensor) -> Tensor:
+        """Return the outputs of the decoder, (1, n, 4 or 5), from the inputs of `components`."""
+        latent, place = inputs[5], Placement(*inputs[6:])
+        return self.decode(latent, place, *(column.unsqueeze(0) for column in inputs[:5]))
+
+    def stored(self, constants: tuple[Tensor, ...]) -> int:
+        """Return the numbers of the decoder and of the fabric's latent."""
+        return super().stored(constants[:1])
+
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""
         assert self._cloth is not None
@@ -112,51 +136,22 @@ class WovenNetwork(EncoderDecoder):
         u, v = batch.u / own[:, :1], batch.v / own[:, 1:]
         output = self.decode(self.encode(cloth), cloth.placement, u, v, batch.sigma, batch.wi, batch.wo)
         target = to_network(cloth.placement.swap(batch.target), options.log_k)
-        error = weighted_error(output[..., :4], target, options.specular_weight, options.diffuse_weight)
+        error = component_error(output[..., :4], target, options)
         if options.transmission:
             error = error + options.transparency_weight * (output[..., 4] - batch.transparency).square().mean()
         return error
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, and the last weights small: a leaky ReLU can stall far from it."""
+        start_at_mean(self.decoder.last, target, self.options.log_k)
         with torch.no_grad():
-            self.decoder.last.bias[:4].copy_(to_network(target, self.options.log_k).mean(dim=0))
             self.decoder.last.weight.mul_(0.01)
 
 
-class Woven:
-    """A trained network that answers for any fabric; it encodes each once.
+class Woven(NetworkMethod[WovenNetwork]):
+    """A trained network that answers for any fabric; it encodes each once."""
 
-    Parameters
-    ----------
-    network : WovenNetwork
-        Trained weights.
-    domain : Domain, optional
-        Domain of the training; any query if left out.
-    device : torch.device
-        Device of the computation.
-    """
-
-    def __init__(self, network: WovenNetwork, domain: Domain | None = None, device: torch.device | None = None) -> None:
-        self.name, self.setting, self.domain = network.options.name, "", domain
-        self._device = device or torch.device("cpu")
-        self._network = network.eval().to(self._device)
-        self._encoded = PerFabric(self._encode)
-        self._answering = Answering(self._network, self._all_at_once)
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return True: any fabric can be encoded."""
-        return True
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Encode the fabric, once."""
-        self._encoded.of(fabric)
-
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries not trained on."""
-        return self._components(queries, *self._encoded.of(fabric))
-
-    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
+    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> Float32:
         """Answer for a blend of two fabrics: their latents are blended, no intermediate fabric is encoded.
 
         Parameters
@@ -181,68 +176,28 @@ class Woven:
         if first.weave.repeat != second.weave.repeat:
             (ends, picks), allowed = second.weave.repeat, "the repeat of {} is needed, {} x {}, to blend the two"
             raise BadInput(second.name, "repeat", f"{ends} x {picks}", allowed.format(first.name, *first.weave.repeat))
+        network = self.network_of(first)
         with torch.inference_mode():
-            cloth = read_cloth([first, second], self._network.options, like=first).to(self._device)
-            one, other = self._network.encode(cloth)
+            cloth = read_cloth([first, second], network.options, like=first)
+            one, other = network.encode(cloth)
             blended = torch.lerp(one, other, share).unsqueeze(0)
-            place = cloth.take(torch.tensor([0], device=self._device)).placement
-        return self._components(queries, blended, place)
+            place = cloth.take(torch.tensor([0])).placement
+        return self._part(first, (blended, *place)).answered(queries)
 
-    def transparency(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def transparency(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the share of light from straight behind that passes unscattered, float32 (N,) in [0, 1].
 
         0 if `transmission` was not learnt.
         """
-        if not self._network.options.transmission:
+        if not self.options.transmission:
             return np.zeros(len(queries.u), np.float32)
+        self.refuse(queries)
+        part, network = self.per_query(fabric), self.network_of(fabric)
 
-        def read(output: Tensor) -> Tensor:
-            return output[0, :, 4:].clamp(0.0, 1.0).expand(-1, 4)
+        def read(*inputs: Tensor) -> Tensor:
+            return network.outputs(*inputs, *part.constants)[0, :, 4:].clamp(0.0, 1.0)
 
-        return self._answer(queries, *self._encoded.of(fabric), read)[:, 0].copy()
-
-    def _components(self, queries: Queries, latent: Tensor, place: Placement) -> npt.NDArray[np.float32]:
-        log_k = self._network.options.log_k
-        return self._answer(queries, latent, place, lambda output: to_components(place.swap(output[..., :4])[0], log_k))
-
-    def _answer(
-        self, queries: Queries, latent: Tensor, place: Placement, read: Callable[[Tensor], Tensor]
-    ) -> npt.NDArray[np.float32]:
-        self._refuse(queries)
-
-        def answer(*columns: Tensor) -> Tensor:
-            return read(self._network.decode(latent, place, *(column.unsqueeze(0) for column in columns)))
-
-        ends, picks = place.own_repeat()[0].tolist()
-        return in_chunks(in_repeat(queries, (int(ends), int(picks))), answer, self._device)
-
-    def per_query(self, fabric: Fabric) -> PerQuery:
-        """Return the decoder; latent and placement are its constants, so that all fabrics share it."""
-        latent, place = self._encoded.of(fabric)
-        repeat = fabric.weave.repeat
-        return PerQuery(
-            self._refuse, lambda queries: columns_of(in_repeat(queries, repeat)), self._answering, (latent, *place)
-        )
-
-    def _all_at_once(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor, *fabric: Tensor) -> Tensor:
-        latent, place = fabric[0], Placement(*fabric[1:])
-        columns = (column.unsqueeze(0) for column in (u, v, sigma, wi, wo))
-        output = self._network.decode(latent, place, *columns)
-        return to_components(place.swap(output[..., :4])[0], self._network.options.log_k)
-
-    def _refuse(self, queries: Queries) -> None:
-        if self.domain is not None:
-            self.domain.refuse(queries, self.name)
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes of the decoder and of the fabric's latent; the encoder is not needed to render."""
-        latent, _ = self._encoded.of(fabric)
-        return 4 * (sum(weight.numel() for weight in self._network.decoder.parameters()) + latent.numel())
-
-    def _encode(self, fabric: Fabric) -> tuple[Tensor, Placement]:
-        with torch.no_grad():
-            cloth = read_cloth([fabric], self._network.options).to(self._device)
-            return self._network.encode(cloth), cloth.placement
+        return evaluated(queries, part.inputs, read, 1)[:, 0]
 
 
 def build(options: WovenOptions, fabrics: Sequence[Fabric]) -> WovenNetwork:
@@ -252,4 +207,4 @@ def build(options: WovenOptions, fabrics: Sequence[Fabric]) -> WovenNetwork:
 
 def restore(options: WovenOptions, trained: Trained) -> list[Woven]:
     """Return the method that a trained network is."""
-    return [Woven(loaded(WovenNetwork(options), weights), domain_of(card)) for card, weights in trained]
+    return [Woven(*restored(options, trained, lambda _: WovenNetwork(options)))]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.models.domain import Domain
+from pipeline.models.domain import Domain, domain_of
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -145,7 +145,7 @@ def test_cloth_bent_more_than_any_seen_is_out_of_domain():
 def test_networks_of_one_fabric_each_know_all_of_theirs():
     alone = [Domain.of({}, [fabric]) for fabric in FABRICS]
     assert not alone[0].knows(FABRICS[1])
-    joined = Domain.joined(alone)
+    joined = domain_of([{"domain": domain.model_dump(mode="json")} for domain in alone])
     assert joined == Domain.of({}, FABRICS) and all(joined.knows(fabric) for fabric in FABRICS)
 
 

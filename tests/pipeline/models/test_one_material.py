@@ -8,9 +8,9 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback, fallback_answers
+from pipeline.models.network import restored
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork, restore
-from pipeline.models.one_material import restored
 from pipeline.shards.queries import QueryOptions, draw_queries
 from weaves.fabric import load_fabric
 
@@ -38,7 +38,7 @@ def test_every_fabric_is_known_whichever_was_read_last(order):
 
 
 def test_yarns_unlike_all_of_them_are_not_known():
-    _, domain = restored(trained(CLOTHS), lambda repeat: NeumipNetwork(SMALL, repeat))
+    _, domain = restored(SMALL, trained(CLOTHS), lambda repeat: NeumipNetwork(SMALL, repeat))
     assert all(domain.knows(fabric) for fabric in CLOTHS)
     assert not domain.knows(load_fabric("voile"))
     # The ranges hold those of every fabric and nothing more.
@@ -50,7 +50,7 @@ def test_cloth_steeper_than_was_taught_is_quadratures():
     denim, options = CLOTHS[0], CurvedOptions(texels_per_yarn=2, silhouette_texels_per_yarn=1)
     about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}
     network = CurvedNetwork(options, denim.weave.repeat)
-    method = Curved("curved", {fingerprint(denim.optics()): network}, Domain.of(about, [denim]))
+    method = Curved({fingerprint(denim.optics()): network}, Domain.of(about, [denim]))
     queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), denim.weave.repeat, 3, 0, 40)
     fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
     assert steep.any() and not steep.all()

@@ -11,7 +11,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS
-from pipeline.models.network import Answering, PerQuery, columns_of
+from pipeline.models.network import Answering, PerQuery
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import RUNTIME_TOLERANCE, RUNTIMES, RunBy, Runtime, not_run, runs
@@ -55,7 +55,7 @@ class Linear:
             if (queries.wi[:, 2] < 0).any():
                 raise BadInput("queries", "wi", -1, "front only")
 
-        return PerQuery(refuse, lambda q: columns_of(q, ("u", "v", "sigma")), self.module, (self.constant,))
+        return PerQuery(refuse, lambda q: (q.u, q.v, q.sigma), self.module, (self.constant,))
 
 
 def asked(rows=50, **options):
@@ -110,7 +110,7 @@ def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatc
 def test_eight_bits_cost_a_percent_and_save_three_bytes_of_four():
     torch.manual_seed(0)
     options = NeumipOptions(texels_per_yarn=2, hidden=128)
-    neumip = Neumip("neumip", {fingerprint(DENIM.optics()): NeumipNetwork(options, DENIM.weave.repeat)})
+    neumip = Neumip({fingerprint(DENIM.optics()): NeumipNetwork(options, DENIM.weave.repeat)})
     run, queries = RunBy(neumip, "onnx-int8"), asked(500)
     run.prepare(DENIM)
     assert not run.covers(FABRICS[1])

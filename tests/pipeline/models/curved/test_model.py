@@ -50,7 +50,7 @@ def _queries(count, curvature=0.1, behind=False):
 def _method(options=SMALL, domain=None):
     torch.manual_seed(1)
     network = CurvedNetwork(options, DENIM.weave.repeat)
-    return Curved("curved", {fingerprint(DENIM.optics()): network}, domain)
+    return Curved({fingerprint(DENIM.optics()): network}, domain)
 
 
 def test_published_sizes():
@@ -209,7 +209,7 @@ def test_a_flat_material_may_take_part():
     options = NeumipOptions(texels_per_yarn=4, ignore_curvature=True)
     torch.manual_seed(2)
     network = NeumipNetwork(options, DENIM.weave.repeat)
-    method = Neumip("neumip", {fingerprint(DENIM.optics()): network})
+    method = Neumip({fingerprint(DENIM.optics()): network})
     front, behind = _queries(30), _queries(30, behind=True)
     assert (method.predict(DENIM, behind) == 0).all()
     assert (method.predict(DENIM, front) > 0).any()

@@ -5,7 +5,8 @@ import math
 import pytest
 import torch
 
-from pipeline.models.networks.layers import perceptron, to_components, to_network, weighted_error
+from pipeline.models.networks.layers import component_error, perceptron, to_components, to_network
+from pipeline.models.options import ComponentLossOptions
 
 
 @pytest.fixture(autouse=True)
@@ -46,4 +47,5 @@ def test_components_are_never_negative():
 
 def test_weights_apply_to_the_mean_of_each_pair():
     output, target = torch.tensor([[1.0, 0.0, 2.0, 0.0]]), torch.zeros(1, 4)
-    assert weighted_error(output, target, 3.0, 5.0).item() == pytest.approx(3 * 1 / 2 + 5 * 4 / 2)
+    options = ComponentLossOptions(specular_weight=3.0, diffuse_weight=5.0)
+    assert component_error(output, target, options).item() == pytest.approx(3 * 1 / 2 + 5 * 4 / 2)

@@ -18,7 +18,7 @@ def test_footprint_chooses_the_levels():
         level.data.fill_(float(index))
     sigma = 0.5 / 4 * torch.tensor([0.01, 1.0, 2.0**0.5, 2.0, 1e6])
     zero = torch.zeros(5)
-    read = network._read_pyramid(zero, zero, sigma)[:, 0]
+    read = network.read(list(network.levels), zero, zero, sigma)[:, 0]
     torch.testing.assert_close(read, torch.tensor([0.0, 0.0, 0.5, 1.0, len(network.levels) - 1.0]))
 
 
@@ -35,7 +35,7 @@ def test_offset_shifts_along_the_view():
     """With the published clamp: r wo.xy / max(wo.z, 0.6), here r fixed by the perceptron's last bias."""
     network = NeumipNetwork(SMALL, (2, 2)).eval()
     seen = []
-    network._read_pyramid = lambda u, v, sigma: seen.append((u, v)) or torch.zeros(len(u), 7)
+    network.read = lambda levels, u, v, sigma: seen.append((u, v)) or torch.zeros(len(u), 7)
     with torch.no_grad():
         for weight in network.offset.parameters():
             weight.zero_()
@@ -43,7 +43,7 @@ def test_offset_shifts_along_the_view():
     wo = torch.tensor([[0.6, 0.0, 0.8], [0.0, 0.96, 0.28]])
     half = torch.full((2,), 0.5)
     network(half, half, half, wo, wo)
-    (u, v), depth = seen[0], 0.1 * 1.5
+    (u, v), depth = seen[1], 0.1 * 1.5
     torch.testing.assert_close(u, torch.tensor([0.5 + depth * 0.6 / 0.8, 0.5]))
     torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + depth * 0.96 / 0.6]))
 
@@ -58,7 +58,7 @@ def test_textures_learn_faster():
 
 def test_method_knows_its_fabrics_and_answers_at_extremes():
     twill, plain = load_fabric("cotton_twill"), load_fabric("polyester_lining")
-    method = Neumip("neumip", {fingerprint(twill.optics()): NeumipNetwork(SMALL, twill.weave.repeat)})
+    method = Neumip({fingerprint(twill.optics()): NeumipNetwork(SMALL, twill.weave.repeat)})
     assert method.covers(twill)
     assert method.covers(twill.model_copy(update={"name": "other"}))
     assert not method.covers(plain)

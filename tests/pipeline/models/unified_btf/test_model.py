@@ -6,9 +6,9 @@ import torch
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain
-from pipeline.models.network import Batch
+from pipeline.models.network import Batch, NetworkMethod
 from pipeline.models.unified_btf import UnifiedBtfOptions
-from pipeline.models.unified_btf.model import UnifiedBtf, UnifiedBtfNetwork, averaged, build, decoder, restore
+from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, build, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import columns_of
 from pipeline.truth.query import Queries
@@ -110,7 +110,7 @@ def test_unseen_fabric_is_one_forward_pass():
     """Nothing in the network changes, and the answers differ from place to place and at no extreme go wild."""
     model = network()
     before = {name: weight.clone() for name, weight in model.state_dict().items()}
-    method = UnifiedBtf(model)
+    method = NetworkMethod(model)
     assert method.covers(BASKET)
     method.prepare(BASKET)
     u, v, sigma = (a.ravel() for a in np.meshgrid([0.0, 1.3, 1e6, -1e6], [0.0, -1e-30, 2.2], [1e-4, 1.0, 1e4]))
@@ -127,7 +127,7 @@ def test_unseen_fabric_is_one_forward_pass():
 
 
 def test_bytes_are_those_of_latents_and_decoder():
-    method = UnifiedBtf(network())
+    method = NetworkMethod(network())
     ends, picks = LINING.weave.repeat
     texels = sum((2 * ends // 2**level) * (2 * picks // 2**level) for level in range(3))
     weights = sum(weight.numel() for weight in decoder(32, 16).parameters())
@@ -145,7 +145,7 @@ def test_restored_method_answers_alike_and_only_what_it_knows():
     model = network()
     (method,) = restore(SMALL, [(card_of(), model.state_dict())])
     queries = draw_queries(QueryOptions(), (2, 2), 5, 0, 32)
-    np.testing.assert_array_equal(method.predict(LINING, queries), UnifiedBtf(model).predict(LINING, queries))
+    np.testing.assert_array_equal(method.predict(LINING, queries), NetworkMethod(model).predict(LINING, queries))
     with pytest.raises(BadInput, match="light from the viewer's side"):
         method.predict(LINING, draw_queries(QueryOptions(behind=1.0), (2, 2), 5, 0, 4))
 

@@ -164,7 +164,7 @@ def test_chunks_do_not_show(twill, monkeypatch):
     assert isinstance(method, Method)
     asked = queries(np.linspace(0, 4, 37), np.linspace(0, 4, 37), 0.2)
     whole = method.predict(twill, asked)
-    monkeypatch.setattr("pipeline.models.network.CHUNK_ROWS", 10)
+    monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", 10)
     np.testing.assert_allclose(method.predict(twill, asked), whole, rtol=1e-5, atol=1e-6)
 
 
