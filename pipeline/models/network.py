@@ -66,7 +66,7 @@ class Batch(NamedTuple):
 
 
 class Trainable(nn.Module):
-    """What the training loop can train: subclasses have a `loss`, and the rest as far as they need it."""
+    """A network that the training loop trains; subclasses have a `loss`, and the rest as far as they need it."""
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; `random` is a pure function of seed and step."""
