@@ -99,6 +99,15 @@ def calibrate(raw: Raw, behind: Mask) -> tuple[Float64, Float64]:
 
 
 @kernel
+def squared_norm(components: Float64) -> float:
+    """Return the sum of the squares of the four components; what follows them does not count."""
+    total = 0.0
+    for q in range(4):
+        total += components[q] ** 2
+    return total
+
+
+@kernel
 def standard_error(reported: float, size: float, factors: Factors) -> float:
     """Return the standard error of a component from the reported one; `size` is the norm of the components."""
     error = factors.reported * reported

@@ -20,10 +20,9 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Index, Mask
-from pipeline.truth import monte_carlo
-from pipeline.truth.calibration import SAMPLED, calibrate
+from pipeline.truth.calibration import calibrate
 from pipeline.truth.cloth import ClothSide, Raw, WideQueries, cloth_side, columns_of
-from pipeline.truth.monte_carlo import OWEN, sample_rows
+from pipeline.truth.monte_carlo import INDEPENDENT, OWEN, R2, sample_rows
 from pipeline.truth.node_table.tables import ALLOWED, COARSE, FINE, NOT_REFINED
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.quadrature.adaptive import quadrature_rows
@@ -57,18 +56,10 @@ def auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: Tru
         left[here[good]] = False
     missing = np.flatnonzero(left)
     if missing.size:
-        sampled = sample_rows(
-            cloth,
-            columns.take(missing),
-            index[missing],
-            OWEN,
-            options.relative_error / _STUDENT,
-            options.absolute_error / _STUDENT,
-            options.min_count,
-            options.max_count,
-            np.uint64(seed),
+        limits = options.limits._replace(
+            relative_error=options.relative_error / _STUDENT, absolute_error=options.absolute_error / _STUDENT
         )
-        answers.put(missing, *sampled, SAMPLED)
+        answers.put(missing, *sample_rows(cloth, columns.take(missing), index[missing], OWEN, limits, np.uint64(seed)))
     return answers
 
 
@@ -100,26 +91,15 @@ def _wide(columns: WideQueries) -> Mask:
 def _sampled(
     method: int, cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int
 ) -> Raw:
-    rows = monte_carlo.sample_rows(
-        cloth,
-        columns,
-        index,
-        method,
-        options.relative_error,
-        options.absolute_error,
-        options.min_count,
-        options.max_count,
-        np.uint64(seed),
-    )
-    return Raw(*rows, np.full(len(index), SAMPLED))
+    return sample_rows(cloth, columns, index, method, options.limits, np.uint64(seed))
 
 
 Estimator = Callable[[ClothSide, WideQueries, Index, TruthOptions, int], Raw]
 
 ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
-    "mc": partial(_sampled, monte_carlo.INDEPENDENT),
-    "r2": partial(_sampled, monte_carlo.R2),
-    "owen": partial(_sampled, monte_carlo.OWEN),
+    "mc": partial(_sampled, INDEPENDENT),
+    "r2": partial(_sampled, R2),
+    "owen": partial(_sampled, OWEN),
     "quadrature": quadrature_rows,
     "node_table": node_table_rows,
     "auto": auto_rows,

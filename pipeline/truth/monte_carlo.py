@@ -16,10 +16,12 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
-from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries
+from pipeline.truth.calibration import SAMPLED, squared_norm
+from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, independent_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.options import Limits
 from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.scattering.point import Directions, directions_of, point_share
 
@@ -144,25 +146,10 @@ def sample_rows(
     columns: WideQueries,
     index: Index,
     method: int,
-    relative_error: float,
-    absolute_error: float,
-    min_count: int,
-    max_count: int,
+    limits: Limits,
     seed: np.uint64,
-) -> tuple[Float64, Float64, Index]:
-    """Answer every row: means and standard errors (N, 5), and points used.
-
-    Parameters
-    ----------
-    cloth, columns : ClothSide, WideQueries
-        The cloth and the queries.
-    index : int (N,)
-        Name of each row: its random numbers are a function of (seed, index).
-    method : int
-        INDEPENDENT, R2 or OWEN.
-    relative_error, absolute_error, min_count, max_count, seed
-        As in `TruthOptions` and `estimate`.
-    """
+) -> Raw:
+    """Answer every row by points that are INDEPENDENT, R2 or OWEN; a function of (seed, index) names those of a row."""
     rows = len(index)
     means, errors = np.zeros((rows, AREA_SUM)), np.zeros((rows, AREA_SUM))
     counts = np.zeros(rows, np.int64)
@@ -172,7 +159,7 @@ def sample_rows(
         directions = query_directions(columns, row)
         mean, error = means[row], errors[row]
         sums[:] = 0.0
-        done, target, visible = 0, min_count // RANDOMISATIONS, 0
+        done, target, visible = 0, limits.min_count // RANDOMISATIONS, 0
         while True:
             # Extend every randomisation from `done` to `target` points.
             for r in range(RANDOMISATIONS):
@@ -190,24 +177,20 @@ def sample_rows(
 
             # Stop when the requested error is reached, or the points are spent.
             seen = ratios(sums, mean, error)
-            size, squares = 0.0, 0.0
-            for c in range(4):
-                size += mean[c] * mean[c]
+            size = squared_norm(mean)
             for c in range(4):
                 # One more visible point may show what none has shown so far.
                 error[c] = math.hypot(error[c], math.sqrt(size) / max(visible, 1))
-                squares += error[c] * error[c]
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
                 error[2] = error[3] = abs(directions.light.z) / (math.pi * done * RANDOMISATIONS)
-                squares = 2.0 * error[2] * error[2]
-            reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
+            reached = squared_norm(error) <= max(limits.relative_error**2 * size, limits.absolute_error**2)
             # A patch of which hardly a point is seen says nothing of its error yet; its points cost little.
-            limit = max_count if seen == RANDOMISATIONS else max_count * HIDDEN_PATIENCE
+            limit = limits.max_count if seen == RANDOMISATIONS else limits.max_count * HIDDEN_PATIENCE
             if done * RANDOMISATIONS >= limit or (reached and seen == RANDOMISATIONS):
                 break
             target = 2 * done
         counts[row] = done * RANDOMISATIONS
         share, doubt = visible_share(sums, directions.viewer.z * done)
         conceal(share, doubt, mean, error)
-    return means, errors, counts
+    return Raw(means, errors, counts, np.full(rows, SAMPLED))

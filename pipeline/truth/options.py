@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from pydantic import Field, field_validator, model_validator
 
@@ -18,6 +18,15 @@ TABLE_CELLS: Final = 96
 
 TABLE_SIGMA: Final = 1.25 / 32
 """Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
+
+
+class Limits(NamedTuple):
+    """When an estimator stops, as kernels read it; the fields are those of `TruthOptions`."""
+
+    relative_error: float
+    absolute_error: float
+    min_count: int
+    max_count: int
 
 
 class TruthOptions(Frozen):
@@ -63,3 +72,8 @@ class TruthOptions(Frozen):
         if self.max_count < self.min_count:
             raise ValueError(f"max_count ({self.max_count}) must not be below min_count ({self.min_count})")
         return self
+
+    @property
+    def limits(self) -> Limits:
+        """When an estimator stops."""
+        return Limits(*(getattr(self, name) for name in Limits._fields))

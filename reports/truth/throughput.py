@@ -19,25 +19,24 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import DETAILS
-from pipeline.compiled.decorators import allocating_kernel
+from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND
-from pipeline.truth.node_table.build import FIRST_FINE, FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
+from pipeline.truth.geometry.heightfield import ALPHA
+from pipeline.truth.node_table.answer import sum_pieces
+from pipeline.truth.node_table.build import FIRST_FINE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
 from pipeline.truth.node_table.kernels import (
     FlakeLayer,
-    HorizonSlopes,
     NodeShares,
     Normals,
     Tangents,
     no_shares,
     node_directions,
     reflected,
-    weigh,
 )
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
@@ -127,9 +126,10 @@ def _points() -> Iterator[Rate]:
 
     plain = _rate(lambda: float(_numpy_points(fabric, table, queries)), "points, NumPy", fabric.name, "points/s")
     yield plain
-    for name, visibility in (("specular", False), ("everything", True)):
+    shares = no_shares(table.normal.shape[1])._replace(weight=table.evenly)
+    for name, evaluate in (("specular", _evaluate_speculars), ("everything", _evaluate_all)):
         rate = _rate(
-            lambda visibility=visibility: float(_evaluate_points(model, table, columns, visibility)[1]),  # type: ignore[misc]
+            lambda evaluate=evaluate: float(evaluate(model, table, columns, shares)),  # type: ignore[misc]
             f"points, {name}",
             fabric.name,
             "points/s",
@@ -146,55 +146,35 @@ def _points() -> Iterator[Rate]:
     )
 
 
-@allocating_kernel
-def _evaluate_points(model: ClothSide, table: ExactNodes, columns: WideQueries, visibility: bool) -> tuple[float, int]:
-    """Evaluate all nodes for every query: specular, and with `visibility` all else; return their sum and count."""
-    nodes = table.normal.shape[1]
-    shares = no_shares(nodes)
-    shares.lit[:] = np.float32(1.0)
-    total, points = np.float64(0.0), 0
-    thickness, one = np.float32(model.front.thickness), np.float32(1.0)
+@kernel
+def _evaluate_speculars(model: ClothSide, table: ExactNodes, columns: WideQueries, shares: NodeShares) -> int:
+    """Evaluate the specular share of all nodes for every query; return their number."""
+    points, one = 0, np.float32(1.0)
+    shares.lit[:] = one
     for row in range(len(columns.u)):
         towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
-        light, viewer = towards.light, towards.viewer
         for p in range(len(table.pieces)):
             piece = table.pieces[p]
-            start, count, family = piece[FIRST_NODE], piece[NODES_X] * piece[NODES_Y], min(piece[PIECE_FAMILY], 1)
-            stop, f0 = start + count, piece[FIRST_FINE]
+            count, f0 = piece[NODES_X] * piece[NODES_Y], piece[FIRST_FINE]
             f1 = f0 + count
-            yarn = model.front.yarn[family]
-            normal = Normals(
-                table.normal[0, start:stop],
-                table.normal[1, start:stop],
-                table.normal[2, start:stop],
-                table.normal[3, start:stop],
-            )
-            own = NodeShares(
-                table.evenly[start:stop],
-                shares.lit[start:stop],
-                shares.areas[start:stop],
-                shares.diffuses[start:stop],
-                shares.speculars[start:stop],
-                shares.margins[start:stop],
-                shares.lit_margins[start:stop],
-                shares.undecided[start:stop],
-            )
-            if visibility:
-                area, diffuse = weigh(
-                    normal,
-                    light,
-                    HorizonSlopes(table.slope[light.first, start:stop], table.slope[light.second, start:stop]),
-                    viewer,
-                    HorizonSlopes(table.slope[viewer.first, start:stop], table.slope[viewer.second, start:stop]),
-                    np.float32(yarn[BLEND]),
-                    own,
-                )
-                total += area + diffuse
+            alpha = model.front.yarn[min(piece[PIECE_FAMILY], 1), ALPHA]
+            normal = Normals(table.fine[0, f0:f1], table.fine[1, f0:f1], table.fine[2, f0:f1], table.fine[3, f0:f1])
             tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
-            layer = FlakeLayer(np.float32(yarn[ALPHA] ** 2), thickness, one)
-            total += reflected(normal, tangent, light, viewer, one, layer, own.lit, own.speculars)
+            layer = FlakeLayer(np.float32(alpha**2), np.float32(model.front.thickness), one)
+            lit, speculars = shares.lit[:count], shares.speculars[:count]
+            reflected(normal, tangent, towards.light, towards.viewer, one, layer, lit, speculars)
             points += count
-    return total, points
+    return points
+
+
+@allocating_kernel
+def _evaluate_all(model: ClothSide, table: ExactNodes, columns: WideQueries, shares: NodeShares) -> int:
+    """Sum all nodes for every query, as the estimator does; return their number."""
+    points, sums = 0, np.zeros((3, 5))
+    for row in range(len(columns.u)):
+        towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+        points += sum_pieces(model, table, towards, shares, sums[0], sums[1], sums[2])[-1]
+    return points
 
 
 def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:

@@ -24,12 +24,12 @@ from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import WIDE, estimate
 from pipeline.truth.footprint.mixture import FINE_LINE
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.node_table.answer import _sum_pieces
+from pipeline.truth.node_table.answer import sum_pieces
 from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY
-from pipeline.truth.node_table.kernels import SMOOTH, no_shares, node_directions, with_weight
+from pipeline.truth.node_table.kernels import SMOOTH, no_shares, node_directions
 from pipeline.truth.node_table.refine import UNSEEN
 from pipeline.truth.node_table.tables import COARSE, FINE
-from pipeline.truth.node_table.weights import fill_weights
+from pipeline.truth.node_table.weights import fill_weights, weight_room
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -56,16 +56,13 @@ def curvature_terms(fabric: Fabric, queries: Queries) -> np.ndarray:
         table = (COARSE if wide else FINE).table(cloth, False)
         own = no_shares(table.normal.shape[1])
         if columns.sigma[row] >= table.uniform:
-            own = with_weight(own, table.evenly)
+            own = own._replace(weight=table.evenly)
         else:
-            size = (2, int(table.repeat.max()), len(table.edges))
-            scratch = np.zeros((*size, table.edges.shape[1] - 1), np.float32)
-            points = np.zeros((2, FINE_LINE.points), np.float32)
-            touched = np.zeros(size, np.bool_)
-            fill_weights(table, cloth.shape, columns, row, scratch, touched, FINE_LINE, points, own.weight)
+            room = weight_room(table, FINE_LINE)
+            fill_weights(table, cloth.shape, columns, row, FINE_LINE, room, own.weight)
         sums, moved, squares = np.zeros(5), np.zeros(5), np.zeros(5)
         towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
-        area, *_ = _sum_pieces(cloth, table, towards, own, sums, moved, squares)
+        area, *_ = sum_pieces(cloth, table, towards, own, sums, moved, squares)
         if area <= 0.0:
             continue
         below, parts = 0.0, np.zeros(4)

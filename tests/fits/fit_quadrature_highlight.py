@@ -21,7 +21,7 @@ import numpy as np
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.geometry.pieces import first_cells
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import _HIGHLIGHT, integrate_rows
 from weaves.fabric import load_fabric
 
@@ -39,9 +39,9 @@ def main() -> None:
             cloth, columns = cloth_side(fabric, TruthOptions(shadows=False)), columns_of(queries)
 
             def specular(level: int, cloth=cloth, columns=columns) -> np.ndarray:
-                limits = 1e-15, 0.0, 32, 1 << 30
+                limits = Limits(1e-15, 0.0, 32, 1 << 30)
                 cells = first_cells(cloth.front)
-                return integrate_rows(cloth, columns, cells, *limits, CUT, level - 1, level)[0][:, :2]
+                return integrate_rows(cloth, columns, cells, limits, CUT, level - 1, level)[0][:, :2]
 
             exact = specular(5)
             for level in (1, 2, 3):

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.geometry.pieces import first_cells
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import SAFETY, integrate_rows, quadrature_rows
 from weaves.fabric import load_fabric
 
@@ -33,7 +33,8 @@ def main() -> None:
         fabric = load_fabric(name)
         columns = columns_of(draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 18, 0, rows))
         cloth = cloth_side(fabric, TruthOptions())
-        exact = integrate_rows(cloth, columns, first_cells(cloth.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
+        limits = Limits(1e-12, 0.0, 32, 1 << 30)
+        exact = integrate_rows(cloth, columns, first_cells(cloth.front), limits, CUT, 4, 5)[0]
         for tolerance in (0.02, 0.003):
             options = TruthOptions(relative_error=tolerance, absolute_error=0.0, max_count=1 << 14)
             mean, error, _, _ = quadrature_rows(cloth, columns, np.arange(rows), options, 0)

@@ -11,9 +11,9 @@ wrapped, unless it covers the repeat evenly.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
-from pipeline.compiled.decorators import inlined_kernel
+from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.compiled.normal import normal_quantile
 from pipeline.truth.geometry.march import wrap
 
@@ -29,19 +29,28 @@ EVENLY: Final = 0.6
 BOX_SIDE = math.sqrt(12.0)  # side of the square whose standard deviation is 1
 
 
-@inlined_kernel
-def place(shape: int, centre: float, sigma: float, repeat: float, number: float) -> tuple[float, float]:
-    """Return the position in [0, repeat) that a number in (0, 1) names on one axis, and its weight (mean 1).
+class Axis(NamedTuple):
+    """A footprint along x or y: GAUSSIAN or BOX, centre, standard deviation, and the repeat it is folded into."""
 
-    Parameters
-    ----------
-    shape : int
-        GAUSSIAN or BOX.
-    centre, sigma, repeat : float
-        Centre and standard deviation of the kernel and length of the repeat, in yarn spacings.
-    number : float
-        Numbers in (0, 1) that select the point.
-    """
+    shape: int
+    centre: float
+    sigma: float
+    repeat: float
+
+
+@kernel
+def folded_box(axis: Axis) -> tuple[float, float, float]:
+    """Return how many whole repeats a box covers everywhere, and where it covers one more: half width and centre."""
+    side = BOX_SIDE * axis.sigma
+    whole = float(math.floor(side / axis.repeat))
+    centre = axis.centre + (0.5 * axis.repeat if whole % 2.0 == 1.0 else 0.0)
+    return whole, 0.5 * (side - whole * axis.repeat), centre
+
+
+@inlined_kernel
+def place(axis: Axis, number: float) -> tuple[float, float]:
+    """Return the position in [0, repeat) that a number in (0, 1) names on one axis, and its weight (mean 1)."""
+    shape, centre, sigma, repeat = axis
     if shape == GAUSSIAN:
         if sigma < _WIDE_GAUSSIAN * repeat:
             return wrap(centre + sigma * normal_quantile(number), repeat), 1.0
@@ -98,8 +107,8 @@ def place_pair(
         Numbers in (0, 1) that select the point.
     """
     if angle == 0.0 or (shape == GAUSSIAN and sigma == sigma_minor):
-        x, weight_x = place(shape, u, sigma, ends, first)
-        y, weight_y = place(shape, v, sigma_minor, picks, second)
+        x, weight_x = place(Axis(shape, u, sigma, ends), first)
+        y, weight_y = place(Axis(shape, v, sigma_minor, picks), second)
         return x, y, weight_x * weight_y
     if shape == GAUSSIAN:
         if min(sigma, sigma_minor) >= _EVEN * max(ends, picks):

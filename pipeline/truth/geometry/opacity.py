@@ -25,7 +25,7 @@ from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, 
 from pipeline.truth.geometry.march import wrap
 from pipeline.truth.geometry.visibility import Ray, ray, visible
 from pipeline.truth.monte_carlo import RANDOMISATIONS, place_point
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries, validate
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -117,13 +117,7 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
 
 @allocating_kernel
 def _opacity_rows(
-    cloth: ClothSide,
-    columns: WideQueries,
-    index: Index,
-    tolerance: float,
-    min_count: int,
-    max_count: int,
-    seed: np.uint64,
+    cloth: ClothSide, columns: WideQueries, index: Index, limits: Limits, seed: np.uint64
 ) -> tuple[Float64, Float64]:
     """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance."""
     rows = len(index)
@@ -140,7 +134,7 @@ def _opacity_rows(
             continue
         key = derive(seed, index[row])
         sums[:] = 0.0
-        hit, done, target = 0, 0, min_count // RANDOMISATIONS
+        hit, done, target = 0, 0, limits.min_count // RANDOMISATIONS
         while True:
             for r in range(RANDOMISATIONS):
                 randomisation = derive(key, r)
@@ -163,7 +157,7 @@ def _opacity_rows(
                 for r in range(RANDOMISATIONS):
                     spread += (sums[r, 0] - means[row] * sums[r, 1]) ** 2
                 errors[row] = math.sqrt(spread * RANDOMISATIONS / (RANDOMISATIONS - 1)) / total
-            if errors[row] <= tolerance or points >= max_count:
+            if errors[row] <= limits.relative_error or points >= limits.max_count:
                 break
             target = 2 * done
     return means, errors
@@ -203,26 +197,13 @@ def opacity(
     lifted[:, 2] = np.maximum(np.abs(lifted[:, 2]), np.float32(1e-30))
     validate(queries._replace(wi=lifted, wo=lifted))
     index = start + np.arange(len(queries.u))
-    mean, error = _opacity_rows(
-        cloth_side(fabric, options),
-        columns_of(queries._replace(wi=lifted)),
-        index,
-        options.relative_error,
-        options.min_count,
-        options.max_count,
-        np.uint64(seed),
-    )
+    columns = columns_of(queries._replace(wi=lifted))
+    mean, error = _opacity_rows(cloth_side(fabric, options), columns, index, options.limits, np.uint64(seed))
     return mean.astype(np.float32), error.astype(np.float32)
 
 
 @allocating_kernel
-def _grazing_rows(
-    field: HeightField,
-    u: Float64,
-    v: Float64,
-    azimuth: Float64,
-    curvature: Float64,
-) -> Float64:
+def _grazing_rows(field: HeightField, u: Float64, v: Float64, azimuth: Float64, curvature: Float64) -> Float64:
     picks, ends = field.top.shape
     cosines = np.zeros(len(u))
     for row in range(len(u)):

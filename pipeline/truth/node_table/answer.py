@@ -14,10 +14,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32, Float64, Index, Mask
-from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
-from pipeline.truth.calibration import Factors, standard_error
-from pipeline.truth.cloth import ClothSide, WideQueries
+from pipeline.compiled.arrays import Float64, Index
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.calibration import REFINED, Factors, squared_norm, standard_error
+from pipeline.truth.cloth import ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.mixture import Line
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.footprint.sequences import derive
@@ -47,10 +47,9 @@ from pipeline.truth.node_table.kernels import (
     reflected,
     transmitted,
     weigh,
-    with_weight,
 )
 from pipeline.truth.node_table.refine import UNSEEN, RefineRoom, refine, refine_room
-from pipeline.truth.node_table.weights import any_weight, fill_weights
+from pipeline.truth.node_table.weights import WeightRoom, any_weight, fill_weights, weight_room
 
 _ROWS: Final = (2, 4, 8)
 """Rows of a refined node, tried in this order."""
@@ -83,29 +82,17 @@ class Requested(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """Room for one query: shares of an own and of an even footprint, of its rows and columns, and for refinement."""
+    """Room for one query: shares of an own and of an even footprint, its weights, sums, and for refinement."""
 
     own: NodeShares
     everywhere: NodeShares
-    scratch: Float32
-    touched: Mask
-    points: Float32
+    weights: WeightRoom
     moved: Float64
     mean: Float64
     error: Float64
     refinement: RefineRoom
 
 
-class _Found(NamedTuple):
-    """Answers: means and errors (N, 5), nodes and places visited (N,), and whether nodes were refined (N,)."""
-
-    mean: Float64
-    error: Float64
-    count: Index  # type: ignore[assignment]  # the field's word, though tuples have a count too
-    refined: Mask
-
-
-@allocating_kernel
 def sum_rows(
     cloth: ClothSide,
     table: ExactNodes,
@@ -114,29 +101,19 @@ def sum_rows(
     requested: Requested,
     seed: np.uint64,
     line: Line,
-) -> _Found:
-    """Answer every row; ellipses by a `line`.
+) -> Raw:
+    """Answer every row; ellipses by a `line`. Rows whose nodes were refined have the stage REFINED, others 0.
 
     Footprints are Gaussian or lie along the axes, the cloth is flat, cosines go to the ply normal, points hide one
     another, and there is light from behind only if the table has horizons there.
     """
-    rows, nodes = len(columns.u), table.normal.shape[1]
+    nodes = table.normal.shape[1]
     own = no_shares(nodes)
-    cells, kinds = max(table.repeat[0], table.repeat[1]), len(table.edges)
-    room = _Room(
-        own,
-        with_weight(own, table.evenly),
-        np.zeros((2, cells, kinds, table.edges.shape[1] - 1), np.float32),
-        np.zeros((2, cells, kinds), np.bool_),
-        np.zeros((2, 2 * line.half + 1), np.float32),
-        np.zeros(5),
-        np.zeros(5),
-        np.zeros(5),
-        refine_room(nodes),
-    )
-    found = _Found(np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows, np.int64), np.zeros(rows, np.bool_))
-    _answer_rows(cloth, table, columns, index, requested, seed, line, room, found)
-    return found
+    everywhere, sums = own._replace(weight=table.evenly), np.zeros((3, 5))
+    room = _Room(own, everywhere, weight_room(table, line), *sums, refine_room(nodes))
+    answers = Raw.empty(len(columns.u))
+    _answer_rows(cloth, table, columns, index, requested, seed, line, room, answers)
+    return answers
 
 
 @kernel
@@ -149,17 +126,15 @@ def _answer_rows(
     seed: np.uint64,
     line: Line,
     room: _Room,
-    found: _Found,
+    answers: Raw,
 ) -> None:
     """Answer every row."""
     for row in range(len(columns.u)):
         even = cloth.shape == GAUSSIAN and min(columns.sigma[row], columns.sigma_minor[row]) >= table.uniform
         if not even:
-            fill_weights(
-                table, cloth.shape, columns, row, room.scratch, room.touched, line, room.points, room.own.weight
-            )
+            fill_weights(table, cloth.shape, columns, row, line, room.weights, room.own.weight)
         shares = room.everywhere if even else room.own
-        _answer_row(cloth, table, columns, row, derive(seed, index[row]), requested, shares, room, found)
+        _answer_row(cloth, table, columns, row, derive(seed, index[row]), requested, shares, room, answers)
 
 
 @kernel
@@ -172,30 +147,29 @@ def _answer_row(
     requested: Requested,
     shares: NodeShares,
     room: _Room,
-    found: _Found,
+    answers: Raw,
 ) -> None:
     """Answer a row whose footprint is spread over the nodes; `key` names its random numbers."""
-    mean, error = found.mean[row], found.error[row]
+    mean, error = answers.mean[row], answers.error[row]
     towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
-    area, area_error, moved_area, undecided, nodes = _sum_pieces(cloth, table, towards, shares, mean, room.moved, error)
-    found.count[row] += nodes
+    area, area_error, moved_area, undecided, nodes = sum_pieces(cloth, table, towards, shares, mean, room.moved, error)
+    answers.count[row] += nodes
     cosine = columns.wo[row, 2]
     if area <= 0.0:
-        mean[:] = 0.0
-        error[:] = 0.0
+        mean[:], error[:] = 0.0, 0.0
         return
     _divide(cloth.projected, cosine, area, area_error, moved_area, room.moved, mean, error)
     add_undecided(undecided / (area + undecided), mean, error)
     share, share_error = area / cosine, (math.hypot(moved_area, math.sqrt(area_error)) + undecided) / cosine
     if conceal(share, share_error, mean, error):
         return
-    target = max(requested.relative**2 * _squared_norm(mean), requested.absolute**2)
+    target = max(requested.relative**2 * squared_norm(mean), requested.absolute**2)
     plain, refined = requested.table, requested.refined
     if columns.wi[row, 2] < 0.0:
         plain, refined = requested.table_behind, requested.refined_behind
     if _squared_error(mean, error, plain) <= target:
         return
-    found.refined[row] = True
+    answers.stage[row] = REFINED
     below = cosine if cloth.projected else area
     directions = query_directions(columns, row)
     least = doubtful_from(table, shares, mean, below, target / refined.reported**2, room.refinement.doubts)
@@ -204,7 +178,7 @@ def _answer_row(
     for rows in _ROWS:
         for q in range(5):
             mean[q], error[q] = room.mean[q], room.error[q]
-        found.count[row] += refine(
+        answers.count[row] += refine(
             cloth, table, directions, key, rows, shares, least, below, room.refinement, mean, error
         )
         if _squared_error(mean, error, refined) <= target:
@@ -214,7 +188,7 @@ def _answer_row(
 @kernel
 def _squared_error(mean: Float64, error: Float64, factors: Factors) -> float:
     """Return the sum of the squares of the standard errors of the four components."""
-    size, total = math.sqrt(_squared_norm(mean)), 0.0
+    size, total = math.sqrt(squared_norm(mean)), 0.0
     for q in range(4):
         total += standard_error(error[q], size, factors) ** 2
     return total
@@ -226,22 +200,13 @@ def add_undecided(share: float, mean: Float64, error: Float64) -> None:
 
     They lie side by side and change together: they are all visible and lit, or none is.
     """
-    change = UNDECIDED * share * math.sqrt(_squared_norm(mean))
+    change = UNDECIDED * share * math.sqrt(squared_norm(mean))
     for q in range(4):
         error[q] = math.hypot(error[q], change)
 
 
 @kernel
-def _squared_norm(components: Float64) -> float:
-    """Return the sum of the squares of the four components."""
-    total = 0.0
-    for q in range(4):
-        total += components[q] ** 2
-    return total
-
-
-@kernel
-def _sum_pieces(
+def sum_pieces(
     cloth: ClothSide,
     table: ExactNodes,
     towards: NodeDirections,

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
+from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.geometry.heightfield import GAP, UNDER, surface_at
 from pipeline.truth.geometry.visibility import visible
@@ -85,7 +85,6 @@ class RowRoom(NamedTuple):
     value: Float64
 
 
-@allocating_kernel
 def row_room() -> RowRoom:
     """Return room for a row."""
     return RowRoom(np.zeros(PLACES, np.int64), np.zeros((2 * PLACES, 2), np.int64), np.zeros(POINT_SUMS))

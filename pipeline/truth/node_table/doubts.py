@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.compiled.decorators import kernel
+from pipeline.truth.calibration import squared_norm
 from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
 from pipeline.truth.node_table.kernels import SMOOTH, NodeShares
@@ -65,20 +66,10 @@ class Doubts(NamedTuple):
     levels: Float64
 
 
-@allocating_kernel
 def no_doubts(nodes: int) -> Doubts:
     """Return room for so many nodes, all 0."""
-    score = np.zeros(nodes, np.float32)
-    return Doubts(
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        score,
-        score.view(np.int32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(5),
-        np.zeros((_LEVELS, 5)),
-    )
+    right, down, score, specular, diffuse = np.zeros((5, nodes), np.float32)
+    return Doubts(right, down, score, score.view(np.int32), specular, diffuse, np.zeros(5), np.zeros((_LEVELS, 5)))
 
 
 @kernel
@@ -93,7 +84,7 @@ def doubtful_from(
     levels, left = doubts.levels, doubts.left
     levels[:] = 0.0
     left[:] = 0.0
-    squares = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2] + mean[3] * mean[3]
+    squares = squared_norm(mean)
     whole = requested * below * below
     zero = math.frexp(whole)[1] - 1 - _MIDDLE
     for p in range(len(table.pieces)):

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
@@ -76,30 +76,20 @@ class NodeDirections(NamedTuple):
 def node_directions(wi: Float64, wo: Float64, azimuths: int) -> NodeDirections:
     """Prepare unit directions, wo with z > 0, for a table with so many azimuths."""
     behind = wi[2] < 0.0
-    sign = -1.0 if behind else 1.0
     half = (wi[0] + wo[0]) ** 2 + (wi[1] + wo[1]) ** 2 + (wi[2] + wo[2]) ** 2
-    first, second, turn = azimuth_rows(wi[0], wi[1], azimuths)
-    light = Direction(
-        np.float32(sign * wi[0]),
-        np.float32(sign * wi[1]),
-        np.float32(sign * wi[2]),
-        _slope(wi),
-        first,
-        second,
-        np.float32(turn),
-    )
-    x, y, z, slope = np.float32(wo[0]), np.float32(wo[1]), np.float32(wo[2]), _slope(wo)
-    first, second, turn = azimuth_rows(wo[0], wo[1], azimuths)
-    viewer = Direction(x, y, z, slope, first, second, np.float32(turn))
-    first, second, turn = azimuth_rows(-wo[0], -wo[1], azimuths)
-    through = Direction(-x, -y, z, slope, first, second, np.float32(turn))
+    light = _direction(wi[0], wi[1], wi[2], -1.0 if behind else 1.0, azimuths)
+    viewer = _direction(wo[0], wo[1], wo[2], 1.0, azimuths)
+    through = _direction(-wo[0], -wo[1], wo[2], 1.0, azimuths)
     return NodeDirections(behind, light, viewer, through, np.float32(1.0 / max(half, 1e-12)))
 
 
 @kernel
-def _slope(w: Float64) -> np.float32:
-    """Return the rise of a direction, on either side of the cloth, bounded."""
-    return np.float32(min(abs(w[2]) / max(math.sqrt(w[0] * w[0] + w[1] * w[1]), 1e-9), _STEEPEST))
+def _direction(x: float, y: float, z: float, sign: float, azimuths: int) -> Direction:
+    """Return `sign` times a direction, with the slope and the azimuths of the direction itself."""
+    first, second, turn = azimuth_rows(x, y, azimuths)
+    slope = min(abs(z) / max(math.sqrt(x * x + y * y), 1e-9), _STEEPEST)
+    x, y, z = sign * x, sign * y, sign * z
+    return Direction(np.float32(x), np.float32(y), np.float32(z), np.float32(slope), first, second, np.float32(turn))
 
 
 class NodeShares(NamedTuple):
@@ -129,34 +119,9 @@ class NodeShares(NamedTuple):
     undecided: Float32
 
 
-@allocating_kernel
 def no_shares(nodes: int) -> NodeShares:
     """Return arrays for so many nodes, all 0."""
-    return NodeShares(
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-        np.zeros(nodes, np.float32),
-    )
-
-
-@allocating_kernel
-def with_weight(shares: NodeShares, weight: Float32) -> NodeShares:
-    """Return shares that use other weights; the remaining arrays are the same."""
-    return NodeShares(
-        weight,
-        shares.lit,
-        shares.areas,
-        shares.diffuses,
-        shares.speculars,
-        shares.margins,
-        shares.lit_margins,
-        shares.undecided,
-    )
+    return NodeShares(*np.zeros((len(NodeShares._fields), nodes), np.float32))
 
 
 SMOOTH: Final = np.float32(0.0005)

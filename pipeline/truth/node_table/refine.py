@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.compiled.decorators import kernel
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
 from pipeline.truth.geometry.heightfield import GAP
@@ -66,12 +66,10 @@ class RefineRoom(NamedTuple):
     second: Float64
 
 
-@allocating_kernel
 def refine_room(nodes: int) -> RefineRoom:
     """Return room for a table of so many nodes."""
-    return RefineRoom(
-        no_doubts(nodes), row_room(), np.zeros(POINT_SUMS), np.zeros(4), np.zeros(POINT_SUMS), np.zeros(4)
-    )
+    sums, squares = np.zeros((2, POINT_SUMS)), np.zeros((2, 4))
+    return RefineRoom(no_doubts(nodes), row_room(), sums[0], squares[0], sums[1], squares[1])
 
 
 @kernel

@@ -95,8 +95,8 @@ class NodeTable:
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
         factors = (sides[stage] for sides in (FRONT_FACTORS, BEHIND_FACTORS) for stage in (self._stage, REFINED))
         requested = Requested(relative_error, absolute_error, *factors)
-        found = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
-        return Raw(found.mean, found.error, found.count, np.where(found.refined, REFINED, self._stage))
+        answers = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
+        return answers._replace(stage=np.where(answers.stage == REFINED, REFINED, self._stage))
 
     def table(self, cloth: ClothSide, behind: bool) -> ExactNodes:
         """Return the table of one side of a cloth, with horizons `behind` it if there is light."""

@@ -7,6 +7,7 @@ kernel, centre and repeat are those of `place`, whose points have these masses a
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.compiled.normal import normal_distribution
 from pipeline.truth.cloth import WideQueries
 from pipeline.truth.footprint.mixture import Line, along_axes, line_points
-from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN
+from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN, Axis, folded_box
 from pipeline.truth.geometry.march import wrap
 from pipeline.truth.node_table.build import EDGES_X, EDGES_Y, FIRST_NODE, NODES_X, NODES_Y, ExactNodes
 
@@ -26,29 +27,39 @@ _SPREAD_OUT = 0.8  # in repeats: an axis of a Gaussian this wide covers the repe
 _REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
 
 
+class WeightRoom(NamedTuple):
+    """Room for the weights of one query.
+
+    Attributes
+    ----------
+    masses : float32 (2, cells, kinds, n)
+        Shares of the intervals along x and along y, by cell and kind of edges.
+    touched : bool (2, cells, kinds)
+        Whether any of them may be above 0.
+    points : float32 (2, P)
+        Places and shares of the points of a mixture.
+    """
+
+    masses: Float32
+    touched: Mask
+    points: Float32
+
+
+def weight_room(table: ExactNodes, line: Line) -> WeightRoom:
+    """Return room for footprints over a table, rotated ones by a `line`."""
+    size = 2, int(table.repeat.max()), len(table.edges)
+    masses = np.zeros((*size, table.edges.shape[1] - 1), np.float32)
+    return WeightRoom(masses, np.zeros(size, np.bool_), np.zeros((2, line.points), np.float32))
+
+
 @kernel
-def interval_masses(
-    shape: int,
-    centre: float,
-    sigma: float,
-    repeat: float,
-    edges: Float32,
-    cell: float,
-    masses: Float32,
-) -> bool:
+def interval_masses(axis: Axis, edges: Float32, cell: float, masses: Float32) -> bool:
     """Write the mass of each interval between neighbouring edges; return whether any may be above 0.
 
-    Parameters
-    ----------
-    shape, centre, sigma, repeat
-        As in `place`.
-    edges : float32 (n + 1,)
-        Rising positions in their cell, in [0, 1].
-    cell : float
-        Start of the cell.
-    masses : float32 (n,)
-        Written; over a whole repeat they sum to 1.
+    `edges` (n + 1,) are rising positions, in [0, 1], in the cell that starts at `cell`; over a whole repeat the masses
+    (n,) sum to 1.
     """
+    shape, centre, sigma, repeat = axis
     count = len(masses)
     if shape == GAUSSIAN and sigma >= _SPREAD_OUT * repeat:
         even = np.float32(1.0 / repeat)
@@ -56,14 +67,10 @@ def interval_masses(
             masses[k] = (edges[k + 1] - edges[k]) * even
         return True
     side = BOX_SIDE * sigma
-    whole, even = 0.0, np.float32(0.0)
+    whole, even, reach = 0.0, np.float32(0.0), _REACH * sigma
     if shape == BOX:
-        # So many whole repeats everywhere, and the rest around the centre, or opposite it.
-        whole = math.floor(side / repeat)
+        whole, reach, centre = folded_box(axis)
         even = np.float32(whole / side)
-        if whole % 2.0 == 1.0:
-            centre += 0.5 * repeat
-    reach = _REACH * sigma if shape == GAUSSIAN else 0.5 * (side - whole * repeat)
     for k in range(count):
         masses[k] = even * (edges[k + 1] - edges[k])
     first = math.ceil((cell - centre - reach) / repeat)
@@ -85,13 +92,7 @@ def _add_gaussian(edges: Float32, middle: np.float32, inverse: np.float32, masse
 
 
 @fast_kernel
-def _add_box(
-    edges: Float32,
-    middle: np.float32,
-    reach: np.float32,
-    inverse: np.float32,
-    masses: Float32,
-) -> None:
+def _add_box(edges: Float32, middle: np.float32, reach: np.float32, inverse: np.float32, masses: Float32) -> None:
     for k in range(len(masses)):
         low = min(max(edges[k] - middle, -reach), reach)
         high = min(max(edges[k + 1] - middle, -reach), reach)
@@ -100,61 +101,36 @@ def _add_box(
 
 @kernel
 def fill_weights(
-    table: ExactNodes,
-    shape: int,
-    columns: WideQueries,
-    row: int,
-    scratch: Float32,
-    touched: Mask,
-    line: Line,
-    points: Float32,
-    weight: Float32,
+    table: ExactNodes, shape: int, columns: WideQueries, row: int, line: Line, room: WeightRoom, weight: Float32
 ) -> None:
-    """Write the share of a footprint that falls on each node and its copies; a rotated one by a `line` (mixture).
-
-    `scratch` is (2, cells, kinds, n), `touched` (2, cells, kinds): the shares along x and y, and whether there are any;
-    `points` (2, line.points) is scratch too.
-    """
+    """Write the share of a footprint that falls on each node and its copies; a rotated one by a `line` (mixture)."""
     weight[:] = _0
+    ends, picks = float(table.repeat[0]), float(table.repeat[1])
     u, v, sigma_x, sigma_y = columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row]
     if columns.angle[row] == 0.0:
-        _add(table, shape, u, v, sigma_x, sigma_y, _1, scratch, touched, weight)
+        _add(table, Axis(shape, u, sigma_x, ends), Axis(shape, v, sigma_y, picks), _1, room, weight)
         return
     sigma_x, sigma_y, correlation = along_axes(sigma_x, sigma_y, columns.angle[row])
     blur, shift = math.sqrt(1.0 - abs(correlation)), math.sqrt(abs(correlation))
     shift_x, shift_y = shift * sigma_x, math.copysign(shift, correlation) * sigma_y
-    for point in range(line_points(correlation, line, points[0], points[1])):
-        z = points[0, point]
-        _add(
-            table, shape, u + z * shift_x, v + z * shift_y, blur * sigma_x, blur * sigma_y, points[1, point], scratch,
-            touched, weight,
-        )  # fmt: skip
+    places, shares = room.points[0], room.points[1]
+    for point in range(line_points(correlation, line, places, shares)):
+        x_axis = Axis(shape, u + places[point] * shift_x, blur * sigma_x, ends)
+        y_axis = Axis(shape, v + places[point] * shift_y, blur * sigma_y, picks)
+        _add(table, x_axis, y_axis, shares[point], room, weight)
 
 
 @kernel
-def _add(
-    table: ExactNodes,
-    shape: int,
-    u: float,
-    v: float,
-    sigma_x: float,
-    sigma_y: float,
-    share: np.float32,
-    scratch: Float32,
-    touched: Mask,
-    weight: Float32,
-) -> None:
+def _add(table: ExactNodes, x_axis: Axis, y_axis: Axis, share: np.float32, room: WeightRoom, weight: Float32) -> None:
     """Add `share` of a footprint along the axes."""
-    kinds, ends, picks = len(table.edges), table.repeat[0], table.repeat[1]
+    kinds, masses, touched = len(table.edges), room.masses, room.touched
     for axis in range(2):
-        centre, sigma, cells = u, sigma_x, ends
-        if axis == 1:
-            centre, sigma, cells = v, sigma_y, picks
-        centre = wrap(centre, float(cells))
-        for cell in range(cells):
+        shape, centre, sigma, repeat = x_axis if axis == 0 else y_axis
+        own = Axis(shape, wrap(centre, repeat), sigma, repeat)
+        for cell in range(table.repeat[axis]):
             for kind in range(kinds):
                 touched[axis, cell, kind] = interval_masses(
-                    shape, centre, sigma, float(cells), table.edges[kind], float(cell), scratch[axis, cell, kind]
+                    own, table.edges[kind], float(cell), masses[axis, cell, kind]
                 )
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
@@ -162,7 +138,7 @@ def _add(
         for c in range(table.copies.shape[1]):
             end, pick = table.copies[p, c, 0], table.copies[p, c, 1]
             if touched[0, end, piece[EDGES_X]] and touched[1, pick, piece[EDGES_Y]]:
-                along_x, along_y = scratch[0, end, piece[EDGES_X]], scratch[1, pick, piece[EDGES_Y]]
+                along_x, along_y = masses[0, end, piece[EDGES_X]], masses[1, pick, piece[EDGES_Y]]
                 _add_product(along_x[:across], along_y[:lines], share, weight[start : start + across * lines])
 
 

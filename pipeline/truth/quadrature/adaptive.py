@@ -22,12 +22,12 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.calibration import QUADRATURE, QUADRATURE_CURVED, SAMPLED
+from pipeline.truth.calibration import QUADRATURE, QUADRATURE_CURVED, squared_norm
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, Raw, WideQueries
-from pipeline.truth.footprint.place import GAUSSIAN
+from pipeline.truth.footprint.place import GAUSSIAN, Axis
 from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.monte_carlo import OWEN, query_directions, sample_rows
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.rules import (
     BOX_WEIGHT,
     KIND,
@@ -35,7 +35,6 @@ from pipeline.truth.quadrature.rules import (
     PART,
     RULES,
     TURNING,
-    Axis,
     cut_parts,
     integrate,
     rectangles,
@@ -60,10 +59,7 @@ def integrate_rows(
     cloth: ClothSide,
     columns: WideQueries,
     different: Mask,
-    relative_error: float,
-    absolute_error: float,
-    min_count: int,
-    max_count: int,
+    limits: Limits,
     split: int,
     first: int,
     last: int,
@@ -76,8 +72,6 @@ def integrate_rows(
         The cloth and the queries.
     different : Mask (picks, ends)
         The cells that represent all others under a footprint that covers the repeat evenly: the first of each orbit.
-    relative_error, absolute_error, min_count, max_count
-        As in `TruthOptions`.
     split : int
         Level from which on lines are cut at shadow edges.
     first, last : int
@@ -116,7 +110,7 @@ def integrate_rows(
         while True:
             refined = False
             for p in range(total):
-                fits = levels[p] == first or counts[row] + 4 * costs[p] <= max_count
+                fits = levels[p] == first or counts[row] + 4 * costs[p] <= limits.max_count
                 if badness[p] >= cut and levels[p] < last and fits:
                     earlier[p] = changes[p]
                     changes[p] = sums[p]
@@ -141,11 +135,8 @@ def integrate_rows(
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
                 errors[row, 2:4] = abs(directions.light.z) / (math.pi * counts[row])
-            squares = 0.0
-            for c in range(4):
-                squares += errors[row, c] ** 2
-            reached = squares <= max(relative_error * relative_error * size, absolute_error * absolute_error)
-            if not refined or (reached and counts[row] >= min_count):
+            reached = squared_norm(errors[row]) <= max(limits.relative_error**2 * size, limits.absolute_error**2)
+            if not refined or (reached and counts[row] >= limits.min_count):
                 break
             cut = _WORST * worst
         share = 0.0
@@ -188,7 +179,7 @@ def _estimate_errors(
     What both rules of a part may have stepped over is added to its change: highlights, and, where `cosine` (the
     viewer's, 0 without shadows) says so, slivers that are seen or lit.
     """
-    area, worst, size = 0.0, 0.0, 0.0
+    area, worst = 0.0, 0.0
     badness[:] = 0.0
     for p in range(len(sums)):
         area += sums[p, AREA_SUM]
@@ -198,8 +189,7 @@ def _estimate_errors(
     for c in range(AREA_SUM):
         for p in range(len(sums)):
             mean[c] += sums[p, c] / area
-        if c < 4:
-            size += mean[c] * mean[c]
+    size = squared_norm(mean)
     for c in range(AREA_SUM):
         signed, unsigned = 0.0, 0.0
         for p in range(len(sums)):
@@ -240,16 +230,14 @@ def quadrature_rows(cloth: ClothSide, columns: WideQueries, index: Index, option
     quarter = np.sin(2.0 * columns.angle)
     aligned = (np.abs(quarter) < 1e-6) | ((cloth.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
     answers = Raw.empty(len(index))
-    limits = options.relative_error, options.absolute_error, options.min_count, options.max_count
     if aligned.any():
         mean, error, count, barely = integrate_rows(
-            cloth, columns.take(aligned), first_cells(cloth.front), *limits, _SPLIT, _FIRST, RULES - 1
+            cloth, columns.take(aligned), first_cells(cloth.front), options.limits, _SPLIT, _FIRST, RULES - 1
         )
         curved = columns.curvature[aligned] > 0.0
         answers.put(aligned, mean, error, count, np.where(curved, QUADRATURE_CURVED, QUADRATURE))
         aligned[aligned] = ~barely
     if not aligned.all():
         rest = ~aligned
-        sampled = sample_rows(cloth, columns.take(rest), index[rest], OWEN, *limits, np.uint64(seed))
-        answers.put(rest, *sampled, SAMPLED)
+        answers.put(rest, *sample_rows(cloth, columns.take(rest), index[rest], OWEN, options.limits, np.uint64(seed)))
     return answers

@@ -11,14 +11,14 @@ line gets a rule of its own. The integrand of the other direction is then smooth
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
-from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN
+from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN, Axis, folded_box
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
     BEND,
@@ -43,15 +43,6 @@ _RESOLVED: Final = 3.0  # widest part in standard deviations: 8 nodes give its m
 # footprint, which is 1 for all parts together.
 A0, A1, B0, B1, KIND, MIDDLE, HALF, BOX_WEIGHT, TURNING, MASS = range(10)
 PART: Final = 10
-
-
-class Axis(NamedTuple):
-    """A footprint along x or y: kernel, centre, standard deviation, and the repeat it is folded into."""
-
-    shape: int
-    centre: float
-    sigma: float
-    repeat: float
 
 
 @allocating_kernel
@@ -153,11 +144,8 @@ def _cut(axis: Axis, low: float, high: float, pieces: Float64) -> int:
                 count += 1
             image += 1.0
         return count
-    # So many whole repeats everywhere, and one more around the centre, or opposite it.
     side = BOX_SIDE * axis.sigma
-    whole = float(math.floor(side / axis.repeat))
-    reach = 0.5 * (side - whole * axis.repeat)
-    centre = axis.centre + (0.5 * axis.repeat if whole % 2.0 == 1.0 else 0.0)
+    whole, reach, centre = folded_box(axis)
     image = float(math.ceil((low - centre - reach) / axis.repeat))
     last = math.floor((high - centre + reach) / axis.repeat)
     cursor = low

@@ -24,7 +24,7 @@ from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, WARP
 from pipeline.truth.geometry.march import wrap
 from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import Queries, validate
 from pipeline.truth.scattering.point import point_share
 from weaves.colour_order import ThreadColours
@@ -101,23 +101,15 @@ def component_colours(
                 found.mean[index] = np.stack([threads.warp[0], threads.weft[0]], axis=1).reshape(4, 3)
                 continue
             cloth, columns = cloth_side(fabric, options, side), columns_of(queries.take(index), side)
-            found.mean[index], found.standard_error[index] = sample_colours(
-                cloth, columns, start + index, threads, options.relative_error, options.min_count, options.max_count,
-                np.uint64(seed),
-            )  # fmt: skip
+            found.mean[index], found.standard_error[index] = _sample_colours(
+                cloth, columns, start + index, threads, options.limits, np.uint64(seed)
+            )
     return found
 
 
 @allocating_kernel
-def sample_colours(
-    cloth: ClothSide,
-    columns: WideQueries,
-    index: Index,
-    threads: ThreadTable,
-    relative_error: float,
-    min_count: int,
-    max_count: int,
-    seed: np.uint64,
+def _sample_colours(
+    cloth: ClothSide, columns: WideQueries, index: Index, threads: ThreadTable, limits: Limits, seed: np.uint64
 ) -> tuple[Float64, Float64]:
     """Return the colours of every row's components (N, 4, 3), and the standard error in the patch BSDF (N, 3)."""
     rows = len(index)
@@ -128,13 +120,13 @@ def sample_colours(
     for row in range(rows):
         key = derive(seed, index[row])
         plain[:], coloured[:], area[:] = 0.0, 0.0, 0.0
-        done, target = 0, min_count // RANDOMISATIONS
+        done, target = 0, limits.min_count // RANDOMISATIONS
         while True:
             for r in range(RANDOMISATIONS):
                 _add_points(cloth, columns, row, threads, derive(key, r), done, target, plain[r], coloured[r], area[r:])
             done = target
             size, error = _colours(threads, plain, coloured, area, means[row], errors[row])
-            if error <= relative_error * size or done * RANDOMISATIONS >= max_count:
+            if error <= limits.relative_error * size or done * RANDOMISATIONS >= limits.max_count:
                 break
             target = 2 * done
     return means, errors

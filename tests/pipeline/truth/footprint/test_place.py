@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN, place
+from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN, Axis, place
 
 
 def test_moments_of_the_wrapped_kernel():
@@ -14,7 +14,7 @@ def test_moments_of_the_wrapped_kernel():
         for sigma in [0.05, 0.4, 0.899, 0.901, 1.4, 2.9, 3.1, 40.0]:
             # The k-th circular moment of a wrapped kernel is that of the kernel itself: exp(-w^2 s^2 / 2), or a sinc.
             repeat, centre, numbers = 3.0, 1.2, (np.arange(20_000) + 0.5) / 20_000
-            x, weight = np.array([place(shape, centre, sigma, repeat, n) for n in numbers]).T
+            x, weight = np.array([place(Axis(shape, centre, sigma, repeat), n) for n in numbers]).T
             assert ((x >= 0) & (x < repeat)).all()
             for k in range(4):
                 w = 2 * np.pi * k / repeat
@@ -30,13 +30,13 @@ def test_moments_of_the_wrapped_kernel():
 def test_a_box_of_whole_repeats_is_the_repeat_average():
     for whole in (1, 2, 7):
         sigma = 2.0 * whole / BOX_SIDE
-        weights = [place(BOX, 0.3, sigma, 2.0, (k + 0.5) / 64)[1] for k in range(64)]
+        weights = [place(Axis(BOX, 0.3, sigma, 2.0), (k + 0.5) / 64)[1] for k in range(64)]
         np.testing.assert_allclose(weights, 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("centre", [-1e6 + 0.25, 1e6 + 0.25])
 def test_centres_far_away_are_folded(centre):
-    x, _ = place(GAUSSIAN, centre, 1e-4, 4.0, 0.5)
+    x, _ = place(Axis(GAUSSIAN, centre, 1e-4, 4.0), 0.5)
     assert x == pytest.approx(0.25, abs=1e-9)
 
 

@@ -11,7 +11,7 @@ from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.pieces import first_cells
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.rules import rectangles
 from pipeline.truth.query import Queries
@@ -70,11 +70,11 @@ def _specular_errors(roughness, split):
     model = cloth_side(fabric, TruthOptions(shadows=False))
     wi, wo = (np.array([_direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
     columns = columns_of(_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
-    limits = 1e-15, 0.0, 32, 1 << 30
+    limits = Limits(1e-15, 0.0, 32, 1 << 30)
     different = first_cells(model.front)
-    exact = integrate_rows(model, columns, different, *limits, CUT, 4, 5)[0][:, :2]
+    exact = integrate_rows(model, columns, different, limits, CUT, 4, 5)[0][:, :2]
     means = [
-        integrate_rows(model, columns, different, *limits, split, level - 1, level)[0][:, :2] for level in (1, 2, 3)
+        integrate_rows(model, columns, different, limits, split, level - 1, level)[0][:, :2] for level in (1, 2, 3)
     ]
     return [np.sqrt(np.mean(np.sum((mean - exact) ** 2, 1) / np.sum(exact**2, 1))) for mean in means]
 
@@ -134,8 +134,9 @@ def test_cutting_lines_at_shadow_edges_pays():
     fabric = load_fabric("polyester_lining")
     queries = draw_queries(QueryOptions(sigma=(0.5, 8.0), max_angle=70.0), fabric.weave.repeat, 5, 0, 24)
     model, columns = cloth_side(fabric, TruthOptions()), columns_of(queries)
-    exact = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5)[0]
-    cut, _, used, _ = integrate_rows(model, columns, first_cells(model.front), 1e-12, 0.0, 32, 8192, CUT, 1, 5)
+    exact = integrate_rows(model, columns, first_cells(model.front), Limits(1e-12, 0.0, 32, 1 << 30), CUT, 4, 5)[0]
+    limits = Limits(1e-12, 0.0, 32, 8192)
+    cut, _, used, _ = integrate_rows(model, columns, first_cells(model.front), limits, CUT, 1, 5)
     options = TruthOptions(relative_error=1e-9, absolute_error=0.0, min_count=8192, max_count=8192)
     owen = estimate(fabric, queries, options, 1)
     size = np.linalg.norm(exact[:, :4], axis=1)
@@ -150,9 +151,8 @@ def _coverage(rows):
         fabric = _both(name, **changes)
         queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 17, 0, rows)
         model = cloth_side(fabric, TruthOptions())
-        exact = integrate_rows(
-            model, columns_of(queries), first_cells(model.front), 1e-12, 0.0, 32, 1 << 30, CUT, 4, 5
-        )[0]
+        limits = Limits(1e-12, 0.0, 32, 1 << 30)
+        exact = integrate_rows(model, columns_of(queries), first_cells(model.front), limits, CUT, 4, 5)[0]
         for tolerance in (0.02, 0.003):
             options = TruthOptions(relative_error=tolerance, absolute_error=0.0, max_count=1 << 14)
             mean, error, *_ = _answer(fabric, queries, options)
