@@ -110,7 +110,7 @@ def sum_rows(
     nodes = table.normal.shape[1]
     own = no_shares(nodes)
     everywhere, sums = own._replace(weight=table.evenly), np.zeros((3, 5))
-    room = _Room(own, everywhere, weight_room(table, line), *sums, refine_room(nodes))
+    room = _Room(own, everywhere, weight_room(table, line), sums[0], sums[1], sums[2], refine_room(nodes))
     answers = Raw.empty(len(columns.u))
     _answer_rows(cloth, table, columns, index, requested, seed, line, room, answers)
     return answers
