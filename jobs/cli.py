@@ -27,7 +27,7 @@ VERBS: Final = {
         "exchange:view",
         "Write a page of one file that draws a fabric while light and viewer turn, and compares methods.",
     ),
-    "render": ("render.render:render", "Render a scene with any fabrics by any method."),
+    "render": ("render:render", "Render a scene with any fabrics by any method."),
     "plan": ("plan:print_plan", "Show what would run and why, with rows, bytes and time; nothing is computed."),
     "generate": ("run:generate", "Compute the ground truth: the shards of a recipe's data set."),
     "evaluate": ("evaluate:evaluate", "Evaluate a file of queries on a fabric: its rows with the BSDF values."),
@@ -42,16 +42,19 @@ VERBS: Final = {
     ),
     "report": ("run:report", "Write the page: pictures, tables and plots of all measurements."),
     "run": ("run:run", "Generate, train, bench and report; finished tasks are skipped."),
-    "status": ("status:print_status", "Show which tasks are done, failed (with the reason) or missing."),
+    "status": ("plan:print_status", "Show which tasks are done, failed (with the reason) or missing."),
     "prune": ("prune:prune", "List, or remove, the products that none of some recipes needs."),
     "merge": ("merge:merge", "Join two folders of products, such as parts of a data set made on two machines."),
-    "records merge": ("merge:merge_records", "Join Records of several machines in one file; times of each stay apart."),
+    "records merge": (
+        "records:merge_records",
+        "Join Records of several machines in one file; times of each stay apart.",
+    ),
     "publish": (
         "publish.publish:publish",
         "Write a data set as a folder that others can read without this package, and cite.",
     ),
     "compare": (
-        "compare:compare",
+        "records:compare",
         "Compare two benchmarks and mark significant differences.\n\n"
         "An error differs if it exceeds the interval over queries and the range over trainings.",
     ),
@@ -63,7 +66,7 @@ VERBS: Final = {
         "savings:savings",
         "Compare scenes' own recipes with the general one: time and rows saved, and errors.",
     ),
-    "results": ("results:results", "Write the tables of a recipe's page as Markdown."),
+    "results": ("records:results", "Write the tables of a recipe's page as Markdown."),
 }
 """Function of each verb, in a module of `jobs.verbs`, and its line in the help."""
 

@@ -1,4 +1,4 @@
-"""The terminal: tables and sentences are printed by it, and nothing in them is obeyed.
+"""The terminal: tables, sentences and bars are printed by it, and nothing in them is obeyed.
 
 Names, sources and messages come from files of others. Characters that a terminal would obey, such as those that move
 the cursor or set its title, are replaced, and brackets and colons mean themselves.
@@ -6,13 +6,24 @@ the cursor or set its title, are replaced, and brackets and colons mean themselv
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
+from rich.table import Table
 
 from weaves.errors import printable
+
+if TYPE_CHECKING:
+    from reports.tables.table import ResultTable
+
+Item = TypeVar("Item")
+
+MOST_SENTENCES: Final = 20
+"""Most sentences of one kind that a verb prints; it counts the others."""
 
 
 class Terminal(Console):
@@ -31,3 +42,108 @@ class Terminal(Console):
         """Yield the segments of anything that can be shown; rich's own control segments stay."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text), style, control)
+
+
+def print_lines(*sentences: object, stderr: bool = False) -> None:
+    """Print sentences as they are, each in one line."""
+    for sentence in sentences:
+        Terminal(stderr=stderr).print(str(sentence), soft_wrap=True)
+
+
+def print_table(
+    columns: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    *,
+    text: Sequence[str] = (),
+    title: str = "",
+    caption: str = "",
+    styles: Mapping[int, str] = MappingProxyType({}),
+    gap: int = 2,
+    least_width: int = 0,
+) -> None:
+    """Print a table, whose first column labels the rows.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : iterable of sequences
+        Cells.
+    text : sequence of str
+        Columns of words; those of numbers stand on the right.
+    title, caption : str
+        Line above, lines below.
+    styles : mapping
+        Styles of single rows, by their number.
+    gap, least_width : int
+        Letters between columns, and of the terminal at least.
+    """
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, gap, 0, 0))
+    table.title, table.title_justify = title or None, "left"
+    table.caption, table.caption_justify = caption or None, "left"
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="right" if index and column not in text else "left")
+    for index, row in enumerate(rows):
+        table.add_row(*map(str, row), style=styles.get(index))
+    console = Terminal()
+    console.width = max(console.width, least_width)
+    console.print(table)
+
+
+def print_result(result: ResultTable) -> None:
+    """Print a table of results after an empty line; marked rows are bold."""
+    print_lines("")
+    print_table(
+        result.columns,
+        [(row.label, *row.cells) for row in result.rows],
+        text=[column for index, column in enumerate(result.columns) if not result.numeric(index)],
+        title=result.title,
+        styles={index: "bold" for index, row in enumerate(result.rows) if row.kind == "marked"},
+    )
+
+
+@contextmanager
+def progress(doing: str) -> Iterator[Callable[[float], None]]:
+    """Show a bar on a terminal while work is done; yield what takes the share that is done."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Terminal(stderr=True)
+    columns = TextColumn(doing), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bars:
+        bar = bars.add_task(doing, total=1.0)
+        yield lambda share: bars.update(bar, completed=share)
+
+
+def tracked(items: Sequence[Item], doing: str) -> Iterator[Item]:
+    """Yield items, with a bar on a terminal."""
+    with progress(doing) as advance:
+        for index, item in enumerate(items):
+            yield item
+            advance((index + 1) / len(items))
+
+
+def duration(seconds: float) -> str:
+    """Write a time as a person would say it."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 2 * 3600:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h" if seconds < 48 * 3600 else f"{seconds / 86400:.1f} days"
+
+
+def size(count: float) -> str:
+    """Write a number of bytes."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"
+
+
+def number(value: float) -> str:
+    """Write a measured number with three digits; a missing one as a dash."""
+    if value != value:
+        return "–"
+    if 0 < abs(value) < 0.01:
+        return f"{value:.1e}"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"

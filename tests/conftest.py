@@ -20,7 +20,7 @@ STARTED = {"cpp", "selvage_cpp", "neumip_cpp", "webgl", "browse", "llvm", "switc
 
 LONG = (
     "tests/jobs/test_smoke.py",
-    "tests/jobs/verbs/render/",
+    "tests/jobs/verbs/test_render.py",
     "tests/pipeline/models/",
     "tests/pipeline/analytic/",
     "tests/pipeline/truth/",

@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
-from rich.progress import track
-from rich.table import Table
 
-from jobs.console import table_of
 from jobs.exits import print_error
 from jobs.recipe.load import load_recipe, recipe_names
 from jobs.recipe.recipe import Recipe
-from jobs.terminal import Terminal
+from jobs.terminal import print_lines, print_table, tracked
 from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out
 from pipeline.shards.check import check_shard
 from pipeline.shards.manifest import Manifest
@@ -25,6 +22,9 @@ from pipeline.storage import is_local, place
 from weaves.errors import BadInput, WorkFailed, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.validation import read_toml
+
+if TYPE_CHECKING:
+    from pipeline.truth.checks.invariants import CheckResult
 
 WHERE = "check"
 
@@ -58,12 +58,8 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
     """Return the subject of a name: the folder of a data set, a recipe, or a fabric.
 
     A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is. `add` has
-    the methods from outside that a recipe may name.
-
-    Raises
-    ------
-    BadInput
-        If nothing or more than one thing has this name, or the file cannot be used.
+    the methods from outside that a recipe may name. BadInput if nothing or more than one thing has this name, or the
+    file cannot be used.
     """
     presets, recipes = preset_names(), recipe_names()
     folder = place(subject, WHERE)
@@ -94,69 +90,49 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
 def check_dataset(folder: Path) -> list[str]:
     """Check every shard of a data set and return the faults as sentences; without any, print a summary.
 
-    Raises
-    ------
-    BadInput
-        If the folder has no manifest.
+    BadInput if the folder has no manifest.
     """
     manifest = Manifest.load(folder)
     if not manifest.shards:
         return [f"{folder}: its manifest lists no shards; run `twillight generate`"]
-    console = Terminal(stderr=True)
-    faults = []
-    for entry in track(manifest.shards, "checking", console=console, disable=not console.is_terminal):
-        faults += check_shard(folder, entry, manifest)
-    rows = sum(entry.rows for entry in manifest.shards)
+    faults = [fault for entry in tracked(manifest.shards, "checking") for fault in check_shard(folder, entry, manifest)]
     if not faults:
-        Terminal().print(f"{folder}: {len(manifest.shards)} shards with {rows:,} rows are sound")
+        rows = sum(entry.rows for entry in manifest.shards)
+        print_lines(f"{folder}: {len(manifest.shards)} shards with {rows:,} rows are sound")
     return faults
 
 
 def check_fabric(fabric: Fabric) -> None:
-    """Test a fabric's ground truth against physical invariants and print a table.
-
-    Raises
-    ------
-    WorkFailed
-        If an invariant does not hold.
-    """
+    """Test a fabric's ground truth against physical invariants and print a table; WorkFailed if one does not hold."""
     from pipeline.truth.checks.invariants import INVARIANTS
 
-    console = Terminal(stderr=True)
-    found = []
-    for invariant in track(INVARIANTS, "checking", console=console, disable=not console.is_terminal, transient=True):
-        found += invariant(fabric)
-    Terminal().print(invariants_table(fabric.name, found))
-    if broken := [item.name for item in found if item.status == "broken"]:
-        raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(found)} invariants do not hold: {', '.join(broken)}")
+    results = [result for invariant in tracked(INVARIANTS, "checking") for result in invariant(fabric)]
+    rows = [(one.name, _measured(one), _should_be(one), _holds(one), one.note) for one in results]
+    broken = {index: "bold red" for index, one in enumerate(results) if one.status == "broken"}
+    columns = ("invariant", "value", "should be", "holds", "")
+    print_table(columns, rows, text=("should be", "holds", ""), title=fabric.name, styles=broken)
+    if broken:
+        names = ", ".join(results[index].name for index in broken)
+        raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(results)} invariants do not hold: {names}")
 
 
-def invariants_table(name: str, found: Sequence[Any]) -> Table:
-    """Show the invariants of a fabric (a sequence of `pipeline.truth.checks.invariants.CheckResult`)."""
-    table = table_of("invariant", "value", "should be", "holds", "", right=("value",))
-    for item in found:
-        style = "bold red" if item.status == "broken" else ""
-        table.add_row(item.name, _measured(item), _should_be(item), _holds(item), item.note, style=style)
-    table.title, table.title_justify = name, "left"
-    return table
+def _measured(result: CheckResult) -> str:
+    value = f"{result.measured:.4g}"
+    return f"{value} ± {result.standard_error:.1g}" if result.standard_error else value
 
 
-def _measured(item: Any) -> str:
-    value = f"{item.measured:.4g}"
-    return f"{value} ± {item.standard_error:.1g}" if item.standard_error else value
+def _should_be(result: CheckResult) -> str:
+    return "–" if result.relation == "reported" else f"{result.relation} {result.expected:g}"
 
 
-def _should_be(item: Any) -> str:
-    return "–" if item.relation == "reported" else f"{item.relation} {item.expected:g}"
-
-
-def _holds(item: Any) -> str:
-    inside = item.relation == "<=" and item.sigmas < -5
-    match item.status:
+def _holds(result: CheckResult) -> str:
+    match result.status:
         case "exact":
             return "exactly"
+        case "statistics" if result.relation == "<=" and result.sigmas < -5:
+            return f"by {-result.sigmas:.0f} σ"
         case "statistics":
-            return f"by {-item.sigmas:.0f} σ" if inside else f"within statistics ({item.sigmas:+.1f} σ)"
+            return f"within statistics ({result.sigmas:+.1f} σ)"
         case "broken":
-            return f"NO ({item.sigmas:+.1f} σ)" if item.standard_error else "NO"
+            return f"NO ({result.sigmas:+.1f} σ)" if result.standard_error else "NO"
     return "a number only"

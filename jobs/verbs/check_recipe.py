@@ -10,9 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from rich.progress import Progress
-
-from jobs.console import MOST_SENTENCES, print_line
 from jobs.plan.dataset import Shard
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
@@ -20,7 +17,7 @@ from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import Fault, faults
 from jobs.run.ledger import Ledger
-from jobs.terminal import Terminal
+from jobs.terminal import MOST_SENTENCES, print_lines, progress
 from jobs.verbs.parameters import WorkerFlags
 from jobs.verbs.run import work
 from weaves.errors import BadInput, WorkFailed
@@ -35,9 +32,9 @@ def check_recipe(name: str, out: Path, add: Sequence[str] = ()) -> int:
     if not found:
         _print_sound(name, tasks)
     elif any(fault.kind in ("cut", "damaged") for fault in found):
-        print_line(f"`twillight check {name} --repair` makes exactly these files again")
+        print_lines(f"`twillight check {name} --repair` makes exactly these files again", stderr=True)
     elif any(fault.kind in _HARMLESS for fault in found):
-        print_line(f"`twillight run {name}` makes what is missing")
+        print_lines(f"`twillight run {name}` makes what is missing", stderr=True)
     return exit_code(found)
 
 
@@ -45,14 +42,8 @@ def repair(name: str, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> in
     """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
 
     Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
-    measured again, and the page that shows them is written again.
-
-    Raises
-    ------
-    BadInput
-        If the recipe, the folder or the scheduler cannot be used.
-    WorkFailed
-        If a task failed, or another run is at work in the folder.
+    measured again, and the page that shows them is written again. BadInput if the recipe, the folder or the scheduler
+    cannot be used; WorkFailed if a task failed, or another run is at work in the folder.
     """
     ledger = Ledger(out)
     if not ledger.exists():
@@ -62,15 +53,16 @@ def repair(name: str, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> in
         _print(found, out)
         for fault in found:
             _remove(fault, ledger)
-    planned = Counter(task.stage for task in tasks)
-    never = {fault.task.stage for fault in found if fault.task and fault.never_run}
-    never = {stage for stage in never if _never(stage, found) == planned[stage]}
+    planned, never_run = Counter(task.stage for task in tasks), Counter[str]()
+    for fault in found:
+        if fault.never_run and fault.task:
+            never_run[fault.task.stage] += fault.tasks
     if any(fault.kind != "foreign" for fault in found):
-        if stages := [stage for stage in STAGES if stage not in never]:
+        if stages := [stage for stage in STAGES if not 0 < never_run[stage] == planned[stage]]:
             work(name, stages, out, on, add)
         found = _found(name, out, add)[1]
         if found:
-            print_line("what is left:")
+            print_lines("what is left:", stderr=True)
             _print(found, out)
     if not found:
         _print_sound(name, tasks)
@@ -88,15 +80,8 @@ def _found(name: str, out: Path, add: Sequence[str]) -> tuple[list[Task], list[F
     """Return the plan of a recipe and the faults of its files."""
     recipe = load_recipe(name, add)
     tasks = plan(recipe)
-    console = Terminal(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("checking", total=1.0)
-        return tasks, faults(recipe, tasks, Ledger(out), lambda share: progress.update(bar, completed=share))
-
-
-def _never(stage: str, found: Sequence[Fault]) -> int:
-    """Return the number of tasks of a stage that were never run."""
-    return sum(fault.tasks for fault in found if fault.never_run and fault.task and fault.task.stage == stage)
+    with progress("checking") as advance:
+        return tasks, faults(recipe, tasks, Ledger(out), advance)
 
 
 def _remove(fault: Fault, ledger: Ledger) -> None:
@@ -115,9 +100,9 @@ def _print(found: Sequence[Fault], out: Path) -> None:
     order = ["damaged", "cut", "odd", "foreign", "outdated", "missing"]
     found = sorted(found, key=lambda fault: order.index(fault.kind))
     for fault in found[:MOST_SENTENCES]:
-        print_line(f"{out / fault.path}: {fault.kind}: {fault.why}")
+        print_lines(f"{out / fault.path}: {fault.kind}: {fault.why}", stderr=True)
     if more := Counter(fault.kind for fault in found[MOST_SENTENCES:]):
-        print_line(f"and {', '.join(f'{count:,} {kind}' for kind, count in more.items())} more")
+        print_lines(f"and {', '.join(f'{count:,} {kind}' for kind, count in more.items())} more", stderr=True)
 
 
 def _print_sound(name: str, tasks: Sequence[Task]) -> None:
@@ -126,6 +111,4 @@ def _print_sound(name: str, tasks: Sequence[Task]) -> None:
     count = Counter(task.stage for task in tasks)
     rows = sum(part.rows for part in parts)
     models = f"{count['train']:,} models, {count['bench']:,} measurements"
-    Terminal().print(
-        f"{name}: {len(parts):,} shards with {rows:,} rows, {models} and the page are sound", soft_wrap=True
-    )
+    print_lines(f"{name}: {len(parts):,} shards with {rows:,} rows, {models} and the page are sound")

@@ -1,26 +1,28 @@
-"""`twillight evaluate`: options from the command line, a progress bar, and a summary."""
+"""`twillight evaluate`: options from the command line, a trained model in place of the truth, and a summary."""
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
-from jobs.console import number, table_of
 from jobs.run.cluster import MOST_WORKERS
-from jobs.terminal import Terminal
+from jobs.terminal import number, print_lines, print_table, progress
 from jobs.verbs.parameters import FabricName, Place
 from pipeline.cores import cores
-from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
+from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput, nearest
-from weaves.fabric import load_fabric
+from weaves.fabric import Fabric, load_fabric
+from weaves.reading import MIB, read_text
 from weaves.validation import validated
+
+if TYPE_CHECKING:
+    from pipeline.truth.query import Queries
 
 WHERE = "evaluate"
 
@@ -41,10 +43,7 @@ class TruthFlags:
 def truth_options(**chosen: object) -> TruthOptions:
     """Return the options of the truth from the command line; those not given have their defaults.
 
-    Raises
-    ------
-    BadInput
-        If one cannot be used, named as it is spelt on the command line.
+    BadInput if one cannot be used, named as it is spelt on the command line.
     """
     given = {name: value for name, value in chosen.items() if value is not None}
     estimator = given.get("estimator", TruthOptions().estimator)
@@ -55,7 +54,7 @@ def truth_options(**chosen: object) -> TruthOptions:
     except BadInput as error:
         if not error.key:
             raise
-        raise BadInput(WHERE, f"--{error.key.replace('_', '-')}", error.value, error.allowed) from error
+        raise BadInput(WHERE, _flag(error.key), error.value, error.allowed) from error
 
 
 def evaluate(
@@ -72,28 +71,26 @@ def evaluate(
 ) -> None:
     """Evaluate the queries of a file, by the ground truth or a model, and print a summary.
 
-    Raises
-    ------
-    BadInput
-        As `pipeline.shards.evaluate.evaluate_file`, and if an option, the model, the seed or the number of threads
-        cannot be used.
+    BadInput as `pipeline.shards.evaluate.evaluate_file`, and if an option, the model, the seed or the number of threads
+    cannot be used.
     """
     chosen = asdict(truth)
     options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
+    threads: AbstractContextManager[None] = nullcontext()
     if model is not None:
-        from jobs.verbs.evaluate_model import answerer, refuse_truth_options
+        from pipeline.models.network import one_thread
 
-        refuse_truth_options(chosen | {"seed": seed or None})
-        other = answerer(model, cloth, extrapolate)
+        threads = one_thread()
+        for name, value in (chosen | {"seed": seed or None}).items():
+            if value is not None:
+                allowed = "leave it out with --model: it is an option of the ground truth"
+                raise BadInput(WHERE, _flag(name), value, allowed)
+        other = _answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
     if not 0 <= seed < 2**64:
         raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
-    console = Terminal(stderr=True)
-    columns = TextColumn("evaluating"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
-    bars = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
-    with bars, _one_thread_each(other):
-        bar = bars.add_task("evaluating", total=1.0)
+    with progress("evaluating") as advance, threads:
         try:
             summary = evaluate_file(
                 cloth,
@@ -103,41 +100,49 @@ def evaluate(
                 seed,
                 skip_bad,
                 threads=workers or cores(),
-                progress=lambda share: bars.update(bar, completed=share),
+                progress=advance,
                 other=other,
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None
-    Terminal().print(evaluation_table(summary))
-    Terminal().print(str(out), soft_wrap=True)
-    if summary.bad:
-        rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
-        note = f"{rows} no answer; see {bad_list(out)}"
-        Terminal().print(note, soft_wrap=True)
-
-
-def _one_thread_each(other: Answerer | None) -> AbstractContextManager[None]:
-    """Return what keeps a model's torch on the threads that call it; the truth needs no torch."""
-    if other is None:
-        return nullcontext()
-    from pipeline.models.network import one_thread
-
-    return one_thread()
-
-
-def evaluation_table(summary: Summary) -> Table:
-    """Show the summary of `twillight evaluate`."""
-    answered = summary.rows - summary.bad
-    table = table_of("rows", "answered", "median relative error", "points per query", "queries per second")
-    for column in table.columns:
-        column.justify = "right"
-    table.add_row(
+    answered, error = summary.rows - summary.bad, summary.median_relative_error
+    row = (
         f"{summary.rows:,}",
         f"{answered:,}",
-        "–"
-        if summary.median_relative_error != summary.median_relative_error
-        else f"{summary.median_relative_error:.2%}",
+        "–" if error != error else f"{error:.2%}",
         number(summary.points / answered) if answered and summary.points else "–",
         number(answered / summary.seconds) if summary.seconds else "–",
     )
-    return table
+    print_table(("rows", "answered", "median relative error", "points per query", "queries per second"), [row])
+    print_lines(out)
+    if summary.bad:
+        rows = "1 bad row has" if summary.bad == 1 else f"{summary.bad:,} bad rows have"
+        print_lines(f"{rows} no answer; see {bad_list(out)}")
+
+
+def _answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
+    """Return a trained model, by name or by its folder, prepared for a fabric.
+
+    BadInput if there is no such model, its files are damaged, or it does not cover the fabric; `extrapolate` accepts
+    yarns outside the training domain.
+    """
+    from pipeline.models.registry import covering_model, model_folder
+
+    method = covering_model(model, fabric, WHERE, "--model")
+    domain = getattr(method, "domain", None)
+    if domain is not None and not extrapolate:
+        domain.refuse_fabric(fabric, method.name)
+    method.prepare(fabric)
+    through: Any = getattr(method, "transparency", None)
+
+    def answer(queries: Queries) -> tuple[np.typing.NDArray[np.float32], np.typing.NDArray[np.float32]]:
+        values = method.predict(fabric, queries)
+        return values, through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
+
+    card = read_text(model_folder(model, WHERE, "--model") / "card.json", 8 * MIB, "a model card")
+    faults = (lambda queries: {}) if domain is None else lambda queries: domain.faults(queries, method.name)
+    return Answerer(answer, {"model": method.name, "card": card}, faults)
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

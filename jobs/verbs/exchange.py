@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from jobs.terminal import Terminal
+from jobs.terminal import Terminal, print_lines
 from jobs.verbs.parameters import NOTHING, FabricName, Local
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
@@ -45,10 +45,7 @@ def import_draft(
 ) -> None:
     """Write the fabric of a draft file, and print what was read and what is assumed.
 
-    Raises
-    ------
-    BadInput
-        If the draft, a name or a number cannot be used.
+    BadInput if the draft, a name or a number cannot be used.
     """
     if out.suffix != ".toml":
         raise BadInput("import", "--out", str(out), "a path that ends in .toml is needed")
@@ -58,13 +55,10 @@ def import_draft(
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
     drafted = fabric_of(file, yarns, own, str(draft), {"warp": warp.given(), "weft": weft.given()})
     atomic_write(out, drafted.fabric.to_toml().encode())
-    console = Terminal()
     program = f", written by {file.program}" if file.program else ""
-    console.print(f"{out}: fabric {own} from the draft {file.title!r}{program}", soft_wrap=True)
+    print_lines(f"{out}: fabric {own} from the draft {file.title!r}{program}")
     for heading, sentences in (("Read:", drafted.read), ("Assumed:", drafted.assumed)):
-        console.print(heading)
-        for sentence in sentences:
-            console.print(f"- {sentence}", soft_wrap=True)
+        print_lines(heading, *(f"- {sentence}" for sentence in sentences))
 
 
 def export_fabric(
@@ -92,10 +86,7 @@ def export_fabric(
 ) -> None:
     """Write a fabric for other programs, and print what was written.
 
-    Raises
-    ------
-    BadInput
-        If not one path is given, or as `reports.exports.export.export`.
+    BadInput if not one path is given, or as `reports.exports.export.export`.
     """
     paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader}
     options: dict[str, Any] = {"vertices": vertices, "repeats": repeats, "size": size, "model": model, "level": level}
@@ -132,4 +123,4 @@ def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, An
             raise
         key = error.key and f"--{flags.get(error.key, error.key)}"
         raise BadInput(verb, key, error.value, error.allowed) from error
-    Terminal().print(sentence, soft_wrap=True)
+    print_lines(sentence)

@@ -36,7 +36,6 @@ def _local(type_: object, tokens: Sequence[Token]) -> Path:
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]
 RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or path of a .toml file.")]
 SceneName = Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")]
-OfSeveralPages = Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")]
 Add = Annotated[
     list[str],
     Parameter(help="Method or metric from outside: MODULE:NAME, FILE.py:NAME, or an installed method; runs its code."),

@@ -1,22 +1,20 @@
-"""`twillight plan`: what would run and why, with rows and time; and how long it takes on some workers."""
+"""`twillight plan` and `twillight status`: what would run and why, with rows and time; what is done and what failed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
-from rich.table import Table
 
-from jobs.console import duration, table_of
 from jobs.plan.estimate import Estimate
 from jobs.plan.plan import plan
-from jobs.plan.schedule import LEAST_GAIN, Schedule, doublings, longest_chain, schedule
+from jobs.plan.schedule import LEAST_GAIN, doublings, longest_chain, schedule
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE, reasons
-from jobs.terminal import Terminal
+from jobs.terminal import duration, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from pipeline.cores import cores
 from weaves.errors import BadInput
@@ -26,25 +24,31 @@ MOST_WORKERS: Final = 100_000
 
 
 class Facts(NamedTuple):
-    """Knowledge of the ledger about a plan.
-
-    Attributes
-    ----------
-    why : dict
-        Why each task that is not done would run, by its id.
-    seconds : dict
-        Duration of every task: measured, or estimated and scaled by what was measured of its kind.
-    measured : int
-        Number of tasks with a measured duration.
-    """
+    """Knowledge of the ledger about a plan."""
 
     why: dict[str, str]
+    """Why each task that is not done would run, by its id."""
     seconds: dict[str, float]
+    """Duration of every task: measured, or estimated and scaled by what was measured of its kind."""
     measured: int
+    """Number of tasks with a measured duration."""
 
     def left(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks that would run."""
         return [task for task in tasks if self.why.get(task.id, ELSEWHERE) != ELSEWHERE]
+
+
+def print_status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> None:
+    """Print how many tasks of each stage are done, failed and missing, and the reason of each failure."""
+    tasks, ledger = plan(load_recipe(recipe, add)), Ledger(out)
+    states = {task.id: ledger.state(task) for task in tasks}
+    rows = []
+    for stage in STAGES:
+        of_stage = [states[task.id] for task in tasks if task.stage == stage]
+        if of_stage:
+            rows.append((stage, *(of_stage.count(state) for state in ("done", "failed", "missing"))))
+    failed = [f"{task.title}: {ledger.reason(task)}" for task in tasks if states[task.id] == "failed"]
+    print_table(("stage", "done", "failed", "missing"), rows, caption="\n".join(failed))
 
 
 def print_plan(
@@ -54,113 +58,88 @@ def print_plan(
     out: Out = OUT,
     workers: Annotated[int, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
 ) -> None:
-    """Print the plan of a recipe; nothing is computed.
-
-    Raises
-    ------
-    BadInput
-        If the recipe or the number of workers cannot be used.
-    """
+    """Print the plan of a recipe; nothing is computed. BadInput if the recipe or the workers cannot be used."""
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 1 to {MOST_WORKERS}")
     tasks = plan(load_recipe(recipe, add))
     facts = facts_of(tasks, Ledger(out))
-    console = Terminal()
-    console.print(plan_table(tasks, facts))
-    for line in details(tasks, facts):
-        console.print(line, soft_wrap=True)
+    _print_plan(tasks, facts)
+    print_lines(*_details(tasks, facts))
     if workers:
-        console.print()
-        console.print(schedule_table(tasks, facts, workers))
+        print_lines("")
+        _print_schedule(tasks, facts, workers)
 
 
 def facts_of(tasks: Sequence[Task], ledger: Ledger) -> Facts:
     """Read what the ledger knows of a plan."""
-    why = reasons(tasks, ledger)
     receipts = {task.id: ledger.receipt(task) for task in tasks}
-    measured = {id: receipt for id, receipt in receipts.items() if receipt}
+    measured = {task: receipt.seconds for task, receipt in receipts.items() if receipt}
     estimate = Estimate()
     for task in tasks:
-        if receipt := measured.get(task.id):
-            estimate.learn(task, receipt.seconds)
-    seconds = {}
+        if task.id in measured:
+            estimate.learn(task, measured[task.id])
+    seconds = {task.id: measured[task.id] if task.id in measured else estimate.seconds(task) for task in tasks}
+    return Facts(reasons(tasks, ledger), seconds, len(measured))
+
+
+def _print_plan(tasks: Sequence[Task], facts: Facts) -> None:
+    """Print a plan by stage, kind and reason: tasks, rows and time on one core; totals of what would run."""
+    groups: dict[tuple[str, str, str], list[Task]] = {}
     for task in tasks:
-        if receipt := measured.get(task.id):
-            seconds[task.id] = receipt.seconds
-        else:
-            seconds[task.id] = estimate.seconds(task)
-    return Facts(why, seconds, len(measured))
-
-
-def plan_table(tasks: Sequence[Task], facts: Facts) -> Table:
-    """Show a plan by stage, kind and reason: tasks, rows and time on one core; totals of what would run."""
-    right = ("tasks", "rows", "one core")
-    table = table_of("stage", "what", *right, "why", right=right)
-    for stage in STAGES:
-        groups: dict[tuple[str, str], list[Task]] = {}
-        for task in tasks:
-            if task.stage == stage:
-                why, _, _ = facts.why.get(task.id, "done").partition(":")
-                groups.setdefault((task.group, why), []).append(task)
-        for (group, why), members in groups.items():
-            table.add_row(stage, group, *_sums(members, facts), why, style="dim" if why == "done" else "")
-        table.add_section()
+        why, _, _ = facts.why.get(task.id, "done").partition(":")
+        groups.setdefault((task.stage, task.group, why), []).append(task)
+    rows = [
+        (stage, group, *_sums(members, facts), why)
+        for (stage, group, why), members in sorted(groups.items(), key=lambda item: STAGES.index(item[1][0].stage))
+    ]
     left = facts.left(tasks)
-    table.add_row("all", "", *_sums(tasks, facts), "")
+    rows.append(("all", "", *_sums(tasks, facts), ""))
     if len(left) < len(tasks):
-        table.add_row("to do", "", *_sums(left, facts), "")
-    there = f"on the {cores()} cores of this machine"
+        rows.append(("to do", "", *_sums(left, facts), ""))
     seconds = schedule(left, facts.seconds, cores()).makespan
-    table.caption = f"about {duration(seconds)} {there}" if left else "nothing to do"
-    return table
+    caption = f"about {duration(seconds)} on the {cores()} cores of this machine" if left else "nothing to do"
+    dim = {index: "dim" for index, row in enumerate(rows) if row[-1] == "done"}
+    columns = ("stage", "what", "tasks", "rows", "one core", "why")
+    print_table(columns, rows, text=("what", "why"), caption=caption, styles=dim)
 
 
-def details(tasks: Sequence[Task], facts: Facts) -> list[str]:
-    """Return each reason that names keys or a failure once, with the tasks that it holds for."""
-    found: dict[str, list[Task]] = {}
+def _details(tasks: Sequence[Task], facts: Facts) -> Iterator[str]:
+    """Yield each reason that names keys or a failure once, with the tasks that it holds for."""
+    by_reason: dict[str, list[Task]] = {}
     for task in tasks:
         if ":" in (why := facts.why.get(task.id, "")):
-            found.setdefault(why, []).append(task)
-    lines = []
-    for why, members in found.items():
-        first, more = members[0], f" and {len(members) - 1} more" if len(members) > 1 else ""
-        lines.append(f"{first.stage} {first.title}{more}: {why}")
-    return lines
+            by_reason.setdefault(why, []).append(task)
+    for why, (first, *others) in by_reason.items():
+        more = f" and {len(others)} more" if others else ""
+        yield f"{first.stage} {first.title}{more}: {why}"
 
 
-def schedule_table(tasks: Sequence[Task], facts: Facts, workers: int) -> Table:
-    """Show how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number."""
+def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
+    """Print how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number.
+
+    Notes below say the time without work for all at the end (tail), where it stops scaling, and what was measured.
+    """
     left = facts.left(tasks)
-    found = {one.workers: one for one in doublings(tasks, facts.seconds)}
-    last = max(found)
-    found[workers] = schedule(tasks, facts.seconds, workers)
-    right = ("workers", "everything", "to do", "busy", "tail")
-    table = table_of(*right, right=right)
-    for count, one in sorted(found.items()):
-        rest = schedule(left, facts.seconds, count)
-        style = "bold" if count == workers else ""
-        cells = duration(one.makespan), duration(rest.makespan), f"{one.efficiency:.0%}", duration(one.tail)
-        table.add_row(f"{count:,}", *cells, style=style)
-    table.caption = "\n".join(_notes(tasks, facts, found[workers], last))
-    return table
-
-
-def _notes(tasks: Sequence[Task], facts: Facts, chosen: Schedule, last: int) -> list[str]:
-    """Return sentences about a schedule: straggler tail, where it stops scaling, and what was measured."""
-    chain = longest_chain(tasks, facts.seconds)
-    return [
-        f"{chosen.workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
+    schedules = {one.workers: one for one in doublings(tasks, facts.seconds)}
+    last = max(schedules)
+    chosen = schedules[workers] = schedule(tasks, facts.seconds, workers)
+    rows = []
+    for count, one in sorted(schedules.items()):
+        rest = duration(schedule(left, facts.seconds, count).makespan)
+        rows.append((f"{count:,}", duration(one.makespan), rest, f"{one.efficiency:.0%}", duration(one.tail)))
+    notes = (
+        f"{workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
         "workers (tail)",
         f"more than {max(1, last // 2):,} workers save less than {LEAST_GAIN:.0%} each time they double; the longest "
-        f"chain of tasks takes {duration(chain)}",
+        f"chain of tasks takes {duration(longest_chain(tasks, facts.seconds))}",
         f"{facts.measured:,} of {len(tasks):,} durations are measured, the others estimated",
-    ]
+    )
+    bold = {sorted(schedules).index(workers): "bold"}
+    print_table(("workers", "everything", "to do", "busy", "tail"), rows, caption="\n".join(notes), styles=bold)
 
 
 def _sums(tasks: Sequence[Task], facts: Facts) -> tuple[str, str, str]:
+    """Return the number of tasks, their rows, and their time on one core."""
     rows = sum(task.rows for task in tasks)
-    return (
-        f"{len(tasks):,}",
-        f"{rows:,}" if rows else "",
-        duration(sum(facts.seconds[task.id] for task in tasks)),
-    )
+    seconds = sum(facts.seconds[task.id] for task in tasks)
+    return f"{len(tasks):,}", f"{rows:,}" if rows else "", duration(seconds)

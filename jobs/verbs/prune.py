@@ -7,29 +7,36 @@ reports and the recipes of `twillight require`, are listed apart and kept.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
-from rich.table import Table
 
-from jobs.console import MOST_SENTENCES, size, table_of
 from jobs.plan.dataset import DATASETS, DataSet
 from jobs.plan.plan import plan
-from jobs.plan.task import Stage
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
-from jobs.terminal import Terminal
+from jobs.terminal import MOST_SENTENCES, print_lines, print_table, size
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
 
-FOLDERS: Final[dict[Stage, str]] = {"generate": DATASETS, "train": "models", "bench": "records", "report": "report"}
-"""Folder of the products of each stage."""
+_FOLDERS: Final = (DATASETS, "models", "records", "report", "ledger")
+"""Folders of the products of each stage, and of the receipts."""
 
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
+
+
+class _Content(NamedTuple):
+    """Bytes that are stored under one name or several."""
+
+    id: tuple[object, ...]
+    names: int
+    bytes: int
 
 
 def prune(
@@ -41,32 +48,23 @@ def prune(
 ) -> None:
     """List the files that no recipe needs, or remove them.
 
-    Raises
-    ------
-    BadInput
-        If no recipe is named, one cannot be used, or the folder holds no products.
-    WorkFailed
-        If a run is at work in the folder.
+    BadInput if no recipe is named, one cannot be used, or the folder holds no products; WorkFailed if a run is at work
+    in the folder.
     """
-    ledger, console = Ledger(out), Terminal()
+    ledger = Ledger(out)
     if not recipes:
         raise BadInput("prune", "recipes", [], "name every recipe whose products are to be kept")
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", "--out must name a folder with products of a run")
     with ledger.store.held():
-        needed = _needed(recipes, out, add)
-        stored = {} if is_local(out) else {path: one.bytes for path, one in listing(out).items()}
-        files = (path for path in out.rglob("*") if path.is_file() or path.is_symlink()) if is_local(out) else ()
-        every = set(stored) | {str(path.relative_to(out)) for path in files}
-        made = _made(ledger, every)
+        files = _files(out)
+        needed, made = _needed(recipes, add, out, files), _made(ledger, files)
         unneeded = sorted(made - needed)
-        kept = sorted(every - made - needed - {"ledger/lock"})
         if unneeded:
-            console.print(_table(unneeded, out, stored))
-        if kept:
-            names = ", ".join(kept[:MOST_SENTENCES])
+            _print_sizes({path: files[path] for path in unneeded})
+        if kept := sorted(files.keys() - made - needed - {"ledger/lock"}):
             more = f" and {len(kept) - MOST_SENTENCES:,} more" if len(kept) > MOST_SENTENCES else ""
-            console.print(f"kept, because no task made them: {names}{more}", soft_wrap=True)
+            print_lines(f"kept, because no task made them: {', '.join(kept[:MOST_SENTENCES])}{more}")
         if delete:
             _delete(unneeded, out)
     named = ", ".join(recipes)
@@ -76,10 +74,23 @@ def prune(
         said = f"{len(unneeded):,} files removed; {named} need the others"
     else:
         said = f"{len(unneeded):,} files are not needed by {named}; --delete removes them"
-    console.print(f"{out}: {said}", soft_wrap=True)
+    print_lines(f"{out}: {said}")
 
 
-def _needed(recipes: Sequence[str], out: Path, add: Sequence[str]) -> set[str]:
+def _files(out: Path) -> dict[str, _Content]:
+    """Return all files below a folder, by path relative to it."""
+    if not is_local(out):
+        return {path: _Content((path,), 1, stored.bytes) for path, stored in listing(out).items()}
+    files = {}
+    for path in out.rglob("*"):
+        if path.is_file() or path.is_symlink():
+            status = path.lstat()
+            content = _Content((status.st_dev, status.st_ino), status.st_nlink, status.st_size)
+            files[str(path.relative_to(out))] = content
+    return files
+
+
+def _needed(recipes: Sequence[str], add: Sequence[str], out: Path, every: Iterable[str]) -> set[str]:
     """Return the paths of all files that recipes need, receipts and notes of failures too."""
     needed = set[str]()
     for name in recipes:
@@ -89,13 +100,10 @@ def _needed(recipes: Sequence[str], out: Path, add: Sequence[str]) -> set[str]:
         ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in DataSet(one).shards}
         needed.update(f"ledger/{id}{ending}" for id in ids for ending in (".json", ".failed.json"))
         # What a stopped training goes on from.
-        folders = [task.folder for task in tasks if hasattr(task, "folder")] if is_local(out) else []
-        needed.update(
-            str(path.relative_to(out))
-            for folder in folders
-            for path in (out / folder).glob("*")
-            if is_leftover(path.name) and not path.name.startswith(".tmp-")
-        )
+        folders = {task.folder for task in tasks if hasattr(task, "folder")}
+        for path in map(Path, every):
+            if str(path.parent) in folders and is_leftover(path.name) and not path.name.startswith(".tmp-"):
+                needed.add(str(path))
     return needed
 
 
@@ -107,50 +115,32 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
     places = {place for receipt in ledger.receipts([]) for place in ledger.places(receipt)}
     for path in [place for place in places if place.endswith("/files.json")]:
         folder = Path(path).parent
-        try:
+        with suppress(BadInput):
             places.update(str(folder / name) for name in read_files(ledger.out / folder))
-        except BadInput:
-            continue
     made = set()
     for path in every:
         name, top = Path(path).name, Path(path).parts[0]
-        ours = path in places or _RECEIPT.fullmatch(path) or (top in FOLDERS.values() and is_leftover(name))
-        if not ours and top == DATASETS and name == FILE:
-            try:
-                ours = bool(Manifest.load((ledger.out / path).parent))
-            except BadInput:
-                ours = False
-        if ours or (top == "ledger" and is_leftover(name)):
+        if path in places or _RECEIPT.fullmatch(path) or (top in _FOLDERS and is_leftover(name)):
             made.add(path)
+        elif top == DATASETS and name == FILE:
+            with suppress(BadInput):
+                Manifest.load((ledger.out / path).parent)
+                made.add(path)
     return made
 
 
-def _table(paths: Sequence[str], out: Path, stored: Mapping[str, int]) -> Table:
-    """Show numbers and sizes of files by folder."""
-    table = table_of("folder", "files", "size", right=("files", "size"))
-    groups: dict[str, list[str]] = {}
-    for path in paths:
+def _print_sizes(files: Mapping[str, _Content]) -> None:
+    """Print by folder the numbers of files, and the bytes that removing them frees."""
+    folders: dict[str, list[_Content]] = {}
+    for path, content in files.items():
         parts = Path(path).parts
-        groups.setdefault("/".join(parts[:2]) if parts[0] == DATASETS else parts[0], []).append(path)
-    for folder, members in groups.items():
-        table.add_row(folder, f"{len(members):,}", size(_bytes(members, out, stored)))
-    table.add_row("all", f"{len(paths):,}", size(_bytes(paths, out, stored)))
-    return table
-
-
-def _bytes(paths: Iterable[str], out: Path, stored: Mapping[str, int]) -> int:
-    """Return the bytes that removing some files frees: a file with another name elsewhere frees none.
-
-    `stored` has the sizes of files in object storage, where each file has one name.
-    """
-    if not is_local(out):
-        return sum(stored[path] for path in paths)
-    found: dict[tuple[int, int], list[int]] = {}
-    for path in paths:
-        status = (out / path).lstat()
-        entry = found.setdefault((status.st_dev, status.st_ino), [0, status.st_nlink, status.st_size])
-        entry[0] += 1
-    return sum(bytes_ for names, links, bytes_ in found.values() if names == links)
+        folders.setdefault("/".join(parts[:2]) if parts[0] == DATASETS else parts[0], []).append(content)
+    rows = []
+    for folder, contents in (*folders.items(), ("all", list(files.values()))):
+        # A file with another name elsewhere frees none.
+        freed = sum(content.bytes for content, count in Counter(contents).items() if count == content.names)
+        rows.append((folder, f"{len(contents):,}", size(freed)))
+    print_table(("folder", "files", "size"), rows)
 
 
 def _delete(paths: Sequence[str], out: Path) -> None:

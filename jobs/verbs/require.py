@@ -7,18 +7,23 @@ the fabrics and the distribution of queries narrowed to the scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
 from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from jobs.verbs.compare import records_file
+from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, SceneName
+from jobs.verbs.records import records_file
 from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.requirement import Requirement
+from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.errors import nearest as nearest_name
 from weaves.fabric import Fabric
@@ -26,10 +31,7 @@ from weaves.reading import MOST_TEXT
 from weaves.validation import parse_toml
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from pipeline.scenes.requirement import Requirement
-    from pipeline.truth.query import Queries
+    from pipeline.scenes.scene import Scene
     from reports.options import SceneBenchOptions
 
 _SAMPLE = 2000  # queries for the time of the fallback
@@ -54,16 +56,14 @@ def require(
 ) -> None:
     """Print the requirements of a scene and the methods that meet a limit, and write the recipe of the chosen one.
 
-    Raises
-    ------
-    BadInput
-        If the scene cannot be used, the page has no errors by size, its best method is none of the recipe's, or no
-        method meets the limits. Then the sentence names the nearest points of the front.
+    BadInput if the scene cannot be used, the page has no errors by size, its best method is none of the recipe's, or no
+    method meets the limits. Then the sentence names the nearest points of the front.
     """
-    from jobs.terminal import Terminal
+    from reports.measure.by_size import EDGES, SIZES
     from reports.record import read_records
     from reports.tables.equal_time import size_table
     from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
+    from reports.tables.number_format import display
     from reports.tables.summary import rows, scene_table
 
     _refuse_limits(error=error, time=time, frames=frames, margin=margin, effort=effort)
@@ -71,24 +71,30 @@ def require(
     options = _options(set_)
     names = [model.options.name for model in general.models]
     if method and method not in names:
-        raise BadInput(
-            "require", "--method", method, f"{general.name} has no such method; {nearest_name(method, names)}"
-        )
+        allowed = f"{general.name} has no such method; {nearest_name(method, names)}"
+        raise BadInput("require", "--method", method, allowed)
     records = read_records([records_file(out, general.name)])
     sizes = size_table(records)
     if sizes.empty:
         raise BadInput(str(out), "recipe", recipe, "its page has no errors by size of footprint; run the recipe again")
-    queries_by_fabric, worn = _queries_of(scene, frames, general.bench.scenes)
-    fabrics = {name: fabric for name, (_, fabric) in worn.items()}
-    requirement = _requirement(scene, queries_by_fabric, frames, margin)
-    found = {one.options.name: _fallback_share(one, queries_by_fabric, fabrics, general) for one in general.models}
-    fallback = _fallback_cost(queries_by_fabric, fabrics)
-    shares = {name: share for name, share in found.items() if share is not None}
+    described = load_scene(scene)
+    queries_by_fabric, worn = _queries_of(described, frames, general.bench.scenes)
+    requirement = Requirement.of(described.name, frames, queries_by_fabric, EDGES[:-1], SIZES, margin)
+    by_fabric = [(worn[name][1], queries) for name, queries in queries_by_fabric.items()]
+    every_share = {model.options.name: _fallback_share(model, by_fabric, general) for model in general.models}
+    shares = {name: share for name, share in every_share.items() if share is not None}
+    fallback = _fallback_cost(by_fabric)
     table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
     table = with_measured(table, scene_table(records), requirement.scene)
-    console = Terminal()
-    console.print(_requirement_table(requirement), "")
-    console.print(_choice_table(rows(table)), "")
+    _print_requirement(requirement)
+    cells, front = [], dict[int, str]()
+    for index, row in enumerate(rows(table)):
+        of_truth = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"
+        name = display(row.method, row.setting)
+        cells.append((name, of_truth, f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known))
+        front |= {index: "bold"} if row.front else {}
+    print_table(("method", "error", "ms per frame", "fallback share", ""), cells, text=("",), styles=front)
+    print_lines("")
     if method and (table := of_method(table, method)).empty:
         allowed = "it was not measured on footprints of these sizes, or does not cover the fabrics of the scene"
         raise BadInput("require", "--method", method, allowed)
@@ -108,8 +114,7 @@ def require(
     write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options, add)
     name = f"{chosen.method} {chosen.setting}".strip()
     cost = f"{100 * chosen.error:.2g} % in {chosen.ms:.3g} ms per frame ({chosen.known})"
-    summary = f"{name}: {cost}. {savings(path, general, add)}"
-    console.print(summary, f"recipe: {path}", sep="\n", soft_wrap=True)
+    print_lines(f"{name}: {cost}. {savings(path, general, add)}", f"recipe: {path}")
 
 
 def _refuse_limits(**limits: float) -> None:
@@ -121,37 +126,21 @@ def _refuse_limits(**limits: float) -> None:
 
 
 def _queries_of(
-    scene: str, frames: int, options: SceneBenchOptions
+    scene: Scene, frames: int, options: SceneBenchOptions
 ) -> tuple[dict[str, Queries], dict[str, tuple[str, Fabric]]]:
     """Return the queries of some frames on each fabric, and each fabric with its reference (name or path), by name."""
-    import numpy as np
-
-    from pipeline.scenes.catalogue import load_scene
     from pipeline.scenes.frame import render
     from pipeline.scenes.loading import load
-    from pipeline.truth.query import Queries
 
-    described = load_scene(scene)
-    loaded = load(described, options.options)
-    found: dict[str, list[Queries]] = {}
+    loaded = load(scene, options.options)
+    parts: dict[str, list[Queries]] = {}
     fabrics = {}
-    for index in np.linspace(0, max(described.frames - 1, 0), frames):
+    for index in np.linspace(0, max(scene.frames - 1, 0), frames):
         for key, gbuffer in render(loaded, float(index), options.size).gbuffers.items():
             cloth, fabric = loaded.cloths[key]
             fabrics[fabric.name] = (cloth.fabric or key, fabric)
-            found.setdefault(fabric.name, []).append(gbuffer.queries(fabric.repeat))
-    return {
-        name: Queries(*(np.concatenate([getattr(part, column) for part in parts]) for column in Queries._fields))
-        for name, parts in found.items()
-    }, fabrics
-
-
-def _requirement(scene: str, queries_by_fabric: Mapping[str, Queries], frames: int, margin: float) -> Requirement:
-    from pipeline.scenes.catalogue import load_scene
-    from pipeline.scenes.requirement import Requirement
-    from reports.measure.by_size import EDGES, SIZES
-
-    return Requirement.of(load_scene(scene).name, frames, queries_by_fabric, EDGES[:-1], SIZES, margin)
+            parts.setdefault(fabric.name, []).append(gbuffer.queries(fabric.repeat))
+    return {name: Queries(*map(np.concatenate, zip(*of, strict=True))) for name, of in parts.items()}, fabrics
 
 
 def _options(changes: Iterable[str]) -> dict[str, Any]:
@@ -165,40 +154,37 @@ def _options(changes: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-def _fallback_share(
-    model: ModelRecipe, queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric], general: Recipe
-) -> float | None:
+def _fallback_share(model: ModelRecipe, by_fabric: Iterable[tuple[Fabric, Queries]], general: Recipe) -> float | None:
     """Return the fallback share of a model; None if it does not cover the fabrics."""
     trainer = general.trainer_of(model)
-    if model.of_one_material and not set(fabrics) <= {fabric.name for fabric in trainer.seen + trainer.unseen}:
+    known = {fabric.name for fabric in trainer.seen + trainer.unseen}
+    if model.of_one_material and not known.issuperset(fabric.name for fabric, _ in by_fabric):
         return None
-    return fallback_share(model, general, [(fabrics[name], queries) for name, queries in queries_by_fabric.items()])
+    return fallback_share(model, general, by_fabric)
 
 
-def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[str, Fabric]) -> tuple[float, float]:
+def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, float]:
     """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query.
 
     Measured on queries with light or viewer behind, if the scene has any: those fall back most often.
     """
-    import numpy as np
-
     from pipeline.models.fallback import fallback_answers
     from pipeline.truth.estimator import estimate
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
 
-    behind = any(queries.behind.any() for queries in queries_by_fabric.values())
+    behind = any(queries.behind.any() for _, queries in by_fabric)
     differences, colours, seconds, count = [], [], 0.0, 0
-    for name, queries in queries_by_fabric.items():
+    for fabric, queries in by_fabric:
         rows = np.flatnonzero(queries.behind) if behind else np.arange(len(queries.u))
-        rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(queries_by_fabric)]
+        rows = np.random.default_rng(0).permutation(rows)[: _SAMPLE // len(by_fabric)]
         if not rows.size:
             continue
-        fallback_answers(fabrics[name], queries.take(rows[:2]), 0)  # builds the tables
+        fallback_answers(fabric, queries.take(rows[:2]), 0)  # builds the tables
         start = perf_counter()
-        answers = fallback_answers(fabrics[name], queries.take(rows), 0)
+        answers = fallback_answers(fabric, queries.take(rows), 0)
         seconds, count = seconds + perf_counter() - start, count + rows.size
-        truth = estimate(fabrics[name], queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
+        truth = estimate(fabric, queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
         colour = truth @ COLOUR_WEIGHTS
         differences.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
         colours.append(colour)
@@ -206,51 +192,23 @@ def _fallback_cost(queries_by_fabric: Mapping[str, Queries], fabrics: Mapping[st
     return error / max(mean, 1e-9), 1e9 * seconds / count
 
 
-def _requirement_table(requirement: Requirement) -> Table:
-    """Return the requirements of a scene as a table."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
-    fabrics = ", ".join(f"{name} {100 * share:.0f} %" for name, share in requirement.fabrics.items())
-    sizes = ", ".join(f"{name} {100 * share:.0f} %" for name, share in requirement.sizes.items() if share > 0)
-    curved = (
-        "none"
-        if not requirement.curved
-        else (
-            f"{100 * requirement.curved:.0f} %, {requirement.curvature[0]:.2g} to {requirement.curvature[1]:.2g} a yarn"
-        )
-    )
-    for name, text in (
-        (
-            "scene",
-            f"{requirement.scene}, {requirement.queries_per_frame:,} queries per frame",
-        ),
-        ("fabrics", fabrics),
-        (
-            "footprints",
-            f"{requirement.sigma[0]:.2g} to {requirement.sigma[1]:.3g} yarns, axes up to {requirement.stretch:.2g} : 1",
-        ),
-        ("their sizes", sizes),
-        ("angles", f"light up to {requirement.angle[0]:.1f}°, viewer up to {requirement.angle[1]:.1f}°"),
+def _print_requirement(of: Requirement) -> None:
+    """Print the requirements of a scene."""
+    low, high = of.curvature
+    curved = f"{100 * of.curved:.0f} %, {low:.2g} to {high:.2g} a yarn" if of.curved else "none"
+    rows = (
+        ("fabrics", _shares(of.fabrics)),
+        ("footprints", f"{of.sigma[0]:.2g} to {of.sigma[1]:.3g} yarns, axes up to {of.stretch:.2g} : 1"),
+        ("their sizes", _shares({name: share for name, share in of.sizes.items() if share > 0})),
+        ("angles", f"light up to {of.angle[0]:.1f}°, viewer up to {of.angle[1]:.1f}°"),
         ("curved cloth", curved),
-        ("light from behind", f"{100 * requirement.behind:.1f} %"),
-        ("back of the cloth", f"{100 * requirement.viewer_behind:.1f} %"),
-    ):
-        table.add_row(name, text)
-    return table
+        ("light from behind", f"{100 * of.behind:.1f} %"),
+        ("back of the cloth", f"{100 * of.viewer_behind:.1f} %"),
+    )
+    heading = f"{of.scene}, {of.queries_per_frame:,} queries per frame"
+    print_table(("scene", heading), rows, text=(heading,))
+    print_lines("")
 
 
-def _choice_table(found: Iterable[Any]) -> Table:
-    """Return the methods as a table, the fastest first; those on the front are bold."""
-    from rich.table import Table
-
-    from reports.tables.number_format import display
-
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
-    for name in ("method", "error", "ms per frame", "fallback share", ""):
-        table.add_column(name, justify="left" if name in ("method", "") else "right")
-    for row in found:
-        error = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"
-        cells = [error, f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known]
-        table.add_row(display(row.method, row.setting), *cells, style="bold" if row.front else "")
-    return table
+def _shares(of: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in of.items())

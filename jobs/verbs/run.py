@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from rich.table import Table
-
-from jobs.console import duration, number, table_of
 from jobs.plan.dataset import DataSet
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
@@ -19,7 +15,7 @@ from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.receipt import Product
-from jobs.terminal import Terminal
+from jobs.terminal import duration, number, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, WorkerFlags
 from weaves.errors import WorkFailed
 
@@ -52,23 +48,19 @@ def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) 
 def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
     """Run the unfinished tasks of some stages of a recipe and print a summary; `add`: methods from outside.
 
-    Raises
-    ------
-    BadInput
-        If the recipe, the folder or the scheduler cannot be used.
-    WorkFailed
-        If any task failed; the others were done nevertheless.
+    BadInput if the recipe, the folder or the scheduler cannot be used; WorkFailed if any task failed, when the others
+    are done.
     """
     recipe = load_recipe(recipe_name, add)
     tasks = plan(recipe)
-    console = Terminal()
+    page = next(task for task in tasks if isinstance(task, Page))
     ledger = Ledger(out)
     with ledger.store.held():
         manifests = [ManifestFile(DataSet(one), ledger) for one in recipe.together]
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
         if "bench" in stages:
-            _withdraw_page(tasks, ledger)
+            _withdraw(page, tasks, ledger)
 
         def recorded(task: Task, files: Mapping[str, Product]) -> None:
             for manifest in manifests:
@@ -91,14 +83,13 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
         )
     chosen = [task for task in tasks if task.stage in stages]
     if not summary.ran and not summary.failed:
-        console.print(f"nothing to do: {len(chosen)} tasks done")
+        print_lines(f"nothing to do: {len(chosen)} tasks done")
     else:
-        console.print(summary_table(chosen, {task.id: ledger.seconds(task) for task in summary.ran}))
-    page = next(task for task in tasks if isinstance(task, Page))
+        _print_work(chosen, {task.id: ledger.seconds(task) for task in summary.ran})
     if "report" in stages and ledger.state(page) == "done":
-        console.print()
-        console.print(methods_table(summary_of([out / path for path in page.records])))
-        console.print(f"\nthe page: {(out / page.products[0]).resolve()}", soft_wrap=True)
+        print_lines("")
+        print_methods([out / path for path in page.records])
+        print_lines("", f"the page: {(out / page.products[0]).resolve()}")
     if summary.failed:
         first, *others = summary.failed
         flags = "".join(f" --add {one}" for one in add)
@@ -109,43 +100,35 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
         )
 
 
-def _withdraw_page(tasks: Sequence[Task], ledger: Ledger) -> None:
+def _withdraw(page: Page, tasks: Sequence[Task], ledger: Ledger) -> None:
     """Remove a finished page if times that it shows will be measured again: they will not be the same."""
-    page = next(task for task in tasks if isinstance(task, Page))
     timed = [task for task in tasks if task.slots == "all" and task.id in page.needs]
     if ledger.state(page) == "done" and any(ledger.state(task) != "done" for task in timed):
         ledger.store.remove(page.products[0])
 
 
-def summary_of(records: Sequence[Path]) -> Any:
-    """Return the benchmark's summary, one row a method, from the files of its records."""
-    from reports.record import read_records
-    from reports.tables.summary import summary_table as condensed
-
-    return condensed(read_records(records))
-
-
-def summary_table(tasks: Sequence[Task], ran: Mapping[str, float]) -> Table:
-    """Show the tasks of a run by stage, how many of them it did, and the seconds of work in them."""
-    table = table_of("stage", "tasks", "done now", "work", right=("tasks", "done now", "work"))
-    stages: list[Stage] = [stage for stage in STAGES if any(task.stage == stage for task in tasks)]
-    for stage in stages:
-        ids = [task.id for task in tasks if task.stage == stage]
-        now = [ran[key] for key in ids if key in ran]
-        table.add_row(stage, str(len(ids)), str(len(now)), duration(sum(now)) if now else "")
-    return table
+def _print_work(tasks: Sequence[Task], ran: Mapping[str, float]) -> None:
+    """Print the tasks of a run by stage, how many of them it did, and the seconds of work in them."""
+    rows = []
+    for stage in STAGES:
+        if ids := [task.id for task in tasks if task.stage == stage]:
+            now = [ran[key] for key in ids if key in ran]
+            rows.append((stage, len(ids), len(now), duration(sum(now)) if now else ""))
+    print_table(("stage", "tasks", "done now", "work"), rows)
 
 
-def methods_table(frame: Any) -> Table:
-    """Show a benchmark condensed to one row a method (a DataFrame from `reports.tables.summary.summary_table`).
+def print_methods(records: Sequence[Path]) -> None:
+    """Print a benchmark condensed to one row a method, from the files of its Records.
 
     Bytes are left to the page, so that a line fits a terminal of 80 columns.
     """
+    from reports.record import read_records
+    from reports.tables.number_format import NO_BREAK
+    from reports.tables.summary import summary_table
+
+    frame = summary_table(read_records(records))
     frame = frame.drop(columns="bytes", errors="ignore").rename(columns={"ns/query": "ns a query"})
-    names = list(frame.columns)
-    table = table_of("method", *names, right=names)
-    table.columns[0].no_wrap = True
-    table.padding = (0, 1, 0, 0)
+    rows = []
     for (method, setting), *values in frame.itertuples():
-        table.add_row(f"{method} {setting}".strip(), *(number(value) for value in values))
-    return table
+        rows.append((f"{method} {setting}".strip().replace(" ", NO_BREAK), *map(number, values)))
+    print_table(("method", *frame.columns), rows, gap=1)

@@ -28,15 +28,16 @@ from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.run.ledger import Ledger
+from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from jobs.verbs.require_recipe import alone
+from pipeline.atomic import atomic_write
 from pipeline.models.card import read_card
 from pipeline.models.options import setting_of
+from pipeline.scenes.catalogue import load_scene
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from reports.record import Record
 
 ENOUGH: Final = 3.0
@@ -45,10 +46,8 @@ ENOUGH: Final = 3.0
 MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
 """Records of a method on a scene that are held side by side."""
 
-
 DIFFERENCE: Final = "mse, own less general"
 """Quantity that pairs both pictures, pixel by pixel (`reports.measure.block_bootstrap`)."""
-
 
 _WIDTH: Final = 110  # columns that a table with its intervals takes
 
@@ -87,29 +86,17 @@ def savings(
 ) -> None:
     """Print the savings of scenes' own recipes, and write them to ``report/savings.csv``.
 
-    Raises
-    ------
-    BadInput
-        If a recipe is not there, has not run, or did not measure the scene.
+    BadInput if a recipe is not there, has not run, or did not measure the scene.
     """
-    from jobs.terminal import Terminal
-    from pipeline.atomic import atomic_write
-    from pipeline.scenes.catalogue import load_scene
-
     general = load_recipe(recipe, add)
-    found = {
-        name: saved(name, out, general, recipe, add)
-        for name in dict.fromkeys(load_scene(scene).name for scene in scenes)
-    }
-    console = Terminal()
-    console.width = max(console.width, _WIDTH)
-    for rows in found.values():
-        console.print(_table(rows), "")
-    for rows in found.values():
-        console.print(conclusion(rows), soft_wrap=True)
+    names = dict.fromkeys(load_scene(scene).name for scene in scenes)
+    by_scene = [saved(name, out, general, recipe, add) for name in names]
+    for rows in by_scene:
+        _print(rows)
+    print_lines(*map(conclusion, by_scene))
     path = out / "report" / "savings.csv"
-    atomic_write(path, _csv([row for rows in found.values() for row in rows]).encode())
-    console.print(f"the numbers: {path}", soft_wrap=True)
+    atomic_write(path, _csv([row for rows in by_scene for row in rows]).encode())
+    print_lines(f"the numbers: {path}")
 
 
 def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[str] = ()) -> list[SceneSaving]:
@@ -120,14 +107,15 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[s
     own = load_recipe(path, add)
     model = own.models[0]
     name, worn = model.options.name, {fabric.name for fabric in own.seen}
-    if name not in {one.options.name for one in general.models}:
+    same = next((one for one in general.models if one.options.name == name), None)
+    if same is None:
         raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
-    same = next(one for one in general.models if one.options.name == name)
     sides = []
     for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
         costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
         sides.append(costs | _measured(out, whole.name, scene, model, called))
-    _refuse_old_page(own, out, str(path))
+    if Ledger(out).state(plan(own)[-1]) != "done":
+        raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {path}`")
     theirs, ours = sides
     found = [SceneSaving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
     found += _difference(scene, out, (general, own), model)
@@ -173,13 +161,6 @@ def _costs(
         ("training", "s"): Value(sum(ledger.seconds(task) for task in trainings)),
         ("weights", "bytes"): Value(weights),
     }
-
-
-def _refuse_old_page(own: Recipe, out: Path, run: str) -> None:
-    """Refuse a page that a scene's recipe wrote before it was written anew."""
-    page = plan(own)[-1]
-    if Ledger(out).state(page) != "done":
-        raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {run}`")
 
 
 def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:
@@ -255,18 +236,16 @@ def _value(record: Record) -> Value:
     return Value(record.value, record.low, record.high)
 
 
-def _table(rows: Sequence[SceneSaving]) -> Table:
-    """Show a scene's quantities by both recipes."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
-    for name in (f"{rows[0].scene}, {rows[0].method}", "general", "own", "times less"):
-        table.add_column(name, justify="left" if name.startswith(rows[0].scene) else "right")
+def _print(rows: Sequence[SceneSaving]) -> None:
+    """Print a scene's quantities by both recipes."""
+    cells = []
     for row in rows:
         unit = "" if row.unit == "1" else f", {row.unit}"
         ratio = "–" if math.isnan(row.ratio) else f"{row.ratio:.3g}"
-        table.add_row(f"{row.quantity}{unit}", _shown(row.general), _shown(row.narrow), ratio)
-    return table
+        cells.append((f"{row.quantity}{unit}", _shown(row.general), _shown(row.narrow), ratio))
+    columns = (f"{rows[0].scene}, {rows[0].method}", "general", "own", "times less")
+    print_table(columns, cells, least_width=_WIDTH)
+    print_lines("")
 
 
 def _shown(value: Value) -> str:
@@ -278,15 +257,7 @@ def _csv(rows: Sequence[SceneSaving]) -> str:
     """Return all rows as CSV, RFC 4180."""
     text = io.StringIO()
     writer = csv.writer(text)
-    writer.writerow(("scene", "method", "quantity", "unit", *_columns("general"), *_columns("own"), "ratio"))
-    for row in rows:
-        writer.writerow((*row[:4], *_cells(row.general), *_cells(row.narrow), row.ratio))
+    values = [f"{name}{end}" for name in ("general", "own") for end in ("", "_low", "_high")]
+    writer.writerow(("scene", "method", "quantity", "unit", *values, "ratio"))
+    writer.writerows((*row[:4], *row.general, *row.narrow, row.ratio) for row in rows)
     return text.getvalue()
-
-
-def _columns(name: str) -> Iterator[str]:
-    yield from (name, f"{name}_low", f"{name}_high")
-
-
-def _cells(value: Value) -> tuple[object, ...]:
-    return tuple("" if number is None else number for number in value)

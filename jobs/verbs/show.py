@@ -5,16 +5,14 @@ Pictures are a lit swatch, the drawdown (also in colours), height and normals as
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Group, RenderableType
-from rich.text import Text
 
-from jobs.console import table_of
-from jobs.terminal import Terminal
+from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import FabricName, Local
 from pipeline.atomic import atomic_write
 from pipeline.scenes.catalogue import load_scene
@@ -48,11 +46,10 @@ def show(
     ] = None,
 ) -> None:
     """Print a fabric, and write its pictures if a folder is given."""
-    cloth, console = load_fabric(fabric), Terminal()
-    console.print(fabric_page(cloth))
+    cloth = load_fabric(fabric)
+    _print_fabric(cloth)
     if out is not None:
-        console.print(*write_pictures(cloth, out), sep="\n", soft_wrap=True)
-        console.print(write_swatch(fabric, cloth, out), soft_wrap=True)
+        print_lines(*write_pictures(cloth, out), write_swatch(fabric, cloth, out))
 
 
 def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
@@ -79,8 +76,7 @@ def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
 
 def write_swatch(name: str, fabric: Fabric, folder: Path) -> Path:
     """Write a picture of a lit swatch, the scene ``swatch`` with at least one and a half repeats; return its path."""
-    from jobs.verbs.render.look import look
-    from jobs.verbs.render.render import dressed, make
+    from jobs.verbs.render import dressed, look, make
 
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
     yarns = min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS)
@@ -92,35 +88,28 @@ def write_swatch(name: str, fabric: Fabric, folder: Path) -> Path:
     return path
 
 
-def fabric_page(fabric: Fabric) -> RenderableType:
-    """Show a fabric: the drawdown and the numbers of its yarns."""
+def _print_fabric(fabric: Fabric) -> None:
+    """Print the drawdown of a fabric, and the numbers of its yarns."""
     ends, picks = fabric.weave.repeat
-    table = table_of("yarn", "warp", "weft", "unit")
+    print_lines(f"{fabric.name}: {fabric.weave.name}, {ends} ends × {picks} picks (██ warp over, last pick first)", "")
+    print_lines(fabric.weave.text(), "")
+    rows = []
     for name in Yarn.model_fields:
         warp, weft = (_value(getattr(yarn, name)) for yarn in (fabric.warp, fabric.weft))
-        table.add_row(name, warp, weft, _UNITS.get(name, ""))
-    heading = f"{fabric.name}: {fabric.weave.name}, {ends} ends × {picks} picks (██ warp over, last pick first)"
-    return Group(
-        Text(heading),
-        Text(""),
-        Text(fabric.weave.text()),
-        Text(""),
-        table,
-        *([Text(_colours(fabric.colours))] if fabric.colours else []),
-        Text(f"optical thickness {fabric.optical_thickness:g}"),
-        Text(fabric.source),
-    )
+        rows.append((name, warp, weft, _UNITS.get(name, "")))
+    print_table(("yarn", "warp", "weft", "unit"), rows, text=("warp", "weft", "unit"))
+    if fabric.colours:
+        print_lines(*_colours(fabric.colours))
+    print_lines(f"optical thickness {fabric.optical_thickness:g}", fabric.source)
 
 
-def _colours(order: ColourOrder) -> str:
-    """Return the runs of both sequences; of many, the first."""
-    lines = []
+def _colours(order: ColourOrder) -> Iterator[str]:
+    """Yield the runs of both sequences; of many, the first."""
     for axis, runs in (("ends", order.ends), ("picks", order.picks)):
         shown = ", ".join(f"{count} {name}" for name, count in runs[:_RUNS])
         more = f", and {len(runs) - _RUNS} more runs" if len(runs) > _RUNS else ""
         threads = len(order.threads(axis))
-        lines.append(f"{axis}: {shown}{more}; repeats after {threads}" if runs else f"{axis}: all of one colour")
-    return "\n".join(lines)
+        yield f"{axis}: {shown}{more}; repeats after {threads}" if runs else f"{axis}: all of one colour"
 
 
 def _value(value: object) -> str:

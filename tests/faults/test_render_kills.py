@@ -12,14 +12,14 @@ pytestmark = pytest.mark.faults
 
 KILLED = """
 import os, signal, sys
-import reports.images.tiles, jobs.verbs.render.film_maker as film_maker
+import reports.images.tiles, jobs.verbs.render as verb
 shown, left = reports.images.tiles.displayed, [int(sys.argv[1])]
 def displayed(*given):
     if not left[0]:
         os.kill(os.getpid(), signal.SIGKILL)
     left[0] -= 1
     return shown(*given)
-film_maker.displayed = displayed
+verb.displayed = displayed
 from jobs.cli import main
 sys.exit(main(sys.argv[2:]))
 """

@@ -26,7 +26,6 @@ from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import measure
 from jobs.verbs.plan import facts_of
-from jobs.verbs.status import status_table
 from pipeline.storage import place
 from tests.jobs.s3_server import serving
 
@@ -77,8 +76,8 @@ def main() -> None:
             assert len(summary.before) == len(tasks)
 
         looks: dict[str, Callable[[], object]] = {
-            "status, first": lambda: status_table(tasks, Ledger(out)),
-            "status": lambda: status_table(tasks, Ledger(out)),
+            "status, first": lambda: list(map(Ledger(out).state, tasks)),
+            "status": lambda: list(map(Ledger(out).state, tasks)),
             "plan": lambda: facts_of(tasks, Ledger(out)),
             "resume": resume,
         }

@@ -1,30 +1,30 @@
-"""Card of a published data set (`README.md`) with the header that data hubs read, `load.py` and `CITATION.cff`."""
+"""Card of a published data set (`README.md`) with the header that data hubs read, its licence, and `CITATION.cff`."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, Final
 
 import yaml
+from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from jobs.verbs.publish.contents import POPULATIONS, About
-from jobs.verbs.publish.licence import hub_licence, licence_url
 from pipeline.shards.joined import columns_joined
+from weaves.errors import BadInput, nearest
 
-LOADER: Final = '''"""Rows as a pandas frame: load("seen", "test", "denim"), or: python load.py seen test denim"""
-import sys
-from pathlib import Path
+LOADER: Final = Path(__file__).with_name("load.py.txt")
+_TEMPLATE: Final = Path(__file__).with_name("card.md")
 
-import pandas as pd
-
-def load(role, split, *fabrics):
-    files = sorted((Path(__file__).parent / "data" / role).glob(f"{split}-*.parquet"))
-    rows = pd.concat([pd.read_parquet(file) for file in files], ignore_index=True)
-    return rows[rows["fabric"].isin(fabrics)] if fabrics else rows
-
-if __name__ == "__main__":
-    print(load(*sys.argv[1:]).describe().T)
-'''
+_OF_HUBS: Final = {
+    **dict.fromkeys(("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0", "CC-BY-NC-4.0", "CC-BY-NC-SA-4.0", "MIT", "Apache-2.0")),
+    "ODbL-1.0": "odbl",
+    "ODC-By-1.0": "odc-by",
+    "PDDL-1.0": "pddl",
+}
+"""Common licences of data, with the hubs' name if it is not the identifier in small letters."""
 
 _ROLES: Final = {
     "seen": "named fabrics, for training and measurements",
@@ -33,67 +33,51 @@ _ROLES: Final = {
     "unseen_population": "random fabrics that no model is trained on",
 }
 
-_SIZES: Final = ((10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"))
-_LARGER: Final = ((10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"))
+_BOUNDS: Final = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
+_SIZES: Final = ("n<1K", *(f"{low}<n<{high}" for low, high in pairwise(_BOUNDS)))
+"""The hubs' classes of size: below a thousand rows, then a class for each digit more."""
 
-_TEXT: Final = """
-# {title}
 
-{summary}
+def licence_id(given: str | None) -> str:
+    """Return an SPDX identifier as it is written; BadInput if none is given, or there is no such licence."""
+    if not given:
+        allowed = "an SPDX identifier such as CC-BY-4.0 is needed: without a licence nobody may use the data"
+        raise BadInput("publish", "--licence", given, allowed)
+    try:
+        if not re.fullmatch(r"[A-Za-z0-9.-]{1,60}", given) or given.lower().startswith("licenseref-"):
+            raise InvalidLicenseExpression(given)
+        return str(canonicalize_license_expression(given))
+    except InvalidLicenseExpression as error:
+        allowed = f"the SPDX identifier of one licence is needed; {nearest(given, _OF_HUBS)}"
+        raise BadInput("publish", "--licence", given, allowed) from error
 
-It was computed by Twillight, version {truth_version} of its ground truth. It is a model of cloth, not a measurement of one. `recipe.toml` generates it again, from the fabrics in `fabrics/`.
 
-## Files
+def licence_url(licence: str) -> str:
+    """Return the address of a licence's text."""
+    return f"https://spdx.org/licenses/{licence}.html"
 
-{files}
 
-`manifest.json` lists every file with its SHA-256, its rows and its fabrics. {fabrics}
-
-## Reading
-
-`load.py` is a loader for pandas. Any reader of Parquet does as well:
-
-```sql
-SELECT fabric, avg(diffuse_warp) FROM 'data/*/test-*.parquet' GROUP BY fabric;  -- DuckDB
-```
-
-`croissant.json` describes files and columns for tools that load data sets.
-
-## Columns
-
-Directions are unit vectors in the frame of the cloth: weft yarns along x, warp yarns along y, z up. `wi` points to the light, `wo` to the viewer. Components have unit colour and include the incident cosine. The BSDF in RGB is their sum, each times a colour of `fabrics/`: `specular` or `diffuse` of the warp or the weft, and `diffuse_transmission` where light and viewer are on different sides (`wi_z` and `wo_z` of different sign). There, three numbers are linear RGB, and `#rrggbb` is sRGB.
-
-{columns}
-
-## Accuracy
-
-Options of the ground truth:
-
-{options}
-
-The standard error of a row is calibrated: over many rows, it is the root mean square of the true errors. 99.7 % of the errors are below the bound.
-
-## Licence and citation
-
-Licence: [{licence}]({url}). `CITATION.cff` says how to cite the data set; its version is {version}, its fingerprint `{fingerprint}`.
-"""  # noqa: E501, a paragraph is a line
+def _hub_licence(licence: str) -> dict[str, str]:
+    """Return the keys of a data set card that state the licence."""
+    if licence in _OF_HUBS:
+        return {"license": _OF_HUBS[licence] or licence.lower()}
+    return {"license": "other", "license_name": licence.lower(), "license_link": licence_url(licence)}
 
 
 def card(about: About) -> str:
     """Return the text of the card."""
     manifest = about.manifest
     files = [("role", "split", "fabrics", "rows", "files", "meaning of the role")]
-    for role, splits in about.configs.items():
-        for split in splits:
-            parts = [part for part in about.parts if (part.role, part.split) == (role, split)]
-            fabrics = sum(len(part.fabrics) for part in parts)
-            rows = sum(part.rows for part in parts)
-            place = f"`data/{role}/{split}-*.parquet`"
-            files.append((role, split, f"{fabrics:,}", f"{rows:,}", place, _ROLES[role]))
+    for role, split in about.sets:
+        parts = [part for part in about.parts if (part.role, part.split) == (role, split)]
+        fabrics = sum(len(part.fabrics) for part in parts)
+        rows = sum(part.rows for part in parts)
+        place = f"`data/{role}/{split}-*.parquet`"
+        files.append((role, split, f"{fabrics:,}", f"{rows:,}", place, _ROLES[role]))
     named = ", ".join(f"`{name}`" for name in manifest.names("seen", "unseen"))
     populations = [(role, len(manifest.names(role))) for role in POPULATIONS]
     random = "".join(f"; `{role}.toml` has {count:,} random ones" for role, count in populations if count)
-    text = _TEXT.format(
+    text = _TEMPLATE.read_text(encoding="utf-8").format(
         title=about.title,
         summary=about.summary,
         truth_version=about.truth_version,
@@ -111,21 +95,18 @@ def card(about: About) -> str:
 
 def _header(about: About) -> dict[str, Any]:
     """Return what data hubs read."""
-    size = next((name for most, name in (*_SIZES, *_LARGER) if about.rows < most), "n>1T")
-    configs: list[dict[str, Any]] = [
-        {
-            "config_name": role,
-            "data_files": [{"split": split, "path": f"data/{role}/{split}-*.parquet"} for split in splits],
-        }
-        for role, splits in about.configs.items()
-    ]
-    configs[0]["default"] = True
+    size = _SIZES[max(0, len(str(about.rows)) - 3)]
+    configs: dict[str, dict[str, Any]] = {}
+    for role, split in about.sets:
+        config = configs.setdefault(role, {"config_name": role, "data_files": []})
+        config["data_files"].append({"split": split, "path": f"data/{role}/{split}-*.parquet"})
+    next(iter(configs.values()))["default"] = True
     return {
         "pretty_name": about.title,
-        **hub_licence(about.licence),
+        **_hub_licence(about.licence),
         "size_categories": [size],
         "tags": ["rendering", "appearance", "bsdf", "woven-cloth", "tabular"],
-        "configs": configs,
+        "configs": list(configs.values()),
     }
 
 

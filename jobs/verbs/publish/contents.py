@@ -6,7 +6,6 @@ a file if there are many.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from pipeline.shards.manifest import Manifest, Role, ShardEntry
@@ -21,25 +20,16 @@ SPLITS: Final = ("train", "validation", "test")
 
 
 class PublishedPart(NamedTuple):
-    """A file of rows.
-
-    Attributes
-    ----------
-    file : str
-        Path within the folder.
-    role, split : str
-        Role of its fabrics, and split of its rows.
-    fabrics : tuple of str
-        Names of its fabrics, in the order of their rows.
-    shards : tuple of ShardEntry
-        Its shards, in the order of their rows.
-    """
+    """A file of rows of one role and one split."""
 
     file: str
+    """Path within the folder."""
     role: Role
     split: str
     fabrics: tuple[str, ...]
+    """Names of its fabrics, in the order of their rows."""
     shards: tuple[ShardEntry, ...]
+    """Its shards, in the order of their rows."""
 
     @property
     def rows(self) -> int:
@@ -62,47 +52,31 @@ def parts_of(manifest: Manifest) -> list[PublishedPart]:
     shards: dict[tuple[str, str], list[ShardEntry]] = {}
     for shard in sorted(own_shards(manifest), key=lambda shard: shard.start):
         shards.setdefault((shard.fabric, shard.split), []).append(shard)
-    found = []
+    parts = []
     for role in ROLES:
         for split in SPLITS:
             names = [name for name in manifest.names(role) if (name, split) in shards]
             files = min(len(names), max(1, MOST_FILES * len(names) // len(shards)))
-            for number, group in enumerate(_cut(names, files)):
-                parts = tuple(shard for name in group for shard in shards[name, split])
-                found.append(
-                    PublishedPart(f"data/{role}/{split}-{number:02}.parquet", role, split, tuple(group), parts)
-                )
-    return found
-
-
-def _cut(names: list[str], groups: int) -> Iterator[list[str]]:
-    """Yield names in groups of almost equal number."""
-    for group in range(groups):
-        yield names[len(names) * group // groups : len(names) * (group + 1) // groups]
+            for number in range(files):
+                group = names[len(names) * number // files : len(names) * (number + 1) // files]
+                rows = tuple(shard for name in group for shard in shards[name, split])
+                file = f"data/{role}/{split}-{number:02}.parquet"
+                parts.append(PublishedPart(file, role, split, tuple(group), rows))
+    return parts
 
 
 class About(NamedTuple):
-    """Facts of a published data set.
-
-    Attributes
-    ----------
-    manifest : Manifest
-        Its fabrics, roles and options.
-    parts : list of PublishedPart
-        Its files of rows.
-    licence : str
-        SPDX identifier.
-    authors : tuple of str
-        Names.
-    truth_version : int
-        Version of the ground truth that answered the rows; 0 if the shards do not name it.
-    """
+    """Facts of a published data set."""
 
     manifest: Manifest
+    """Its fabrics, roles and options."""
     parts: list[PublishedPart]
+    """Its files of rows."""
     licence: str
+    """SPDX identifier."""
     authors: tuple[str, ...]
     truth_version: int
+    """Version of the ground truth that answered the rows; 0 if the shards do not name it."""
 
     @property
     def title(self) -> str:
@@ -129,11 +103,6 @@ class About(NamedTuple):
         return f"{self.manifest.schema_version}.{self.truth_version}.0"
 
     @property
-    def configs(self) -> dict[str, list[str]]:
-        """Splits of each role that has rows."""
-        found: dict[str, list[str]] = {}
-        for part in self.parts:
-            splits = found.setdefault(part.role, [])
-            if part.split not in splits:
-                splits.append(part.split)
-        return found
+    def sets(self) -> list[tuple[Role, str]]:
+        """Roles and splits that have rows."""
+        return list(dict.fromkeys((part.role, part.split) for part in self.parts))

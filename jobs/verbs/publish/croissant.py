@@ -8,8 +8,8 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
+from jobs.verbs.publish.card import licence_url
 from jobs.verbs.publish.contents import About
-from jobs.verbs.publish.licence import licence_url
 from pipeline.shards.joined import columns_joined
 
 _CR: Final = (
@@ -39,7 +39,6 @@ _TYPES: Final = {"string": "sc:Text", "float": "sc:Float", "int32": "sc:Integer"
 
 def croissant(about: About) -> str:
     """Return the file's text."""
-    sets = [(role, split) for role, splits in about.configs.items() for split in splits]
     content = {
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
@@ -50,8 +49,8 @@ def croissant(about: About) -> str:
         "creator": [{"@type": "sc:Organization", "name": name} for name in about.authors],
         "version": about.version,
         "citeAs": f"{', '.join(about.authors)}: {about.title}, version {about.version}",
-        "distribution": [_files(role, split) for role, split in sets],
-        "recordSet": [_records(role, split) for role, split in sets],
+        "distribution": [_files(role, split) for role, split in about.sets],
+        "recordSet": [_records(role, split) for role, split in about.sets],
     }
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 

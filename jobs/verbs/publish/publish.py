@@ -12,15 +12,12 @@ from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 from filelock import FileLock, Timeout
-from rich.progress import track
 
-from jobs.console import size
-from jobs.terminal import Terminal
+from jobs.terminal import print_lines, size, tracked
 from jobs.verbs.parameters import NOTHING
-from jobs.verbs.publish.card import LOADER, card, citation
+from jobs.verbs.publish.card import LOADER, card, citation, licence_id
 from jobs.verbs.publish.contents import About, PublishedPart, own_shards, parts_of
 from jobs.verbs.publish.croissant import croissant
-from jobs.verbs.publish.licence import licence_id
 from jobs.verbs.publish.recipe import recipe_files
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256, fingerprint
@@ -46,12 +43,8 @@ def publish(
 ) -> None:
     """Write a data set as a folder for others.
 
-    Raises
-    ------
-    BadInput
-        If the licence is missing or unknown, the folder to write is not empty, or the data set is not whole.
-    WorkFailed
-        If another process writes the same folder.
+    BadInput if the licence is missing or unknown, the folder to write is not empty, or the data set is not whole;
+    WorkFailed if another process writes the same folder.
     """
     folder = dataset
     identifier = licence_id(licence)
@@ -62,11 +55,8 @@ def publish(
     truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
     about = About(manifest, parts_of(manifest), identifier, tuple(author) or AUTHORS, truth)
     staging = target.with_name(f".tmp-{target.name}")
-    if (
-        staging.is_dir()
-        and any(staging.iterdir())
-        and not any((staging / name).is_file() for name in (_LOCK, MANIFEST))
-    ):
+    left = {path.name for path in staging.iterdir()} if staging.is_dir() else set()
+    if left and not left & {_LOCK, MANIFEST}:
         raise BadInput(str(staging), "", "is in the way", "it is not of this command; move it, or name another --to")
     try:
         staging.mkdir(parents=True, exist_ok=True)
@@ -84,8 +74,8 @@ def publish(
     except Timeout as error:
         raise WorkFailed(f"{target}: another process is writing it") from error
     written = sum(path.stat().st_size for path in target.rglob("*") if path.is_file())
-    said = f"{target}: {about.rows:,} rows in {len(about.parts)} Parquet files, {size(written)}, licence {identifier}"
-    Terminal().print(said, soft_wrap=True)
+    rows = f"{about.rows:,} rows in {len(about.parts)} Parquet files"
+    print_lines(f"{target}: {rows}, {size(written)}, licence {identifier}")
 
 
 def _free(to: Path | None, folder: Path) -> Path:
@@ -103,21 +93,13 @@ def _free(to: Path | None, folder: Path) -> Path:
 
 
 def _refuse_unfinished(folder: Path, manifest: Manifest) -> None:
-    """Refuse a data set with missing or damaged shards.
-
-    Raises
-    ------
-    BadInput
-        With the first fault, and the number of the others.
-    """
+    """Refuse a data set with missing or damaged shards by the first fault, and the number of the others."""
     shards = own_shards(manifest)
     listed = fingerprint(sorted(Path(shard.file).stem.removeprefix("part-") for shard in shards))
     if not shards or listed != manifest.fingerprint:
         allowed = f"run `twillight generate {manifest.name}` to its end"
         raise BadInput(str(folder), "", f"is not whole: {len(shards):,} of its shards are finished, not all", allowed)
-    console = Terminal(stderr=True)
-    shown = track(shards, "checking", console=console, disable=not console.is_terminal, transient=True)
-    faults = [fault for shard in shown for fault in check_shard(folder, shard, manifest)]
+    faults = [fault for shard in tracked(shards, "checking") for fault in check_shard(folder, shard, manifest)]
     if faults:
         more = f" ({len(faults) - 1:,} more faults)" if len(faults) > 1 else ""
         reason = faults[0].removeprefix(f"{folder}/")
@@ -126,17 +108,16 @@ def _refuse_unfinished(folder: Path, manifest: Manifest) -> None:
 
 def _write(about: About, texts: dict[str, str], folder: Path, staging: Path) -> list[str]:
     """Write all files, `texts` among them, and return their paths within the folder; the manifest is the last one."""
-    console = Terminal(stderr=True)
     texts = {
         **texts,
         "README.md": card(about),
         "croissant.json": croissant(about),
         "CITATION.cff": citation(about),
-        "load.py": LOADER,
+        "load.py": LOADER.read_text(encoding="utf-8"),
     }
     for name, text in texts.items():
         atomic_write(staging / name, text.encode())
-    for part in track(about.parts, "joining", console=console, disable=not console.is_terminal, transient=True):
+    for part in tracked(about.parts, "joining"):
         join_shards(staging / part.file, [folder / shard.file for shard in part.shards], _facts(about, part))
     files = [*texts, *(part.file for part in about.parts)]
     atomic_write(staging / MANIFEST, _listing(about, staging, files))

@@ -26,12 +26,7 @@ _MODELS: Final = ((), ("neumip",), ("curved",), ("point_sampled",))
 def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
     """Return the recipe that generates a data set and the files of its fabrics, by their paths.
 
-    `folder` is that of the data set, for messages.
-
-    Raises
-    ------
-    BadInput
-        If no recipe of this version has the rows of the data set.
+    `folder` is that of the data set, for messages. BadInput if no recipe of this version has its rows.
     """
     fabrics = _fabric_files(manifest)
     present = {(shard.fabric, shard.split, shard.start, shard.rows) for shard in own_shards(manifest)}

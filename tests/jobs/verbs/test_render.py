@@ -7,8 +7,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-import jobs.verbs.render.film_maker
-import jobs.verbs.render.render
+import jobs.verbs.render
 import jobs.verbs.show
 from jobs.cli import main
 from pipeline.models.named import named_method
@@ -96,7 +95,7 @@ def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_
     wide = load_fabric("denim").model_copy(update={"name": "wide", "draft": Satin(ends=100, move=3)})
     (tmp_path / "wide.toml").write_text(wide.to_toml())
     made = []
-    monkeypatch.setattr(jobs.verbs.render.render, "make", lambda scene, *_: made.append(scene))
+    monkeypatch.setattr(jobs.verbs.render, "make", lambda scene, *_: made.append(scene))
     jobs.verbs.show.write_swatch(str(tmp_path / "wide.toml"), wide, tmp_path)
     assert made[0].cloths["swatch"].yarns == (150.0, 150.0)
 
@@ -149,7 +148,7 @@ def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(jobs.verbs.render.film_maker, "displayed", stopped)
+    monkeypatch.setattr(jobs.verbs.render, "displayed", stopped)
     code, _, complaint = render("plane", "--out", "a.png", "--method", "soft_nodes", *SMALL)
     assert code == 130 and complaint == "stopped; a.png is as it was before\n"
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]

@@ -1,0 +1,266 @@
+"""`twillight render`: a scene as a picture, a film, or a folder of pictures, by any method."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from cyclopts import Parameter
+
+from jobs.terminal import duration, print_lines, progress
+from jobs.verbs.parameters import NOTHING, Local, SceneName
+from pipeline import versions
+from pipeline.atomic import atomic_write, refuse_unwritable
+from pipeline.cores import cores
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.loading import Loaded, load
+from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.picture import MOST_SAMPLES, PictureMethod, PicturePart, Plane, TruthAnswers, picture
+from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.sources import worn
+from pipeline.truth.conventions import COMPONENTS
+from reports.images.exr import RGB, write_exr
+from reports.images.tiles import STOPS, Bytes8, Tone, displayed, png
+from reports.images.video import refuse_missing, write_film
+from reports.options import ShotOptions
+from weaves.errors import BadInput, WorkFailed
+from weaves.fabric import load_fabric
+from weaves.validation import validated
+
+WHERE: Final = "render"
+
+MOST_PIXELS: Final = 16_384
+"""Longest side of a picture."""
+
+MOST_FRAMES: Final = 100_000
+"""Most frames of a film."""
+
+RATE: Final = 24
+"""Frames a second of a film."""
+
+_LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}
+_HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
+
+_SUFFIXES: Final = (".png", ".exr", ".mp4", "")
+
+
+@dataclass(frozen=True)
+class RenderLook:
+    """How a picture is made and shown."""
+
+    size: tuple[int, int] | None
+    """Width and height; None: those of the scene's film."""
+    side: int
+    """Rays along each side of a pixel."""
+    options: SceneOptions
+    tone: Tone
+    exposure: float
+    """Stops above the exposure of the page."""
+
+
+def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) -> RenderLook:
+    """Return how a picture is made, from the command line; BadInput if a value cannot be used."""
+    if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
+        raise BadInput(WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
+    try:
+        options = validated(SceneOptions, {"environment_directions": directions}, WHERE)
+    except BadInput as error:
+        raise BadInput(WHERE, "--directions", directions, error.allowed) from error
+    if not -STOPS <= exposure <= STOPS:
+        raise BadInput(WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
+    return RenderLook(_size_of(size) if size else None, round(samples**0.5), options, tone, exposure)
+
+
+def _size_of(text: str) -> tuple[int, int]:
+    """Return width and height from a text such as ``640x480``; BadInput if it is none."""
+    found = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
+    if not found or not all(1 <= int(side) <= MOST_PIXELS for side in found.groups()):
+        raise BadInput(WHERE, "--size", text, f"must be WIDTHxHEIGHT, such as 1024x1024, each from 1 to {MOST_PIXELS}")
+    return int(found[1]), int(found[2])
+
+
+def render(
+    scene: SceneName,
+    *,
+    out: Annotated[Local, Parameter(help="File ending in .png, .exr or .mp4, or a folder for numbered pictures.")],
+    fabric: Annotated[list[str], Parameter(help="Fabric in place of the next cloth's own; several.")] = NOTHING,
+    method: Annotated[str, Parameter(help="truth, selvage, soft_nodes, point_sampled:16, … or a folder.")] = "selvage",
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT in pixels; default: the film of the scene.")] = "",
+    frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
+    samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
+    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 8,
+    tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
+    exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,
+) -> None:
+    """Render a scene and print where the picture is.
+
+    BadInput if a value, the scene, a fabric, the method or the path cannot be used; WorkFailed if the memory does not
+    suffice.
+    """
+    how = look(size, samples, directions, tone, exposure)
+    found = dressed(load_scene(scene), fabric)
+    start = time.monotonic()
+    maker = make(found, method, _frames(frames, found, out), how, out)
+    width, height = maker.size
+    share = "" if method == "truth" else f"; {maker.share:.0%} of the queries by the fallback"
+    print_lines(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}")
+
+
+def make(scene: Scene, method: str, frames: int, how: RenderLook, out: Path) -> FilmMaker:
+    """Make a picture, a film or a folder, and return what made it; errors as for `render`."""
+    # Torch, which help need not wait for.
+    from pipeline.models.fallback import Fallback
+    from pipeline.models.named import TRUTH, named_method
+
+    answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, WHERE, "--method")
+    loaded = load(scene, how.options)
+    if isinstance(answerer, Fallback):
+        for _, fabric in loaded.cloths.values():
+            if not answerer.covers(fabric):
+                raise BadInput(WHERE, "--method", method, f"this model was not trained on {fabric.name}")
+            answerer.prepare(fabric)
+    size = how.size or loaded.camera.size
+    if out.suffix == ".mp4" and (size[0] % 2 or size[1] % 2):
+        raise BadInput(WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
+    refuse_unwritable(out if out.suffix else out / "frame")
+    maker = FilmMaker(loaded, answerer, size, how, frames)
+    try:
+        maker.write(out, method)
+    except KeyboardInterrupt as stop:
+        kept = f"{out} is as it was before" if out.suffix else f"finished frames are in {out}"
+        stop.args = (f"stopped; {kept}",)
+        raise
+    except MemoryError as error:
+        raise WorkFailed(f"{out}: the memory does not suffice for {size[0]} x {size[1]} pixels") from error
+    return maker
+
+
+def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
+    """Return a scene whose cloths are made of other fabrics, in their order; the rest keeps its own."""
+    keys = list(worn(scene))
+    if len(fabrics) > len(keys):
+        allowed = f"the scene {scene.name} has {len(keys)}: {', '.join(keys) or 'none'}"
+        raise BadInput(WHERE, "--fabric", fabrics[len(keys)], f"is one fabric more than cloths; {allowed}")
+    cloths = dict(scene.cloths)
+    for key, name in zip(keys, fabrics, strict=False):
+        load_fabric(name)
+        cloths[key] = cloths.get(key, Cloth()).model_copy(update={"fabric": name})
+    return scene.model_copy(update={"cloths": cloths})
+
+
+def _frames(frames: int | None, scene: Scene, out: Path) -> int:
+    """Return the number of frames; BadInput if it does not go with the file."""
+    if out.suffix not in _SUFFIXES:
+        raise BadInput(WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
+    if frames is not None and not 1 <= frames <= MOST_FRAMES:
+        raise BadInput(WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
+    if out.suffix == ".mp4":
+        refuse_missing(WHERE, "--out", out)
+    if out.suffix in (".png", ".exr"):
+        if frames is not None and frames > 1:
+            raise BadInput(WHERE, "--frames", frames, f"{out.suffix} holds one frame; name an .mp4 file or a folder")
+        return 1
+    return scene.frames if frames is None else frames
+
+
+@dataclass
+class FilmMaker:
+    """A scene, a method, and threads that make frames by it."""
+
+    loaded: Loaded
+    answerer: PictureMethod
+    size: tuple[int, int]
+    how: RenderLook
+    count: int
+    """Number of frames."""
+    queries: int = 0
+    """Queries so far, and how many of them the fallback answered."""
+    fallback: int = 0
+    pixels: int = 0
+    """Pixels so far."""
+
+    @property
+    def share(self) -> float:
+        """Share of the queries that the fallback answered."""
+        return self.fallback / max(self.queries, 1)
+
+    def write(self, out: Path, method: str) -> None:
+        """Write a picture, a film or a folder of pictures."""
+        self._pool = ThreadPoolExecutor(cores())
+        try:
+            with progress("rendering") as self._advance:
+                if out.suffix == ".exr":
+                    self._write_exr(out, method)
+                elif out.suffix == ".mp4":
+                    write_film(out, map(self._shown, range(self.count)), self.size, RATE)
+                elif out.suffix == ".png":
+                    atomic_write(out, _png(self._shown(0)))
+                else:
+                    for frame in range(self.count):
+                        atomic_write(out / f"frame-{frame + 1:04}.png", _png(self._shown(frame)))
+        finally:
+            self._pool.shutdown(cancel_futures=True)
+
+    def _shown(self, frame: int) -> Bytes8:
+        """Return a frame as it is shown."""
+        codes = np.zeros((self.size[1], self.size[0], 3), np.uint8)
+        for part in self._parts(frame, layers=False):
+            codes[_place(part)] = displayed(part.planes["rgb"], self.how.tone, self.how.exposure)
+        return codes
+
+    def _write_exr(self, out: Path, method: str) -> None:
+        """Write the first frame with its layers."""
+        planes: dict[str, Plane] = {}
+        for part in self._parts(0, layers=True):
+            for name, plane in part.planes.items():
+                if name not in planes:
+                    planes[name] = np.zeros((self.size[1], self.size[0], plane.shape[-1]), np.float32)
+                planes[name][_place(part)] = plane
+        channels = {channel: planes["rgb"][..., index] for index, channel in enumerate(RGB)}
+        channels |= {"A": planes["cloth"][..., 0], "depth.Z": planes["depth"][..., 0]}
+        channels |= {"fabric.id": planes["fabric"][..., 0]}
+        for layer, parts in {**dict.fromkeys(("backdrop", *COMPONENTS), RGB), **_LAYERS}.items():
+            channels |= {f"{layer}.{name}": planes[layer][..., index] for index, name in enumerate(parts)}
+        half = [name for name in channels if name.split(".")[0] in _HALF]
+        write_exr(out, channels, self._about(method), half)
+
+    def _about(self, method: str) -> dict[str, str | int | float]:
+        """Return what the file says of itself."""
+        model = method.partition(":")[0]
+        own = f", {model} {versions.MODELS[model]}" if model in versions.MODELS else ""
+        fabrics = (f"{number} {fabric.name}" for number, (_, fabric) in enumerate(self.loaded.cloths.values(), 1))
+        return {
+            "scene": self.loaded.scene.name,
+            "method": method,
+            "fabrics": ", ".join(fabrics),
+            "samples": self.how.side**2,
+            "directions": self.how.options.environment_directions,
+            "fallback_share": 0.0 if isinstance(self.answerer, TruthAnswers) else self.share,
+            "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}{own}",
+        }
+
+    def _parts(self, frame: int, layers: bool) -> Iterator[PicturePart]:
+        from pipeline.models.network import one_thread  # torch
+
+        with one_thread():
+            for part in picture(self.loaded, self.answerer, self._pool, self.size, float(frame), self.how.side, layers):
+                self.queries += part.queries
+                self.fallback += part.fallback
+                yield part
+                self.pixels += part.window.width * part.window.height
+                self._advance(self.pixels / (self.count * self.size[0] * self.size[1]))
+
+
+def _place(part: PicturePart) -> tuple[slice, slice]:
+    left, top, width, height = part.window
+    return slice(top, top + height), slice(left, left + width)
+
+
+def _png(codes: Bytes8) -> bytes:
+    return png(np.concatenate([codes, np.full((*codes.shape[:2], 1), 255, np.uint8)], axis=-1), 1)
