@@ -52,7 +52,7 @@ FALL_ROWS: Final = soft_horizons.AZIMUTHS // 4
 """Rows of a node for the falls of one curvature."""
 
 LEVEL_TINY: Final = 1e-18
-"""Squared length along the fabric plane below which a direction is the normal (pipeline.truth.geometry.visibility)."""
+"""Squared length along the fabric plane below which a direction is the normal (pipeline.truth.geometry.march)."""
 
 _SAMPLER: Final = inspect.signature(PatchBSDF).parameters
 POINTS: Final[int] = _SAMPLER["points"].default

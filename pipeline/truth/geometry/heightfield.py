@@ -120,52 +120,36 @@ def _rise(side: int, row: tuple[float, float, float, float], radius: float) -> f
 
 
 @kernel
-def torus_height(
-    r: float, inverse_r: float, beta: float, bend: float, half: float, drop: float, x: float, y: float
-) -> tuple[float, float, float]:
-    """Return height and its slopes along local x and y, for a float on top; |x| <= r, constants as in `HeightField`."""
-    sine = min(1.0, abs(x) * inverse_r)
+def torus_height(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float, float, float]:
+    """Return height and its slopes along local x and y, for a float on top; |x| <= r.
+
+    `yarn` and `own` are the rows of its yarn and its float in a `HeightField`.
+    """
+    r, beta, bend = yarn[RADIUS], yarn[BETA], own[BEND_RADIUS]
+    sine = min(1.0, abs(x) * yarn[INVERSE_RADIUS])
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     steepness = math.copysign(sine, x) / max(cosine, _EDGE)
     if bend == 0.0:
         return beta * r * cosine, -beta * steepness, 0.0
-    rho = r * cosine
+    rho, half = r * cosine, own[HALF_LENGTH]
     root = math.sqrt((bend + rho - y) * (bend + rho + y))
     # The difference root - R cos(u_max), as a quotient without cancellation: small bends keep every digit.
     rise = 2.0 * bend * rho + rho * rho + (half - y) * (half + y)
-    height = rise / (root + drop)
+    height = rise / (root + own[AXIS_DROP])
     inverse = beta / root
     return beta * height, -(bend + rho) * inverse * steepness, -y * inverse
 
 
 @kernel
-def _height_top(field: HeightField, family: int, pick: int, end: int, x: float, y: float) -> tuple[float, float, float]:
-    """Return height and its slopes along local x and y, for a float on top; |x| <= r."""
-    return torus_height(
-        field.yarn[family, RADIUS],
-        field.yarn[family, INVERSE_RADIUS],
-        field.yarn[family, BETA],
-        field.floats[pick, end, TOP, BEND_RADIUS],
-        field.floats[pick, end, TOP, HALF_LENGTH],
-        field.floats[pick, end, TOP, AXIS_DROP],
-        x,
-        y,
-    )
-
-
-@kernel
-def _height_under(
-    field: HeightField, family: int, pick: int, end: int, x: float, y: float
-) -> tuple[float, float, float]:
-    """Return height and slopes for the yarn beneath, its bend reversed (u -> -u); |x| <= r."""
-    r, beta, bend = field.yarn[family, RADIUS], field.yarn[family, BETA], field.floats[pick, end, UNDER, BEND_RADIUS]
-    sine = min(1.0, abs(x) * field.yarn[family, INVERSE_RADIUS])
+def height_beneath(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float, float, float]:
+    """Return the same for the yarn beneath, its bend reversed (u -> -u)."""
+    r, beta, bend = yarn[RADIUS], yarn[BETA], own[BEND_RADIUS]
+    sine = min(1.0, abs(x) * yarn[INVERSE_RADIUS])
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     steepness = math.copysign(sine, x) / max(cosine, _EDGE)
     if bend == 0.0:
         return beta * r * cosine, -beta * steepness, 0.0
-    inner, drop = bend - r * cosine, field.floats[pick, end, UNDER, AXIS_DROP]
-    half = field.floats[pick, end, UNDER, HALF_LENGTH]
+    inner, half, drop = bend - r * cosine, own[HALF_LENGTH], own[AXIS_DROP]
     # The inner arc is shorter than the float; past its end the yarn runs on straight at u_max.
     bound = inner * half / bend
     y_arc = min(max(y, -bound), bound)
@@ -204,25 +188,26 @@ def surface_at(
         across, along = local_position(family, field.floats[pick, end, UNDER, OFFSET], x, y, end, pick)
         if abs(across) > field.yarn[family, RADIUS]:
             return GAP, UNDER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    radius, bend = field.yarn[family, RADIUS], field.floats[pick, end, side, BEND_RADIUS]
+    yarn, own = field.yarn[family], field.floats[pick, end, side]
+    radius, bend = yarn[RADIUS], own[BEND_RADIUS]
 
     # Angles across (v) and along (u) the yarn.
-    sin_v = min(1.0, max(-1.0, across * field.yarn[family, INVERSE_RADIUS]))
+    sin_v = min(1.0, max(-1.0, across * yarn[INVERSE_RADIUS]))
     cos_v = math.sqrt((1.0 - sin_v) * (1.0 + sin_v))
     sin_u = 0.0
     if side == TOP:
-        height, _, _ = _height_top(field, family, pick, end, across, along)
+        height, _, _ = torus_height(yarn, own, across, along)
         if bend > 0.0:
             sin_u = along / (bend + radius * cos_v)
     else:
-        height, _, _ = _height_under(field, family, pick, end, across, along)
+        height, _, _ = height_beneath(yarn, own, across, along)
         if bend > 0.0:
-            bound = field.floats[pick, end, side, HALF_LENGTH] / bend
+            bound = own[HALF_LENGTH] / bend
             sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
     cos_u = math.sqrt((1.0 - sin_u) * (1.0 + sin_u))
 
     # Normal and twisted tangent of the cylinder, then the relief's stretch along z.
-    sin_t, cos_t, beta = field.yarn[family, SIN_TWIST], field.yarn[family, COS_TWIST], field.yarn[family, BETA]
+    sin_t, cos_t, beta = yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA]
     nx, ny, nz = beta * sin_v, beta * sin_u * cos_v, cos_u * cos_v
     tx = -cos_v * sin_t
     ty = cos_u * cos_t + sin_u * sin_v * sin_t
@@ -235,49 +220,3 @@ def surface_at(
     if family == WARP:
         return family, side, height, nx, ny, nz, tx, ty, tz
     return family, side, height, -ny, nx, nz, -ty, tx, tz
-
-
-@inlined_kernel
-def height_along(
-    field: HeightField, side: int, x: float, y: float, dx: float, dy: float, end: int, pick: int, column: int, row: int
-) -> tuple[float, float]:
-    """Return the height at (x, y) of one piece of cell (pick, end), and its slope along the unit direction (dx, dy).
-
-    `column`, `row` are the cell's place in the endless fabric, `end`, `pick` the same cell within the repeat.
-    """
-    family = int(field.top[pick, end])
-    if side == UNDER:
-        family = 1 - family
-    across, along = local_position(family, field.floats[pick, end, side, OFFSET], x, y, column, row)
-    if side == TOP:
-        height, slope_x, slope_y = _height_top(field, family, pick, end, across, along)
-    else:
-        height, slope_x, slope_y = _height_under(field, family, pick, end, across, along)
-    if family == WARP:
-        return height, slope_x * dx + slope_y * dy
-    return height, slope_x * dy - slope_y * dx
-
-
-@kernel
-def span_over(
-    field: HeightField,
-    family: int,
-    x: float,
-    y: float,
-    dx: float,
-    dy: float,
-    start: float,
-    stop: float,
-    column: int,
-    row: int,
-) -> tuple[float, float]:
-    """Return the part of the way from `start` to `stop` that lies over a yarn of a cell; none of it: stop < start.
-
-    The way leads from (x, y) along the unit direction (dx, dy); the cell is at (column, row) of the endless fabric.
-    """
-    radius, slope = field.yarn[family, RADIUS], dx if family == WARP else dy
-    across, _ = local_position(family, 0.0, x, y, column, row)
-    if slope == 0.0:
-        return (start, stop) if abs(across) <= radius else (stop, start - 1.0)
-    first, second = (-radius - across) / slope, (radius - across) / slope
-    return max(start, min(first, second)), min(stop, max(first, second))

@@ -13,25 +13,27 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.geometry.heightfield import (
-    AXIS_DROP,
-    BEND_RADIUS,
-    BETA,
     GAP,
-    HALF_LENGTH,
-    INVERSE_RADIUS,
     OFFSET,
-    RADIUS,
     TOP,
     UNDER,
     WARP,
     HeightField,
-    height_along,
     local_position,
-    span_over,
     surface_at,
     torus_height,
 )
-from pipeline.truth.geometry.march import Cell, first_cell, float_on_top, next_cell, span_on_top, stride
+from pipeline.truth.geometry.march import (
+    Cell,
+    Ray,
+    first_cell,
+    float_on_top,
+    height_along,
+    level_ray,
+    next_cell,
+    span_on_top,
+    span_over,
+)
 
 _HALVINGS, _SECANTS = 3, 4
 _STRIP_POINTS = 8
@@ -43,17 +45,7 @@ _FARTHEST = 1e4  # yarn spacings
 
 @kernel
 def _slope_of_top(
-    field: HeightField,
-    x: float,
-    y: float,
-    z: float,
-    dx: float,
-    dy: float,
-    a: float,
-    b: float,
-    cell: Cell,
-    best: float,
-    curvature: float,
+    field: HeightField, x: float, y: float, z: float, towards: Ray, a: float, b: float, cell: Cell, best: float
 ) -> float:
     """Return the greatest slope to the top piece of a cell between distances a and b, or `best` if that is greater.
 
@@ -62,20 +54,19 @@ def _slope_of_top(
     # The ray in the frame of the float.
     family = int(field.top[cell.pick, cell.end])
     yarn, own = field.yarn[family], field.floats[cell.pick, cell.end, TOP]
-    r, inverse_r, beta = yarn[RADIUS], yarn[INVERSE_RADIUS], yarn[BETA]
-    bend, length, drop = own[BEND_RADIUS], own[HALF_LENGTH], own[AXIS_DROP]
     x, y = local_position(family, own[OFFSET], x, y, cell.column, cell.row)
+    dx, dy, curvature = towards.dx, towards.dy, towards.bend
     if family != WARP:
         dx, dy = dy, -dx
 
     a = max(a, _NEAREST)
-    low, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + a * dx, y + a * dy)
+    low, slope_x, slope_y = torus_height(yarn, own, x + a * dx, y + a * dy)
     rise_a = slope_x * dx + slope_y * dy - curvature * a
     low -= z + 0.5 * curvature * a * a
     fall_a = low - a * rise_a
     if fall_a >= 0.0:
         return max(best, low / a)
-    high, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + b * dx, y + b * dy)
+    high, slope_x, slope_y = torus_height(yarn, own, x + b * dx, y + b * dy)
     rise_b = slope_x * dx + slope_y * dy - curvature * b
     high -= z + 0.5 * curvature * b * b
     fall_b = high - b * rise_b
@@ -96,7 +87,7 @@ def _slope_of_top(
             share = min(max(fall_a / (fall_a - fall_b), 0.02), 0.98)
         theta = first + (last - first) * share
         s = middle - half * math.cos(theta)
-        height, slope_x, slope_y = torus_height(r, inverse_r, beta, bend, length, drop, x + s * dx, y + s * dy)
+        height, slope_x, slope_y = torus_height(yarn, own, x + s * dx, y + s * dy)
         height -= z + 0.5 * curvature * s * s
         rise = slope_x * dx + slope_y * dy - curvature * s
         best = max(best, height / s)
@@ -110,31 +101,20 @@ def _slope_of_top(
 
 @kernel
 def _slope_of_strip(
-    field: HeightField,
-    x: float,
-    y: float,
-    z: float,
-    dx: float,
-    dy: float,
-    a: float,
-    b: float,
-    cell: Cell,
-    best: float,
-    curvature: float,
+    field: HeightField, x: float, y: float, z: float, towards: Ray, a: float, b: float, cell: Cell, best: float
 ) -> float:
     """Return the greatest slope to the yarn beneath between distances a and b, or `best` if that is greater.
 
     It is tested at `_STRIP_POINTS` points.
     """
-    end, pick, column, row = cell.end, cell.pick, cell.column, cell.row
-    family = 1 - int(field.top[pick, end])
-    a, b = span_over(field, family, x, y, dx, dy, a, b, column, row)
+    family = 1 - int(field.top[cell.pick, cell.end])
+    a, b = span_over(field, family, x, y, towards, a, b, cell)
     if b < a:
         return best
     for k in range(_STRIP_POINTS):
         s = max(a + (b - a) * k / (_STRIP_POINTS - 1.0), _NEAREST)
-        height, _ = height_along(field, UNDER, x + s * dx, y + s * dy, dx, dy, end, pick, column, row)
-        best = max(best, (height - z) / s - 0.5 * curvature * s)
+        height, _ = height_along(field, UNDER, x, y, towards, s, cell)
+        best = max(best, (height - z) / s - 0.5 * towards.bend * s)
     return best
 
 
@@ -159,9 +139,8 @@ def horizon(
     curvature : float
         Of the base along the azimuth, >= 0.
     """
-    picks, ends = field.top.shape
-    stride_x, stride_y = stride(dx), stride(dy)
-    cell = first_cell(x, y, dx, dy, stride_x, stride_y)
+    towards = level_ray(dx, dy, curvature)
+    cell = first_cell(x, y, towards)
     own_family, own_yarn, own_centre = float_on_top(field, cell)
     # A ray below the first value meets the base at the cloth's lowest point.
     best = 0.0 if curvature == 0.0 else -math.sqrt(2.0 * curvature * max(z - field.lowest, 0.0))
@@ -178,26 +157,21 @@ def horizon(
         if field.crown[cell.pick, cell.end] - z > reached and leave > distance:
             family, yarn, centre = float_on_top(field, cell)
             is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
-            enter, exit_ = span_on_top(field, cell, x, y, dx, dy, distance, leave)
+            enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
             if enter > distance:
-                best = _slope_of_strip(field, x, y, z, dx, dy, distance, enter, cell, best, curvature)
+                best = _slope_of_strip(field, x, y, z, towards, distance, enter, cell, best)
             if leave > exit_:
-                best = _slope_of_strip(field, x, y, z, dx, dy, exit_, leave, cell, best, curvature)
+                best = _slope_of_strip(field, x, y, z, towards, exit_, leave, cell, best)
             if exit_ > enter and not is_own:
-                best = _slope_of_top(field, x, y, z, dx, dy, enter, exit_, cell, best, curvature)
+                best = _slope_of_top(field, x, y, z, towards, enter, exit_, cell, best)
         distance = leave
-        cell = next_cell(cell, dx, dy, stride_x, stride_y, ends, picks)
+        cell = next_cell(field, cell, towards)
     return best
 
 
 @allocating_kernel
 def horizons(
-    field: HeightField,
-    x: Float64,
-    y: Float64,
-    azimuths: int,
-    own_plane: bool,
-    curvature: float = 0.0,
+    field: HeightField, x: Float64, y: Float64, azimuths: int, own_plane: bool, curvature: float = 0.0
 ) -> Float32:
     """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
 
@@ -219,13 +193,7 @@ def horizons(
 
 
 def horizon_sines(
-    front: HeightField,
-    back: HeightField,
-    x: Float64,
-    y: Float64,
-    gap: Mask,
-    azimuths: int,
-    curvature: float = 0.0,
+    front: HeightField, back: HeightField, x: Float64, y: Float64, gap: Mask, azimuths: int, curvature: float = 0.0
 ) -> Float64:
     """Return the sine of the horizon's elevation of each point, (azimuths, points); `gap` says which lie in gaps.
 

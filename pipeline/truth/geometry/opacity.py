@@ -22,8 +22,8 @@ from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
-from pipeline.truth.geometry.march import wrap
-from pipeline.truth.geometry.visibility import Ray, ray, visible
+from pipeline.truth.geometry.march import Ray, ray, wrap
+from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.monte_carlo import RANDOMISATIONS, place_point
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries, validate

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
-from pipeline.truth.geometry.visibility import Ray, ray, visible
+from pipeline.truth.geometry.march import Ray, ray
+from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 

@@ -21,7 +21,8 @@ from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows, flak
 from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
-from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.geometry.march import ray
+from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.heightfield import TOP, UNDER, height_along, height_field, surface_at
+from pipeline.truth.geometry.heightfield import TOP, UNDER, height_field, surface_at
+from pipeline.truth.geometry.march import Cell, height_along, level_ray
 from weaves.fabric import load_fabric
 from weaves.surface import GAP
 from weaves.surface import surface_at as oracle
@@ -53,14 +54,16 @@ def test_slopes_are_those_of_the_height(name):
         family, side, _, _, _, nz, *_ = surface_at(field, x, y, end, pick)
         if family == GAP or nz < 0.1:
             continue
-        _, slope = height_along(field, side, x, y, dx, dy, end, pick, end, pick)
-        ahead, _ = height_along(field, side, x + step * dx, y + step * dy, dx, dy, end, pick, end, pick)
-        behind, _ = height_along(field, side, x - step * dx, y - step * dy, dx, dy, end, pick, end, pick)
+        towards, cell = level_ray(dx, dy, 0.0), Cell(end, pick, end, pick, 0.0, 0.0)
+        (_, slope), (ahead, _), (behind, _) = (
+            height_along(field, side, x, y, towards, distance, cell) for distance in (0.0, step, -step)
+        )
         assert slope == pytest.approx((ahead - behind) / (2 * step), abs=2e-4)
 
 
 def test_the_place_in_the_endless_fabric_does_not_matter():
     field = height_field(FABRICS["denim"])
-    near = height_along(field, TOP, 1.3, 2.6, 0.6, 0.8, 1, 2, 1, 2)
-    far = height_along(field, TOP, 1.3 - 8, 2.6 + 12, 0.6, 0.8, 1, 2, 1 - 8, 2 + 12)
+    towards = level_ray(0.6, 0.8, 0.0)
+    near = height_along(field, TOP, 1.3, 2.6, towards, 0.0, Cell(1, 2, 1, 2, 0.0, 0.0))
+    far = height_along(field, TOP, 1.3 - 8, 2.6 + 12, towards, 0.0, Cell(1, 2, 1 - 8, 2 + 12, 0.0, 0.0))
     np.testing.assert_allclose(near, far, atol=1e-12)

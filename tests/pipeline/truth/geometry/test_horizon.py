@@ -8,7 +8,8 @@ import pytest
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, UNDER, surface_at
 from pipeline.truth.geometry.horizon import horizon
-from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.geometry.march import ray
+from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 

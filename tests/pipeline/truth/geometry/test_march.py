@@ -7,9 +7,11 @@ import pytest
 
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import UNDER, surface_at
-from pipeline.truth.geometry.march import first_cell, next_cell, span_on_top, stride, wrap
+from pipeline.truth.geometry.march import first_cell, level_ray, next_cell, span_on_top, wrap
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
+
+FIELD = cloth_side(load_fabric("cotton_twill"), TruthOptions()).front
 
 
 @pytest.mark.parametrize("x", [0.0, 2.999, 3.0, -0.25, -3.0, 1e6 + 0.5, -1e-20])
@@ -23,16 +25,18 @@ def test_wrapped_positions_are_congruent_and_inside(x):
 def test_a_ray_enters_the_cells_in_which_its_points_lie(turn):
     """The middle of the way through each cell lies in that cell, here and within the repeat of 3 x 5."""
     ends, picks = 3, 5
+    field = FIELD._replace(top=np.zeros((picks, ends), np.int8))
     x, y = 1.3, 4.2
     dx, dy = round(math.cos(2 * math.pi * turn), 12), round(math.sin(2 * math.pi * turn), 12)
-    cell, distance = first_cell(x, y, dx, dy, stride(dx), stride(dy)), 0.0
+    towards = level_ray(dx, dy, 0.0)
+    cell, distance = first_cell(x, y, towards), 0.0
     for _ in range(20):
         leave = min(cell.next_x, cell.next_y)
         middle = 0.5 * (distance + leave)
         column, row = math.floor(x + middle * dx), math.floor(y + middle * dy)
         assert (cell.column, cell.row) == (column, row)
         assert (cell.end, cell.pick) == (column % ends, row % picks)
-        cell, distance = next_cell(cell, dx, dy, stride(dx), stride(dy), ends, picks), leave
+        cell, distance = next_cell(field, cell, towards), leave
 
 
 def test_the_way_over_the_top_yarn_is_where_the_top_yarn_shows():
@@ -45,9 +49,10 @@ def test_the_way_over_the_top_yarn_is_where_the_top_yarn_shows():
         end, pick = random.integers(0, field.top.shape[1]), random.integers(0, field.top.shape[0])
         x, y, turn = end + random.random(), pick + random.random(), random.random()
         dx, dy = math.cos(2 * math.pi * turn), math.sin(2 * math.pi * turn)
-        cell = first_cell(x, y, dx, dy, stride(dx), stride(dy))
+        towards = level_ray(dx, dy, 0.0)
+        cell = first_cell(x, y, towards)
         leave = min(cell.next_x, cell.next_y)
-        enter, exit_ = span_on_top(field, cell, x, y, dx, dy, 0.0, leave)
+        enter, exit_ = span_on_top(field, cell, x, y, towards, 0.0, leave)
         assert 0.0 <= enter <= exit_ <= leave
         for s in (enter - 1e-6, enter + 1e-6, exit_ - 1e-6, exit_ + 1e-6):
             if 0.0 < s < leave and exit_ - enter > 1e-5:

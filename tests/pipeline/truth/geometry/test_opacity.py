@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import height_field
+from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.opacity import grazing_cosine, hits, opacity
-from pipeline.truth.geometry.visibility import ray
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix

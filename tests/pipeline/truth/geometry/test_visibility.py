@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.truth.geometry.heightfield import height_field, surface_at
-from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.geometry.march import ray
+from pipeline.truth.geometry.visibility import visible
 from weaves.fabric import load_fabric
 from weaves.surface import GAP
 from weaves.surface import surface_at as oracle

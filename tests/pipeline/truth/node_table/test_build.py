@@ -13,7 +13,8 @@ from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import GAP, surface_at
 from pipeline.truth.geometry.horizon import horizon
-from pipeline.truth.geometry.visibility import ray, visible
+from pipeline.truth.geometry.march import ray
+from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.node_table.build import PIECE_FAMILY, tabulate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
