@@ -42,9 +42,14 @@ def trainings(records: Sequence[Record]) -> dict[tuple[str, str], int]:
     return {key: len(known) for key, known in seeds.items()}
 
 
+def mean(values: Sequence[float]) -> float:
+    """Return the mean of numbers."""
+    return float(np.mean(values))
+
+
 def mean_over_seeds(records: Sequence[Record]) -> list[Record]:
     """Return Records with one for each number that several trainings have, in the order of the first ones."""
-    return statistic_over_seeds(records, lambda values: float(np.mean(values)))
+    return statistic_over_seeds(records, mean)
 
 
 def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> list[Record]:

@@ -18,13 +18,11 @@ Curvatures are lengths to the power -1: cloth whose yarns are s times as wide se
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from pipeline.models.method import Method
 from pipeline.scenes.shade import shade
@@ -33,8 +31,7 @@ from pipeline.truth.geometry.opacity import opacity
 from pipeline.truth.query import Queries
 from reports.images.exr import read_exr, write_exr
 from reports.options import EdgeOptions, Role
-from reports.over_seeds import over_seeds
-from reports.record import TRUTH, Provenance, Record, to_table
+from reports.record import TRUTH, Provenance, Record
 from weaves.fabric import Fabric
 
 Floats = npt.NDArray[np.float64]
@@ -187,21 +184,6 @@ def measure_silhouette(
         subject.of("silhouette_displacement", found.displacement, options.rows),
         subject.of("silhouette_light", found.light_rmse, pixels),
     ]
-
-
-@over_seeds(["method", "setting"], ["coverage", "displacement", "light"])
-def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return one row a method: coverage, displacement, light, fabrics; means over fabrics."""
-    table = to_table(records)
-    table = table[table["metric"].str.startswith("silhouette_")]
-    keys = ["method", "setting"]
-    if table.empty:
-        return pd.DataFrame(columns=[*keys, "coverage", "displacement", "light", "fabrics"])
-    names = table["metric"].str.removeprefix("silhouette_")
-    means = table.assign(metric=names).pivot_table("value", keys, "metric", "mean", sort=False)
-    counts: Any = table.groupby(keys, sort=False)["fabric"].nunique().rename("fabrics")
-    result: pd.DataFrame = means[["coverage", "displacement", "light"]].join(counts).reset_index()
-    return result.rename_axis(columns=None)
 
 
 def _edge(

@@ -135,8 +135,7 @@ def _against_time(
         for axes, (panel, title) in zip(line, panels.items(), strict=True):
             own = table[(table["panel"] == panel) & (table[measure] > 0)]
             own = own.assign(x=own["time"], y=own[measure])
-            best = np.array(front(list(zip(own["x"], own["y"], strict=True))), np.bool_)
-            _band(axes, scheme, own[best].sort_values("x"), 5.0)
+            _band(axes, scheme, own[front(own, "x", "y")].sort_values("x"), 5.0)
             for method, settings in own.groupby("method", sort=False):
                 settings = settings.sort_values("x")
                 axes.plot(

@@ -22,10 +22,10 @@ from reports.page.content import PageInput
 from reports.page.pictures import SHOWN, films, strips
 from reports.record import TRUTH
 from reports.tables.number_format import display, plain
-from reports.tables.page_tables import ranged_frames, result_tables, truth_facts
-from reports.tables.sentences import facts, headline, lacking, learnt, scene_sentences, section_sentences, trade
+from reports.tables.page_tables import ranged_frames, sections
+from reports.tables.sentences import headline, lacking, learnt, scene_sentences, trade
 from reports.tables.summary import scene_table
-from reports.tables.table import WORDS, paragraphs
+from reports.tables.table import WORDS
 from weaves.fabric import Fabric
 
 ALWAYS: Final = frozenset({"fabrics", "made", "columns", "limits"})
@@ -50,19 +50,16 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         Names of the plots that were drawn.
     """
     per_material = [note.name for note in page.models if note.per_material]
-    values = {**facts(page.records, frames["errors"], per_material), **truth_facts(page.records), **_options(page)}
+    every = sections(page.records, frames, _options(page), per_material)
     ranged = ranged_frames(frames)
-    tables = result_tables(page.records, ranged, values, per_material)
     lead, figures = trade(ranged["tradeoff"])
     content = {
         "page": page,
         "lead": lead,
         "headlines": _headlines(page, ranged),
         "figures": figures,
-        "tables": tables,
-        "sentences": section_sentences(ranged),
         "scene_sentences": scene_sentences(frames["scenes"]),
-        "limits": [*paragraphs(WORDS["sections"]["limits"]["intro"], values), *lacking(page.records)],
+        "limits": [*every["limits"].intro, *lacking(page.records)],
         "live": {fabric: plain(fabric) for fabric in page.live},
         "plots": plots,
         "plot_titles": PLOT_TITLES,
@@ -74,11 +71,10 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         "open_rows": OPEN_ROWS,
         **_pictures(page, frames),
     }
-    sections = [
-        {"id": name, "title": words["title"], "plots": words.get("plots", [])}
-        | {part: paragraphs(words.get(part, []), values) for part in ("intro", "note")}
-        for name, words in WORDS["sections"].items()
-        if name in tables or name in ALWAYS or (name in ("live", "pictures") and content[_SHOWN_IN[name]])
+    shown = [
+        section
+        for name, section in every.items()
+        if section.tables or name in ALWAYS or (name in _SHOWN_IN and content[_SHOWN_IN[name]])
     ]
     environment = Environment(
         loader=PackageLoader("reports.page"),
@@ -88,7 +84,7 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         lstrip_blocks=True,
     )
     environment.filters["prose"] = prose
-    return environment.get_template("page.html.j2").render(content, sections=sections)
+    return environment.get_template("page.html.j2").render(content, sections=shown)
 
 
 _SHOWN_IN: Final = {"live": "live", "pictures": "strips"}

@@ -15,8 +15,8 @@ import pandas as pd
 
 from reports.record import Machine, Record
 from reports.tables.number_format import NONE, fixed_to, listed, missing, span, times
-from reports.tables.page_tables import page_frames, ranged_frames, result_tables, truth_facts
-from reports.tables.sentences import BOUNDED, facts, section_sentences
+from reports.tables.page_tables import page_frames, sections
+from reports.tables.sentences import BOUNDED
 from reports.tables.summary import (
     BASELINE,
     PAPER,
@@ -27,7 +27,7 @@ from reports.tables.summary import (
     summary_table,
     unranged,
 )
-from reports.tables.table import WORDS, markdown_table, paragraphs
+from reports.tables.table import markdown_table
 from weaves.errors import BadInput
 
 README_BLOCK: Final = "quick"
@@ -193,17 +193,13 @@ def results_page(records: Sequence[Record], machine: Machine, where: str) -> str
         "defines every column and shows the pictures. What was tried and not kept is in [LOG.md](LOG.md)."
     )
     parts = [f"# Results of the recipe `{named[0].recipe}`", about, "\n".join(f"- {line}" for line in head)]
-    whole = page_frames(records)
-    frames, values = ranged_frames(whole), {**facts(records, whole["errors"]), **truth_facts(records)}
-    sentences = section_sentences(frames)
-    tables = result_tables(records, frames, values)
-    for section, words in WORDS["sections"].items():
-        if section in tables:
-            parts += [f"## {words['title']}", *paragraphs(words.get("intro", []), values)]
-            parts += ["\n".join(f"- {text}" for text in sentences[section])] if sentences.get(section) else []
-            for part in tables[section]:
+    for section in sections(records, page_frames(records)).values():
+        if section.tables:
+            parts += [f"## {section.title}", *section.intro]
+            parts += ["\n".join(f"- {sentence}" for sentence in section.sentences)] if section.sentences else []
+            for part in section.tables:
                 parts += [f"### {part.title}", *part.intro, part.markdown(), *part.note]
-            parts += paragraphs(words.get("note", []), values)
+            parts += section.note
     return "\n\n".join(parts) + "\n"
 
 

@@ -85,7 +85,7 @@ def with_measured(table: pd.DataFrame, scenes: pd.DataFrame, scene: str) -> pd.D
 
 def _with_front(table: pd.DataFrame) -> pd.DataFrame:
     """Add the column `front` and sort by time."""
-    marked = table.assign(front=front(list(zip(table["ms"], table["error"], strict=True))))
+    marked = table.assign(front=front(table, "ms", "error"))
     return marked.sort_values("ms", kind="stable", ignore_index=True)
 
 

@@ -7,7 +7,8 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from reports.catalogue import Format, metric_row
+from reports.catalogue import metric_row
+from reports.measure.memory import UNSURE
 
 NONE = "–"
 
@@ -74,6 +75,21 @@ def percent(value: float, digits: int = 1) -> str:
     return NONE if missing(value) else f"{100 * value:.{digits}f} %".replace("-", "−")
 
 
+def share(value: float) -> str:
+    """Return ``4.0e-03``, or 0."""
+    return NONE if missing(value) else "0" if value == 0 else f"{value:.1e}"
+
+
+def outwards(value: float) -> str:
+    """Return ``−0.0300``."""
+    return NONE if missing(value) else f"{value:+.4f}".replace("-", "−")
+
+
+def memory(value: float) -> str:
+    """Return bytes that a call adds."""
+    return f"below {size(UNSURE)}" if value < UNSURE else size(value)
+
+
 def grouped(value: float) -> str:
     """Return ``1,696``."""
     return NONE if missing(value) else f"{value:,.0f}"
@@ -127,7 +143,7 @@ def missing(value: float | None) -> bool:
     return value is None or not math.isfinite(value)
 
 
-FORMATS: Final[dict[Format, Callable[[float], str]]] = {
+FORMATS: Final[dict[str, Callable[[float], str]]] = {
     "scientific": scientific,
     "signed": signed,
     "percent": percent,
@@ -141,7 +157,11 @@ FORMATS: Final[dict[Format, Callable[[float], str]]] = {
     "bytes": size,
     "seconds": seconds,
     "times": times,
+    "share": share,
+    "outwards": outwards,
+    "memory": memory,
 }
+"""Formats of the catalogue, and of columns of `tables.toml`."""
 
 
 def shown(metric: str, value: float) -> str:

@@ -245,14 +245,14 @@ def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]
     }
 
 
-def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Sequence[str] = ()) -> dict[str, object]:
+def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collection[str] = ()) -> dict[str, object]:
     """Return the values of words (`tables.toml`) that Records tell; what was not measured is not among them.
 
     Parameters
     ----------
     errors : DataFrame
         From `summary.error_table`.
-    per_material : sequence of str
+    per_material : collection of str
         Methods that are trained on every fabric by itself.
     """
     metrics = {record.metric for record in records}

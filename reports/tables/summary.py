@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from scipy import stats
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
-from reports.over_seeds import first_training, mean_over_seeds, over_seeds, statistic_over_seeds
+from reports.over_seeds import Statistic, first_training, mean, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 
 BASELINE: Final = ("point_sampled", "k = 2")
@@ -44,7 +44,7 @@ _OVER_FABRICS: Final = tuple(f"{name}_fabrics" for name in ("ratio", *ERRORS))
 _KEYS: Final = ["method", "setting"]
 _MEANS: Final = [name for name in (*columns_of("errors"), "zero_answers") if name != "mse"]  # of `error_table`
 
-_ALBEDOS: Final = ["diffuse", "specular", "colour"]  # columns of `energy_table`
+_ALBEDOS: Final = columns_of("energy")
 
 
 def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
@@ -68,41 +68,32 @@ def error_table(records: Sequence[Record]) -> pd.DataFrame:
     wide = _wide(records, "queries")
     result = []
     for (method, setting, role), group in wide.groupby([*_KEYS, "role"], sort=False):
-        mse, spread = _mean_error(group)
         baseline = _baseline(wide, role, set(group["fabric"]))
+        mse, spread = _mean_error(group)
         base, base_spread = _mean_error(baseline)
         ratios = ratio((base, base_spread), (mse, spread)) if mse > 0 and base > 0 else (math.nan,) * 3
-        row = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
+        row: dict[str, Any] = {"method": method, "setting": setting, "role": role, "fabrics": len(group)}
         row |= {"queries": int(group["count"].sum()), "mse": mse, "standard_error": spread}
         row |= {"low": mse - 1.96 * spread, "high": mse + 1.96 * spread}
-        measured, noise = (float(group[name].mean()) for name in ("mse_measured", "truth_noise"))
-        row |= {"mse_measured": measured, "truth_noise": noise}
-        row["noise_share"] = noise / measured if measured > 0 else math.nan
+        row |= {name: float(group[name].mean()) for name in ("mse_measured", "truth_noise")}
+        row["noise_share"] = row["truth_noise"] / row["mse_measured"] if row["mse_measured"] > 0 else math.nan
         row |= dict(zip(("ratio", "ratio_low", "ratio_high"), ratios, strict=True))
         row |= {name: group[name].mean() if name in group else math.nan for name in _MEANS}
-        row |= columns_over_fabrics(group, baseline)
-        result.append(row)
+        result.append(row | columns_over_fabrics(group, baseline))
     return pd.DataFrame(result)
 
 
-def fabric_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the MSE on held-out queries, one row a fabric and one column a method (``method setting``)."""
-    return _by_fabric(mean_over_seeds(records))
+def fabric_table(records: Sequence[Record], statistic: Statistic = mean) -> pd.DataFrame:
+    """Return the MSE on held-out queries, a statistic of all trainings.
 
-
-def fabric_ranges(records: Sequence[Record]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return tables like `fabric_table` of the least and of the most of all trainings."""
-    return _by_fabric(statistic_over_seeds(records, min)), _by_fabric(statistic_over_seeds(records, max))
-
-
-def _by_fabric(records: Sequence[Record]) -> pd.DataFrame:
-    table = to_table(records)
+    One row a fabric and one column a method (``method setting``).
+    """
+    table = to_table(statistic_over_seeds(records, statistic))
     table = table[(table["metric"] == "mse") & (table["scene"] == "queries")]
     labels = (table["method"] + " " + table["setting"]).str.strip()
     wide = table.assign(label=labels).pivot(index=["role", "fabric"], columns="label", values="value")
-    order = list(dict.fromkeys(labels))
     keys = list(dict.fromkeys(zip(table["role"], table["fabric"], strict=True)))
-    return wide.reindex(index=keys, columns=order).reset_index().rename_axis(columns=None)
+    return wide.reindex(index=keys, columns=labels.unique()).reset_index().rename_axis(columns=None)
 
 
 def picture_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -120,13 +111,33 @@ def picture_table(records: Sequence[Record]) -> pd.DataFrame:
 
 @over_seeds([*_KEYS, "role"], columns_of("aliasing"))
 def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the metrics of aliasing: one row a method and role, means over fabrics, and over how many."""
-    wide, names = _wide(records, "plane"), columns_of("aliasing")
-    if "flicker" not in wide:
-        return pd.DataFrame(columns=[*_KEYS, "role", "fabrics", *names])
-    groups = wide[wide["flicker"].notna()].reindex(columns=[*wide.columns, *{*names} - {*wide.columns}])
-    means = {name: (name, "mean") for name in names}
-    return groups.groupby([*_KEYS, "role"], sort=False).agg(fabrics=("fabric", "size"), **means).reset_index()
+    """Return the metrics of aliasing, means over fabrics, one row a method and role."""
+    return _over_fabrics(records, columns_of("aliasing"), [*_KEYS, "role"], "mean")
+
+
+@over_seeds(_KEYS, _ALBEDOS, dict.fromkeys(_ALBEDOS, mean))
+def energy_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the largest albedos of all fabrics, one row a method."""
+    return _over_fabrics(records, _ALBEDOS, _KEYS, "max")
+
+
+@over_seeds(_KEYS, columns_of("silhouettes"))
+def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return errors at silhouettes, means over fabrics, one row a method."""
+    return _over_fabrics(records, columns_of("silhouettes"), _KEYS, "mean")
+
+
+def _over_fabrics(
+    records: Sequence[Record], metrics: list[str], keys: list[str], statistic: Literal["mean", "max"]
+) -> pd.DataFrame:
+    """Return the number of fabrics and a statistic of each metric over them."""
+    table = to_table(records)
+    table = table[table["metric"].isin(metrics) & (table["method"] != TRUTH) & (table["fabric"] != "")]
+    if table.empty:
+        return pd.DataFrame(columns=[*keys, "fabrics", *metrics])
+    fabrics = table.groupby(keys, sort=False)["fabric"].nunique().rename("fabrics").to_frame()
+    wide = table.pivot_table("value", keys, "metric", statistic, sort=False).reindex(columns=metrics)
+    return fabrics.join(wide).reset_index()
 
 
 _SCENE: Final = [*columns_of("scenes"), "mse", "mse_relative", "colour_rrmse", "flicker", "excess_energy"]
@@ -150,31 +161,18 @@ def scene_table(records: Sequence[Record]) -> pd.DataFrame:
     keys, ends = ["scene", *_KEYS], [f"{name}_{end}" for name in intervals for end in ("low", "high")]
     if table.empty:
         return pd.DataFrame(columns=[*keys, *metrics, *ends, "ratio", "front"])
-    wide = table[keys].drop_duplicates()
-    for column, names in (("value", metrics), ("low", intervals), ("high", intervals)):
-        part = table.pivot(index=keys, columns="metric", values=column).reindex(columns=list(names))
-        part = part if column == "value" else part.add_suffix(f"_{column}")
-        wide = wide.merge(part.reset_index(), on=keys)
-    wide = wide[[*keys, *metrics, *ends]]
+    wide = table.pivot(index=keys, columns="metric", values=["value", "low", "high"])
+    names: Any = wide.columns
+    wide.columns = [name if part == "value" else f"{name}_{part}" for part, name in names]
+    order = pd.MultiIndex.from_frame(table[keys].drop_duplicates())
+    wide = wide.reindex(index=order, columns=[*metrics, *ends]).reset_index()
     base = wide[of_baseline(wide)].set_index("scene")["mse"]
-    positive = wide["mse"].where(wide["mse"] > 0)
-    wide["ratio"] = wide["scene"].map(base) / positive
+    positive = wide.assign(mse=wide["mse"].where(wide["mse"] > 0))
+    wide["ratio"] = wide["scene"].map(base) / positive["mse"]
     wide["front"] = False
-    for _, group in wide.groupby("scene"):
-        wide.loc[group.index, "front"] = front(list(zip(group["frame_time"], positive[group.index], strict=True)))
-    return wide.rename_axis(columns=None)
-
-
-@over_seeds(_KEYS, _ALBEDOS, dict.fromkeys(_ALBEDOS, np.mean))
-def energy_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the worst furnace figures over all fabrics, one row a method: diffuse, specular, colour, fabrics."""
-    wide = _wide(records, "queries")
-    names = [name for name in wide.columns if str(name).startswith("furnace_")]
-    if not names:
-        return pd.DataFrame(columns=[*_KEYS, "diffuse", "specular", "colour", "fabrics"])
-    groups = wide[wide[names[0]].notna()].groupby(_KEYS, sort=False)
-    worst = {name: (f"furnace_{name}", "max") for name in _ALBEDOS}
-    return groups.agg(**worst, fabrics=("fabric", "size")).reset_index()
+    for _, group in positive.groupby("scene"):
+        wide.loc[group.index, "front"] = front(group, "frame_time", "mse")
+    return wide
 
 
 def path_table(records: Sequence[Record]) -> pd.DataFrame:
@@ -317,15 +315,7 @@ def unranged(errors: pd.DataFrame) -> set[tuple[str, str, str]]:
     return set(zip(alone["role"], alone["method"], alone["setting"], strict=True))
 
 
-class OverFabrics(NamedTuple):
-    """Geometric mean over fabrics, and the ends of its 95 % interval."""
-
-    mean: float
-    low: float
-    high: float
-
-
-def over_fabrics(values: npt.ArrayLike) -> OverFabrics:
+def over_fabrics(values: npt.ArrayLike) -> tuple[float, float, float]:
     """Return the geometric mean of errors or ratios, one a fabric, and its 95 % interval over fabrics.
 
     Parameters
@@ -335,7 +325,7 @@ def over_fabrics(values: npt.ArrayLike) -> OverFabrics:
 
     Returns
     -------
-    OverFabrics
+    mean, low, high : float
         NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth. The
         interval of a single fabric is NaN.
 
@@ -347,13 +337,13 @@ def over_fabrics(values: npt.ArrayLike) -> OverFabrics:
     """
     figures = np.asarray(values, np.float64)
     if not len(figures) or not ((figures > 0) & np.isfinite(figures)).all():
-        return OverFabrics(np.nan, np.nan, np.nan)
+        return math.nan, math.nan, math.nan
     logarithms = np.log(figures)
-    mean = float(np.exp(logarithms.mean()))
+    centre = float(np.exp(logarithms.mean()))
     if len(figures) < 2:
-        return OverFabrics(mean, np.nan, np.nan)
+        return centre, math.nan, math.nan
     reach = float(stats.t.ppf(0.975, len(figures) - 1) * stats.sem(logarithms))
-    return OverFabrics(mean, mean * np.exp(-reach), mean * np.exp(reach))
+    return centre, float(centre * np.exp(-reach)), float(centre * np.exp(reach))
 
 
 def over_unseen(row: Any) -> bool:
@@ -389,25 +379,15 @@ def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, 
     }
 
 
-def front(points: Sequence[tuple[float, float]]) -> list[bool]:
-    """Return which points are on the front of two costs: those that nothing beats on both.
+def front(table: pd.DataFrame, cost: str, fault: str) -> npt.NDArray[np.bool_]:
+    """Return which rows are on the front of two columns: those that nothing beats on both.
 
-    A point is beaten by another that is nowhere worse and somewhere better. Equal points do not beat each other.
-
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        Time and error; less is better. Points with NaN or infinity are not on the front and beat nothing.
-
-    Returns
-    -------
-    list of bool
+    A row is beaten by another that is nowhere worse and somewhere better. Equal rows do not beat each other. Rows with
+    NaN or infinity are not on the front and beat nothing.
     """
-    on = [False] * len(points)
-    measured = sorted((point, index) for index, point in enumerate(points) if all(map(math.isfinite, point)))
-    last, lowest = (math.nan, math.nan), math.inf
-    # From the fastest on: whatever is not better than all faster ones is beaten by one of them, or equals it.
-    for point, index in measured:
-        if point[1] < lowest or point == last:
-            on[index], last, lowest = True, point, point[1]
-    return on
+    points = table[[cost, fault]].to_numpy(np.float64)
+    measured = np.isfinite(points).all(axis=1)
+    points = np.where(measured[:, None], points, np.nan)
+    others = points[:, None]
+    beaten = ((others <= points).all(axis=-1) & (others < points).any(axis=-1)).any(axis=0)
+    return np.asarray(measured & ~beaten)

@@ -1,6 +1,6 @@
 """A table of results as one object: words, columns and rows; the page, Markdown and the terminal show the same object.
 
-Words come from `tables.toml`. A paragraph with a ``{value}`` that is not known is left out.
+Words and columns come from `tables.toml`. A paragraph with a ``{value}`` that is not known is left out.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from reports.catalogue import METRICS
+from reports.catalogue import METRICS, columns_of
 from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
-from reports.tables.number_format import FORMATS, NO_BREAK, display, span
+from reports.tables.number_format import FORMATS, NO_BREAK, beyond_noise, display, span
 from reports.tables.summary import BASELINE, rows
 
 WORDS: Final = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
-"""Words of sections and tables, and definitions of what is no metric."""
+"""Words of sections and tables, columns of tables, and definitions of what is no metric."""
+
+Values = Mapping[str, object]
+"""Values of words."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Column(NamedTuple):
     """A column: its title, and the cell of a row of a frame (`rows`) or of any other object."""
 
     title: str
-    cell: Callable[[Any], TableCell | str]
+    cell: Callable[[Any], TableCell]
 
 
 @dataclass(frozen=True)
@@ -89,23 +92,35 @@ class ResultTable:
 
 
 def number(
-    name: str, title: str = "", worded: Callable[[float], str] | None = None, ends: tuple[str, str] | None = None
+    name: str,
+    title: str = "",
+    format: str = "",
+    metric: str = "",
+    ends: Sequence[str] = (),
+    above_noise: bool = False,
 ) -> Column:
     """Return the column of a number of a frame, with its interval and its range over trainings where it has them.
 
     Parameters
     ----------
     name : str
-        Column of the frame. Of a metric, title and format are those of the catalogue.
-    ends : (str, str), optional
+        Column of the frame.
+    title, format : str
+        Heading, and key of `FORMATS`; those of the metric by default.
+    metric : str
+        A metric of the catalogue, if it is not `name`.
+    ends : sequence of str
         Columns of the interval's ends; <name>_low and <name>_high by default.
+    above_noise : bool
+        Whether a number that is not above 0 is lost in the noise of the truth.
     """
-    metric = METRICS.get(name)
-    if metric:
-        title = title or metric.title + (f", {metric.unit}" if metric.unit in ("dB", "JOD") else "")
-        worded = worded or FORMATS[metric.format]
+    if about := METRICS.get(metric or name):
+        title = title or about.title + (f", {about.unit}" if about.unit in ("dB", "JOD") else "")
+        format = format or about.format
     low, high = ends or (f"{name}_low", f"{name}_high")
-    assert worded is not None
+
+    def worded(value: float) -> str:
+        return beyond_noise(value, FORMATS[format]) if above_noise else FORMATS[format](value)
 
     def cell(row: Any) -> TableCell:
         interval, trainings = (
@@ -117,33 +132,31 @@ def number(
     return Column(title.replace(" ", NO_BREAK) if len(title) < 12 else title, cell)
 
 
-def cells(row: Any, columns: Iterable[Column]) -> tuple[TableCell, ...]:
-    """Return the cells of a row."""
-    made = (column.cell(row) for column in columns)
-    return tuple(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in made)
+def text(title: str, worded: Callable[[Any], str]) -> Column:
+    """Return a column of words about a row."""
+    return Column(title, lambda row: TableCell(worded(row)))
 
 
-def method_row(method: str, setting: str, made: Iterable[TableCell]) -> TableRow:
+def columns_for(name: str, values: Values, measured: Iterable[str] = ()) -> dict[str, Column]:
+    """Return the columns of a table by their names in its frame.
+
+    They are those of `tables.toml`, then the catalogue's for this table, as far as they are among the `measured`.
+    """
+    columns = {}
+    for column, about in WORDS["tables"][name].get("columns", {}).items():
+        title = about.get("title", "").format_map(values)
+        columns[column] = number(column, **{**about, "title": title})
+    return columns | {metric: number(metric) for metric in columns_of(name) if metric in {*measured} - {*columns}}
+
+
+def method_row(method: str, setting: str, cells: Iterable[TableCell]) -> TableRow:
     """Return the row of a method."""
+    label = "the truth" if method == TRUTH else display(method, setting)
     kind = "baseline" if (method, setting) == BASELINE else ""
-    return TableRow(
-        "the truth" if method == TRUTH else display(method, setting),
-        tuple(made),
-        method,
-        setting.replace(" ", NO_BREAK),
-        kind,
-    )
+    return TableRow(label, tuple(cells), method, setting.replace(" ", NO_BREAK), kind)
 
 
-def by_method(lines: Sequence[TableRow]) -> list[TableRow]:
-    """Return rows with all settings of a method together."""
-    order = list(dict.fromkeys(line.method for line in lines))
-    return sorted(lines, key=lambda line: order.index(line.method))
-
-
-def table(
-    name: str, columns: Sequence[str], lines: Iterable[TableRow], values: Mapping[str, object], key: str = ""
-) -> ResultTable:
+def table(name: str, columns: Sequence[str], lines: Iterable[TableRow], values: Values, key: str = "") -> ResultTable:
     """Return the table `name` of `tables.toml` with its words."""
     own = WORDS["tables"][name]
     title = own["title"].format_map(values)
@@ -152,25 +165,29 @@ def table(
 
 
 def of_methods(
-    name: str, frame: pd.DataFrame, columns: Sequence[Column], values: Mapping[str, object], key: str = ""
+    name: str, frame: pd.DataFrame, values: Values, columns: Mapping[str, Column] | None = None, key: str = ""
 ) -> ResultTable:
-    """Return the table of a frame with a row a method."""
-    lines = [method_row(row.method, row.setting, cells(row, columns)) for row in rows(frame)]
-    return table(name, ["method", *(column.title for column in columns)], by_method(lines), values, key)
+    """Return the table of a frame with a row a method, all settings of a method together.
+
+    Its columns are those of `columns_for`, or others.
+    """
+    shown = (columns_for(name, values, frame.columns) if columns is None else columns).values()
+    lines = [method_row(row.method, row.setting, [column.cell(row) for column in shown]) for row in rows(frame)]
+    order = list(dict.fromkeys(line.method for line in lines))
+    lines.sort(key=lambda line: order.index(line.method))
+    return table(name, ["method", *(column.title for column in shown)], lines, values, key)
 
 
-def of_rows(
-    name: str, objects: Iterable[Any], columns: Sequence[Column], values: Mapping[str, object], key: str = ""
-) -> ResultTable:
+def of_rows(name: str, objects: Iterable[Any], columns: Sequence[Column], values: Values) -> ResultTable:
     """Return the table of any objects, whose first column labels the rows; those that do not hold are marked."""
     lines = []
     for row in objects:
-        label, *others = cells(row, columns)
+        label, *others = (column.cell(row) for column in columns)
         lines.append(TableRow(label.text, tuple(others), kind="" if getattr(row, "holds", True) else "marked"))
-    return table(name, [column.title for column in columns], lines, values, key)
+    return table(name, [column.title for column in columns], lines, values)
 
 
-def paragraphs(texts: Iterable[str], values: Mapping[str, object]) -> list[str]:
+def paragraphs(texts: Iterable[str], values: Values) -> list[str]:
     """Return texts with their values; those with a value that is not known are left out."""
     made = []
     for text in texts:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
-from reports.tables.summary import front
+from reports.tables.summary import front, rows
 
 LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 """Errors that the page names the cheapest method for."""
@@ -16,21 +16,13 @@ LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 FLICKER_LIMITS: Final = (0.1, 0.01, 0.001)
 """Distances of the flicker from the truth's that the page names the cheapest method for."""
 
-_COLUMNS: Final = (
-    "role",
-    "method",
-    "setting",
-    "fabrics",
-    "ns",
-    "error",
-    "error_least",
-    "error_most",
-    "bytes_stored",
-    "flicker",
-    "front",
-    "front_flicker",
-    "front_bytes",
-)
+_KEYS: Final = ["role", "method", "setting", "fabrics"]
+_COSTS: Final = ["ns", "error", "error_least", "error_most", "bytes_stored", "flicker"]
+_FRONTS: Final = {
+    "front": ("ns", "error"),
+    "front_flicker": ("ns", "flicker"),
+    "front_bytes": ("bytes_stored", "error"),
+}
 
 
 def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.DataFrame | None = None) -> pd.DataFrame:
@@ -49,28 +41,25 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
         bytes_stored, flicker (distance from the truth's); front (of error and time), front_flicker (of flicker and
         time), front_bytes (of error and bytes).
     """
+    columns = [*_KEYS, *_COSTS, *_FRONTS]
     if errors.empty or timing.empty:
-        return pd.DataFrame(columns=[*_COLUMNS])
-    timing = timing[timing["method"] != TRUTH]
+        return pd.DataFrame(columns=columns)
     keys = ["method", "setting", "role"]
+    names = {"median_ns": "ns", "colour_rrmse": "error"}
+    names |= {f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)}
     moving = aliasing if aliasing is not None and len(aliasing) else pd.DataFrame(columns=[*keys, "flicker"])
     parts: list[pd.DataFrame] = []
     for _, group in errors.groupby("role", sort=False):
         whole = group[group["fabrics"] == group["fabrics"].max()]
-        part = whole.merge(timing, on=["method", "setting"]).merge(moving[[*keys, "flicker"]], on=keys, how="left")
-        part = part.rename(columns={"median_ns": "ns", "colour_rrmse": "error"})
-        part = part.rename(columns={f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)})
+        part = whole.merge(timing[timing["method"] != TRUTH], on=["method", "setting"])
+        part = part.merge(moving[[*keys, "flicker"]], on=keys, how="left").rename(columns=names)
         part["error"] = part["error"].where(part["error"] > 0)
         part["flicker"] = part["flicker"].astype(float).abs()
-        for name, cost, fault in (
-            ("front", "ns", "error"), ("front_flicker", "ns", "flicker"), ("front_bytes", "bytes_stored", "error"),
-        ):  # fmt: skip
-            part[name] = front(list(zip(part[cost], part[fault], strict=True)))
-        parts.append(part[[*_COLUMNS]])
+        parts.append(part.assign(**{name: front(part, *costs) for name, costs in _FRONTS.items()})[columns])
     return pd.concat(parts, ignore_index=True)
 
 
 def cheapest(table: pd.DataFrame, limit: float, cost: str = "ns", fault: str = "error") -> Any | None:
     """Return the row of least cost among those whose fault is at most a limit; None if there is none."""
     within = table[(table[fault] <= limit) & table[cost].notna()]
-    return None if within.empty else next(within.sort_values([cost, fault], kind="stable").itertuples())
+    return None if within.empty else next(rows(within.sort_values([cost, fault], kind="stable")))

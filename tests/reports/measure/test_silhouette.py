@@ -14,7 +14,6 @@ from reports.measure.silhouette import (
     read_edge,
     render_edge,
     silhouette,
-    silhouette_table,
     true_edge,
 )
 from reports.options import EdgeOptions
@@ -126,20 +125,6 @@ def test_records_are_those_of_the_edge_that_was_rendered(tmp_path):
     ]
     np.testing.assert_allclose([r.value for r in records], silhouette(Flat(), DENIM, TINY, truth), rtol=1e-5)
     assert {(r.method, r.fabric, r.role) for r in records} == {("flat", "denim", "seen")}
-
-
-def test_the_table_is_the_mean_over_fabrics(tmp_path):
-    path = tmp_path / "edge.exr"
-    render_edge(DENIM, TINY, path)
-    first = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
-    second = [
-        record.model_copy(update={"fabric": "basket", "value": 3 * record.value, "role": "unseen"}) for record in first
-    ]
-    (row,) = silhouette_table([*first, *second]).itertuples()
-    assert (row.method, row.setting, row.fabrics) == ("flat", "", 2)
-    expected = [2 * record.value for record in first]
-    assert [row.coverage, row.displacement, row.light] == pytest.approx(expected)
-    assert silhouette_table([]).empty
 
 
 RADIUS = 5.0
