@@ -54,27 +54,22 @@ Path("my.toml").write_text(text.replace("[bench]", '[[models]]\\nmodel = "matt"\
 assert any("matt" in task.title for task in plan(load_recipe("my.toml")))
 """,
     "A metric": """
-from pathlib import Path
-from types import SimpleNamespace
 import numpy as np
 from pipeline.truth.query import Answers, Queries
 from reports.measure import held_out
-from reports.options import BenchOptions
 from reports.record import to_table
 from reports.tables.page_tables import page_frames, result_tables
 from weaves.fabric import load_fabric
 u = np.zeros(3, np.float32)
 up = np.tile(np.float32([0, 0, 1]), (3, 1))
 answers = Answers.opaque(np.full((3, 4), 0.1, np.float32), np.full((3, 4), 1e-3, np.float32), np.ones(3, np.int32))
-held_out_rows = load_fabric("denim"), Queries.round(u, u, u + 1, up, up), answers
-held_out._held_out = lambda *_: held_out_rows
+rows = held_out.HeldOut(load_fabric("denim"), Queries.round(u, u, u + 1, up, up), answers)
 class Method:
     name, setting = "off", ""
     def prepare(self, fabric): ...
     def predict(self, fabric, queries, seed=0):
         return answers.mean + np.float32([[0], [0], [0.25]])
-manifest = SimpleNamespace(about={"truth": {}})
-records = held_out.measure_errors(Method(), manifest, Path(), "denim", "seen", BenchOptions())
+records = [one.model_copy(update={"role": "seen"}) for one in held_out.measure_errors(Method(), rows, 0)]
 (found,) = [record for record in records if record.metric == "largest_error"]
 assert abs(found.value - 0.25) < 1e-6 and found.unit == "1/sr"
 assert "largest_error" in set(to_table(records)["metric"])

@@ -12,21 +12,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
-from pipeline.shards.manifest import Manifest
-from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
+from reports.measure.held_out import HeldOut
 from reports.measure.timing import Contender, affordable, time_side_by_side
 from reports.options import TimingOptions
-from reports.record import Metric, Provenance, Record
-from weaves.fabric import Fabric
+from reports.record import Metric, Record
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
@@ -53,15 +50,11 @@ LONGEST: Final = 0.02
 FEWEST: Final = 512
 """Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""
 
-_Rows = list[tuple[Fabric, Queries, Answers]]
-
 
 def measure_by_size(
     methods: Sequence[Method],
-    manifest: Manifest,
-    folder: Path,
+    fabrics: Iterable[HeldOut],
     options: TimingOptions,
-    provenance: Provenance | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
@@ -70,7 +63,7 @@ def measure_by_size(
     many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
     edge of the class, value); its value is that over all classes. `progress` receives the finished share.
     """
-    classes, shares = _classes(manifest, folder)
+    classes, shares = _classes(fabrics)
     methods = [
         one for one in methods if any(one.covers(cloth) for members in classes.values() for cloth, _, _ in members)
     ]
@@ -94,47 +87,38 @@ def measure_by_size(
             times[index].append((low, timing.quartiles[1]))
     records = []
     for index, method in enumerate(methods):
-        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
-        errors = _errors(subject, method, classes, shares, options.seed)
+        subject, errors = _errors(method, classes, shares, options.seed)
         mean = sum(shares[low] * ns for low, ns in times[index])
         records.append(subject.of("size_time", mean, errors[0].count, curve=tuple(times[index])))
         records += errors
     return records
 
 
-def measure_errors_by_size(
-    methods: Sequence[Method], manifest: Manifest, folder: Path, seed: int, provenance: Provenance | None = None
-) -> list[Record]:
+def measure_errors_by_size(methods: Sequence[Method], fabrics: Iterable[HeldOut], seed: int) -> list[Record]:
     """Measure errors as `measure_by_size` does, without times; `seed` is that of random methods."""
-    classes, shares = _classes(manifest, folder)
-    records = []
-    for method in methods:
-        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
-        records += _errors(subject, method, classes, shares, seed)
-    return records
+    classes, shares = _classes(fabrics)
+    return [record for method in methods for record in _errors(method, classes, shares, seed)[1]]
 
 
-def _classes(manifest: Manifest, folder: Path) -> tuple[dict[float, _Rows], dict[float, float]]:
+def _classes(fabrics: Iterable[HeldOut]) -> tuple[dict[float, list[HeldOut]], dict[float, float]]:
     """Return the queries and the truth of each class by its lower edge, and the share of all queries it holds."""
-    classes: dict[float, _Rows] = {}
+    classes: dict[float, list[HeldOut]] = {}
     counts: dict[float, int] = {}
-    for name in manifest.names("seen", "unseen"):
-        queries, answers = manifest.read(folder, name, "test")
+    for fabric, queries, answers in fabrics:
         size = np.sqrt(queries.sigma * queries.sigma_minor)
         for low, high in itertools.pairwise(EDGES):
             chosen = np.flatnonzero((size >= low) & (size < high))
             if chosen.size:
                 counts[low] = counts.get(low, 0) + chosen.size
-                members = (manifest.fabrics[name], queries.take(chosen), answers.take(chosen))
-                classes.setdefault(low, []).append(members)
+                classes.setdefault(low, []).append(HeldOut(fabric, queries.take(chosen), answers.take(chosen)))
     total = sum(counts.values())
     return {low: classes[low] for low in sorted(classes)}, {low: count / total for low, count in counts.items()}
 
 
 def _errors(
-    subject: Record, method: Method, classes: Mapping[float, _Rows], shares: Mapping[float, float], seed: int
-) -> list[Record]:
-    """Return the error of each measure, the mean over fabrics; 0 where it is lost in the noise of the truth."""
+    method: Method, classes: Mapping[float, Sequence[HeldOut]], shares: Mapping[float, float], seed: int
+) -> tuple[Record, list[Record]]:
+    """Return the subject, and each error, the mean over fabrics; 0 where it is lost in the noise of the truth."""
     curves: dict[str, list[tuple[float, float]]] = {name: [] for name in MEASURES}
     count = 0
     for low, members in classes.items():
@@ -151,6 +135,7 @@ def _errors(
             curves[name].append((low, float(np.mean([e.relative_rmse for e in found if e.mean > 0] or [0.0]))))
     # Squared errors add up: over all classes they weigh as their queries occur.
     wholes = {name: math.sqrt(sum(shares[low] * error**2 for low, error in curve)) for name, curve in curves.items()}
-    return [
+    subject = Record(method=method.name, setting=method.setting)
+    return subject, [
         subject.of(metric, wholes[name], count, curve=tuple(curves[name])) for name, (metric, _) in MEASURES.items()
     ]

@@ -28,7 +28,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.error import COLOUR_WEIGHTS
 from reports.options import EXTREME_TRUTH, Role
-from reports.record import Metric, Provenance, Record
+from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -106,7 +106,6 @@ def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
 def measure_extremes(
     families: Sequence[Sequence[Method]],
     fabrics: Sequence[tuple[Fabric, Role]],
-    provenance: Provenance | None = None,
     truth: TruthOptions = EXTREME_TRUTH,
 ) -> list[Record]:
     """Measure methods at their extremes.
@@ -134,11 +133,10 @@ def measure_extremes(
         if not any(covering):
             continue
         true = estimate(fabric, inputs.queries, truth, 0).mean.astype(np.float64)
-        about = Record(fabric=fabric.name, role=role, provenance=provenance or Provenance(), method="")
         for family in covering:
             own: Array | None = None
             for method in family:
-                subject = about.model_copy(update={"method": method.name, "setting": method.setting})
+                subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, role=role)
                 method.prepare(fabric)
                 answers, found = _measured(subject, method, fabric, inputs, true)
                 records += found

@@ -20,8 +20,8 @@ from pipeline.truth.scattering.thread_colours import component_colours
 from reports.error import colour_noise
 from reports.images.exr import read_exr, write_exr
 from reports.measure.aliasing import excess_energy, flicker, spectrum, temporal_variance
-from reports.options import FrameOptions, Role
-from reports.record import TRUTH, Provenance, Record
+from reports.options import FrameOptions
+from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
 
@@ -64,14 +64,7 @@ def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
     write_exr(path, channels, {"fabric": fabric.name, "scene": "plane", "method": TRUTH, "frames": options.frames})
 
 
-def measure_aliasing(
-    method: Method,
-    fabric: Fabric,
-    role: Role,
-    options: FrameOptions,
-    frames: Path,
-    provenance: Provenance | None = None,
-) -> list[Record]:
+def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
     """Measure flicker and excess energy of a method on the moving plane.
 
     Parameters
@@ -92,7 +85,7 @@ def measure_aliasing(
         planes.append(_spread(gbuffer, shade(fabric, values, queries) @ _LUMINANCE))
     shown = np.array(planes)
     lit, rows = reference.lit, reference.rows
-    subject = _subject(method.name, method.setting, fabric, role, provenance)
+    subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="plane")
     motion = flicker(shown[:, lit], reference.truth[:, lit], 0.0, reference.noise[:, lit])
     energy = excess_energy(shown[:, rows], reference.truth[:, rows], 0.0, reference.noise[:, rows])
     return [
@@ -102,13 +95,11 @@ def measure_aliasing(
     ]
 
 
-def measure_truth_frames(
-    fabric: Fabric, role: Role, options: FrameOptions, frames: Path, provenance: Provenance | None = None
-) -> list[Record]:
+def measure_truth_frames(fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
     """Measure the truth's own frames: the variance that the motion brings, and their spectrum."""
     reference = _read(frames, options)
     lit, rows = reference.lit, reference.rows
-    subject = _subject(TRUTH, "", fabric, role, provenance)
+    subject = Record(method=TRUTH, fabric=fabric.name, scene="plane")
     own = temporal_variance(reference.truth[:, lit], reference.noise[:, lit])
     mean = float(reference.truth[:, lit].mean())
     return [
@@ -133,17 +124,6 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Floats:
     plane = np.zeros(gbuffer.lit.shape)
     plane[gbuffer.lit] = values[:, 0]
     return plane
-
-
-def _subject(method: str, setting: str, fabric: Fabric, role: Role, provenance: Provenance | None) -> Record:
-    return Record(
-        method=method,
-        setting=setting,
-        fabric=fabric.name,
-        role=role,
-        scene="plane",
-        provenance=provenance or Provenance(),
-    )
 
 
 def _spectrum(subject: Record, frames: Floats, noise: Floats, mean: float) -> Record:

@@ -17,8 +17,7 @@ import numpy as np
 
 from pipeline.scenes.shade import colours
 from pipeline.truth.query import Queries
-from reports.options import Role
-from reports.record import Metric, Provenance, Record
+from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -55,18 +54,11 @@ def furnace_queries(repeat: tuple[int, int]) -> Queries:
     return Queries.round(u, v, sigma, every, np.repeat(wo, DIRECTIONS, axis=0).astype(np.float32))
 
 
-def measure_furnace(method: Method, fabric: Fabric, role: Role, provenance: Provenance | None = None) -> list[Record]:
+def measure_furnace(method: Method, fabric: Fabric) -> list[Record]:
     """Return the three worst figures of a method on a fabric."""
     method.prepare(fabric)
     values = method.predict(fabric, furnace_queries(fabric.weave.repeat), 0).astype(np.float64)
     energy = 2.0 * math.pi * values.reshape(-1, DIRECTIONS, 4).mean(axis=1)
     figures = (energy[:, 2:].sum(axis=1), energy[:, :2].sum(axis=1), (energy @ colours(fabric)).max(axis=1))
-    subject = Record(
-        method=method.name,
-        setting=method.setting,
-        fabric=fabric.name,
-        role=role,
-        scene="queries",
-        provenance=provenance or Provenance(),
-    )
+    subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="queries")
     return [subject.of(m, float(x.max()), len(x)) for m, x in zip(_METRICS, figures, strict=True)]

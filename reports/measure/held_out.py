@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count, cycle, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,8 +30,8 @@ from reports.catalogue import AddedMetric, enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors, most_error
 from reports.measure.memory import peak_memory
 from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
-from reports.options import ErrorOptions, Role, TimingOptions
-from reports.record import TRUTH, Metric, Provenance, Record
+from reports.options import TimingOptions
+from reports.record import TRUTH, Metric, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -48,38 +48,31 @@ _COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
 )
 
 
-def measure_errors(
-    method: Method,
-    manifest: Manifest,
-    folder: Path,
-    fabric: str,
-    role: Role,
-    options: ErrorOptions,
-    provenance: Provenance | None = None,
-) -> list[Record]:
-    """Measure a method on a fabric's held-out queries: MSE in colour, and relative errors (`reports.error`).
+class HeldOut(NamedTuple):
+    """Held-out queries about a fabric, with the truth's answers."""
 
-    Parameters
-    ----------
-    method : Method
-        Must cover the fabric.
-    manifest, folder : Manifest, Path
-        The data set.
-    fabric, role : str
-        Name of the fabric, and whether general models saw it.
-    options : ErrorOptions
-        Number of rows, and the seed of random methods.
-    """
-    cloth, queries, truth, values = _answered(method, manifest, folder, fabric, options)
-    subject = Record(
-        method=method.name,
-        setting=method.setting,
-        fabric=fabric,
-        role=role,
-        scene="queries",
-        provenance=provenance or Provenance(),
-    )
-    records = subject.of_error(colour_error(values, truth, colours_of(cloth, queries)))
+    fabric: Fabric
+    queries: Queries
+    truth: Answers
+
+    def answered(self, method: Method, seed: int) -> tuple[npt.NDArray[np.float32], Record]:
+        """Return the answers of a method that covers the fabric, and the subject of its Records."""
+        method.prepare(self.fabric)
+        own = int(fingerprint(["errors", self.fabric.name, seed]), 16)
+        subject = Record(method=method.name, setting=method.setting, fabric=self.fabric.name, scene="queries")
+        return method.predict(self.fabric, self.queries, own), subject
+
+
+def held_out(manifest: Manifest, folder: Path, name: str, rows: int | None = None) -> HeldOut:
+    """Return the first rows of a fabric's test split; all of them if `rows` is not given."""
+    queries, answers = manifest.read(folder, name, "test")
+    return HeldOut(manifest.fabrics[name], queries.take(slice(rows)), answers.take(slice(rows)))
+
+
+def measure_errors(method: Method, rows: HeldOut, seed: int) -> list[Record]:
+    """Measure a method: MSE in colour, and relative errors (`reports.error`); `seed` is that of random methods."""
+    truth, (values, subject) = rows.truth, rows.answered(method, seed)
+    records = subject.of_error(colour_error(values, truth, colours_of(rows.fabric, rows.queries)))
     relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
     relative["colour_rrmse_99"] = most_error(values, truth)
     relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
@@ -90,16 +83,7 @@ def measure_errors(
     return records
 
 
-def measure_added(
-    method: Method,
-    metric: AddedMetric,
-    manifest: Manifest,
-    folder: Path,
-    fabric: str,
-    role: Role,
-    options: ErrorOptions,
-    provenance: Provenance | None = None,
-) -> Record:
+def measure_added(method: Method, metric: AddedMetric, rows: HeldOut, seed: int) -> Record:
     """Measure a metric from outside; arguments as for `measure_errors`.
 
     Raises
@@ -109,59 +93,33 @@ def measure_added(
     """
     enter(metric.row)
     measured = load_function(metric)
-    cloth, queries, truth, values = _answered(method, manifest, folder, fabric, options)
-    value = measured(cloth, queries, values, truth.mean, truth.standard_error)
-    subject = Record(
-        method=method.name,
-        setting=method.setting,
-        fabric=fabric,
-        role=role,
-        scene="queries",
-        provenance=provenance or Provenance(),
-    )
+    values, subject = rows.answered(method, seed)
+    value = measured(rows.fabric, rows.queries, values, rows.truth.mean, rows.truth.standard_error)
     return subject.of(metric.row.name, value, len(values)).made_by(metric.origin)
 
 
-def _answered(
-    method: Method, manifest: Manifest, folder: Path, fabric: str, options: ErrorOptions
-) -> tuple[Fabric, Queries, Answers, npt.NDArray[np.float32]]:
-    """Return a fabric, its held-out queries, the truth, and a method's values."""
-    cloth, queries, truth = _held_out(manifest, folder, fabric, options)
-    method.prepare(cloth)
-    return cloth, queries, truth, method.predict(cloth, queries, int(fingerprint(["errors", fabric, options.seed]), 16))
-
-
-def measure_truth(
-    manifest: Manifest,
-    folder: Path,
-    fabric: str,
-    role: Role,
-    options: ErrorOptions,
-    provenance: Provenance | None = None,
-) -> list[Record]:
-    """Measure the truth on a fabric's held-out queries: median and quartiles of |standard error| / |mean|.
+def measure_truth(rows: HeldOut) -> Record:
+    """Measure the truth: median and quartiles of |standard error| / |mean|.
 
     Both are norms over the four components, as in the estimator's stopping rule.
     """
-    _, _, truth = _held_out(manifest, folder, fabric, options)
-    size = np.linalg.norm(truth.mean, axis=1)
-    relative = np.linalg.norm(truth.standard_error, axis=1)[size > 0] / size[size > 0]
-    low, median, high = (float(q) for q in np.percentile(relative, [25, 50, 75]))
-    subject = Record(method=TRUTH, fabric=fabric, role=role, scene="queries", provenance=provenance or Provenance())
-    return [subject.of("truth_relative_error", median, len(relative), low=low, high=high)]
+    size = np.linalg.norm(rows.truth.mean, axis=1)
+    relative = np.linalg.norm(rows.truth.standard_error, axis=1)[size > 0] / size[size > 0]
+    low, median, high = quartiles(relative)
+    subject = Record(method=TRUTH, fabric=rows.fabric.name, scene="queries")
+    return subject.of("truth_relative_error", median, len(relative), low=low, high=high)
 
 
 def measure_timing(
     methods: Sequence[Method],
-    manifest: Manifest,
-    folder: Path,
+    fabrics: Sequence[HeldOut],
+    truth: TruthOptions,
     options: TimingOptions,
-    provenance: Provenance | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
-    """Time methods side by side on held-out queries of all named fabrics; note bytes, memory and the cost of a fabric.
+    """Time methods side by side on held-out queries of all fabrics; note bytes, memory and the cost of a fabric.
 
-    `progress` receives the finished share.
+    The truth is timed with the options it was made by; `progress` receives the finished share.
 
     Returns
     -------
@@ -172,12 +130,7 @@ def measure_timing(
         truth last, with every reading as `samples` and the queries a fabric as `note`
         (`reports.measure.timing.affordable`).
     """
-    sample = []
-    for name in manifest.names("seen", "unseen"):
-        cloth, queries, _ = _held_out(manifest, folder, name, options)
-        sample.append((cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))))
-
-    truth = TruthOptions.model_validate(manifest.about["truth"])
+    sample = [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in fabrics]
     _prepare(methods, [cloth for cloth, _ in sample])
     entries, records, edits = [], [], count(1)
     for index, method in enumerate(methods):
@@ -185,7 +138,7 @@ def measure_timing(
         covered = [(cloth, queries) for cloth, queries in sample if method.covers(cloth)]
         if not covered:
             continue
-        subject = Record(method=method.name, setting=method.setting, provenance=provenance or Provenance())
+        subject = Record(method=method.name, setting=method.setting)
         entries.append((subject, affordable(Contender(method.predict, covered))))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
         records.append(subject.of("bytes_stored", stored, len(covered)))
@@ -193,7 +146,7 @@ def measure_timing(
         records += [subject.of("peak_memory", memory, 3)] if memory is not None else []
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
     exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
-    entries.append((Record(method=TRUTH, provenance=provenance or Provenance()), exact))
+    entries.append((Record(method=TRUTH), exact))
     return records + _times(entries, options, lambda share: progress(0.3 + 0.7 * share))
 
 
@@ -246,11 +199,4 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
             return []
         times.append(milliseconds(partial(method.prepare, new)))
     low, median, high = quartiles(times)
-    found = subject.of("prepare_time", median, len(times), low=low, high=high, samples=tuple(times))
-    return [found]
-
-
-def _held_out(manifest: Manifest, folder: Path, name: str, options: ErrorOptions) -> tuple[Fabric, Queries, Answers]:
-    queries, answers = manifest.read(folder, name, "test")
-    rows = slice(options.rows)
-    return manifest.fabrics[name], queries.take(rows), answers.take(rows)
+    return [subject.of("prepare_time", median, len(times), low=low, high=high, samples=tuple(times))]

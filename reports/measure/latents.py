@@ -12,7 +12,7 @@ is the delay until the next answer: the fabric's maps are made and encoded again
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
@@ -27,7 +27,7 @@ from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.timing import milliseconds, quartiles
 from reports.options import LATENT_PAIRS
-from reports.record import Metric, Provenance, Record
+from reports.record import Metric, Record
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
 
@@ -87,61 +87,41 @@ def between(pair: Pair, share: float) -> Fabric:
 
 
 def measure_paths(
-    method: Method,
-    chosen: Sequence[Pair],
-    distribution: QueryOptions,
-    truth: TruthOptions,
-    rows: int = ROWS,
-    provenance: Provenance | None = None,
+    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = ROWS
 ) -> list[Record]:
-    """Return the errors of blending and of encoding anew along each path.
+    """Return the errors of blending and of encoding anew along the path between two fabrics.
 
     Parameters
     ----------
     method : Method
         Must be one that `Blends`.
-    chosen : sequence of Pair
-        Paths.
     distribution : QueryOptions
-        Distribution of the queries; the same ones at every share.
-    truth : TruthOptions
-        Options of the truth.
-    rows : int
-        Queries at each share.
+        Distribution of the `rows` queries, the same ones at every share.
 
     Returns
     -------
     list of Record
         `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at `SHARES`.
     """
-    records = []
-    for pair in chosen:
-        queries = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows)
-        answers = _truths(pair, queries, truth)
-        subject = Record(
-            method=method.name,
-            setting=method.setting,
-            fabric=pair.first.name,
-            note=pair.about,
-            provenance=provenance or Provenance(),
-        )
-        for metric, values in _along(method, pair, queries):
-            errors = [_error(found, answer) for found, answer in zip(values, answers, strict=True)]
-            curve = tuple(zip(SHARES, errors, strict=True))
-            records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
+    queries, records = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows), []
+    answers = _truths(pair, queries, truth)
+    subject = Record(method=method.name, setting=method.setting, fabric=pair.first.name, note=pair.about)
+    for metric, values in _along(method, pair, queries):
+        errors = [
+            colour_error(found, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
+            for found, answer in zip(values, answers, strict=True)
+        ]
+        curve = tuple(zip(SHARES, errors, strict=True))
+        records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
     return records
 
 
-def measure_edits(
-    method: Method, fabric: Fabric, repeats: int = EDITS, provenance: Provenance | None = None
-) -> list[Record]:
+def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[Record]:
     """Return the time until answers can follow an edit of a yarn, and one of a colour: medians, in milliseconds.
 
     Edits change the warp's relief, or its diffuse colour, a little each time: no two fabrics are the same.
     """
-    subject = Record(
-        method=method.name, setting=method.setting, fabric=fabric.name, provenance=provenance or Provenance()
-    )
+    subject = Record(method=method.name, setting=method.setting, fabric=fabric.name)
     method.prepare(fabric)
     steps = [(step + 1) / (repeats + 2) for step in range(repeats + 1)]
     yarns = [{"relief": fabric.warp.relief * (0.9 + 0.1 * step)} for step in steps]
@@ -173,20 +153,12 @@ def _between(first: Yarn, second: Yarn, share: float) -> Yarn:
 def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:
     """Return the truth at every share: of the yarns in between, or the cross-fade of both drafts."""
     if pair.differs == "yarns":
-        return [_truth(between(pair, share), queries, truth, _SEED) for share in SHARES]
-    ends = _truth(pair.first, queries, truth, _SEED), _truth(pair.second, queries, truth, _SEED + 1)
+        return [estimate(between(pair, share), queries, truth, _SEED) for share in SHARES]
+    ends = estimate(pair.first, queries, truth, _SEED), estimate(pair.second, queries, truth, _SEED + 1)
     return [_faded(*ends, share) for share in SHARES]
-
-
-def _truth(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> Answers:
-    return estimate(fabric, queries, options, seed)
 
 
 def _faded(first: Answers, second: Answers, share: float) -> Answers:
     mean = (1.0 - share) * first.mean + share * second.mean
     error = np.hypot((1.0 - share) * first.standard_error, share * second.standard_error)
     return Answers.opaque(mean.astype(np.float32), error.astype(np.float32), first.count + second.count)
-
-
-def _error(values: npt.NDArray[np.float32], answers: Answers) -> float:
-    return colour_error(values, answers, COLOUR_WEIGHTS, resamples=0).relative_rmse

@@ -23,8 +23,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.scattering.thread_colours import component_colours
 from reports.error import colour_noise, squared_error
 from reports.images.exr import RGB, read_exr, write_exr
-from reports.options import PictureOptions, Role
-from reports.record import TRUTH, Provenance, Record
+from reports.options import PictureOptions
+from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -47,14 +47,7 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
 
 
 def render_method(
-    method: Method,
-    fabric: Fabric,
-    role: Role,
-    scene: View,
-    options: PictureOptions,
-    truth: Path,
-    path: Path,
-    provenance: Provenance | None = None,
+    method: Method, fabric: Fabric, scene: View, options: PictureOptions, truth: Path, path: Path
 ) -> list[Record]:
     """Write a method's picture of a scene and measure its MSE over the lit pixels.
 
@@ -77,15 +70,7 @@ def render_method(
     reference = read_exr(truth)
     lit = gbuffer.lit
     error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit], resamples=0)
-    subject = Record(
-        method=method.name,
-        setting=method.setting,
-        fabric=fabric.name,
-        role=role,
-        scene=scene,
-        provenance=provenance or Provenance(),
-    )
-    return subject.of_error(error)
+    return Record(method=method.name, setting=method.setting, fabric=fabric.name, scene=scene).of_error(error)
 
 
 def write_picture(

@@ -8,11 +8,7 @@ the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacit
 A method without `missed` knows no curved cloth. It is evaluated as a flat material is on a curved surface: the
 same queries with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
 
-A query knows one curvature, that of the boundary along the ray. On a cylinder it is Euler's k1 cos^2 + k2 sin^2 in the
-plane of ray and normal. Elsewhere it changes along the way, and a ray that grazes a strongly curved place may still
-meet the flatter ground behind it: the mean of the curvatures would inflate silhouettes. So the minimum over a short
-stretch past the shading point is taken, along the section of the boundary by that plane [Kuznetsov2022Curved].
-Curvatures are lengths to the power -1: cloth whose yarns are s times as wide sees s times the curvature.
+The camera looks along the plane of the normals: all queries have the curvature 1/r, by Euler's k1 cos^2 + k2 sin^2.
 """
 
 from __future__ import annotations
@@ -30,8 +26,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.opacity import opacity
 from pipeline.truth.query import Queries
 from reports.images.exr import read_exr, write_exr
-from reports.options import EdgeOptions, Role
-from reports.record import TRUTH, Provenance, Record
+from reports.options import EdgeOptions
+from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
 
 Floats = npt.NDArray[np.float64]
@@ -46,36 +42,12 @@ class SeesThrough(Protocol):
 
 
 class Edge(NamedTuple):
-    """Pictures of the strip, the outline at the right, H by W.
-
-    Attributes
-    ----------
-    coverage : float64 (H, W)
-        Share of a pixel that the cloth hides.
-    light : float64 (H, W, 3)
-        Linear RGB.
-    """
+    """Pictures of the strip, the outline at the right."""
 
     coverage: Floats
+    """Share of a pixel that the cloth hides, (H, W)."""
     light: Floats
-
-
-class Silhouette(NamedTuple):
-    """A method's edge beside the truth's.
-
-    Attributes
-    ----------
-    coverage_rmse : float
-        Root mean squared error of the coverage.
-    displacement : float
-        Distance of the method's edge outside the true one, mean over the rows, in yarn spacings.
-    light_rmse : float
-        Root mean squared error of the light, over pixels and channels.
-    """
-
-    coverage_rmse: float
-    displacement: float
-    light_rmse: float
+    """Linear RGB, (H, W, 3)."""
 
 
 def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
@@ -94,8 +66,6 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
         [np.stack([cosine, zero, -sine], -1), np.stack([zero, one, zero], -1), np.stack([sine, zero, cosine], -1)], 1
     )
     wi, wo = frame @ light, frame[:, :, 2]
-    boundary = np.diag([1.0 / radius**2, 0.0, 1.0 / radius**2])
-    curvature = minimum_curvature(boundary, radius * frame[:, 2], np.tile([0.0, 0.0, 1.0], (len(v), 1)))
     result = Queries.round(
         np.mod(radius * np.arcsin(sine), repeat[0]).astype(np.float32),
         np.mod(v, repeat[1]).astype(np.float32),
@@ -103,7 +73,7 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
         wi.astype(np.float32),
         wo.astype(np.float32),
     )
-    return result._replace(curvature=curvature.astype(np.float32))
+    return result._replace(curvature=np.full(len(v), 1.0 / radius, np.float32))
 
 
 def true_edge(fabric: Fabric, options: EdgeOptions) -> Edge:
@@ -127,18 +97,6 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     return _edge(fabric, queries, np.ones(len(queries.u), np.float32), components, options)
 
 
-def silhouette(method: Method, fabric: Fabric, options: EdgeOptions, truth: Edge | None = None) -> Silhouette:
-    """Compare a method's edge with the truth's, which is computed unless it is given."""
-    truth = truth or true_edge(fabric, options)
-    found = edge_of(method, fabric, options)
-    covered = found.coverage - truth.coverage
-    return Silhouette(
-        coverage_rmse=float(np.sqrt(np.square(covered).mean())),
-        displacement=float(covered.sum(axis=1).mean() * options.pixel),
-        light_rmse=float(np.sqrt(np.square(found.light - truth.light).mean())),
-    )
-
-
 def render_edge(fabric: Fabric, options: EdgeOptions, path: Path) -> None:
     """Write the truth's pictures to `path`: R, G, B the light, A the coverage."""
     edge = true_edge(fabric, options)
@@ -152,37 +110,23 @@ def read_edge(path: Path) -> Edge:
     return Edge(exr.channels["A"].astype(np.float64), exr.stack("R", "G", "B").astype(np.float64))
 
 
-def measure_silhouette(
-    method: Method,
-    fabric: Fabric,
-    role: Role,
-    options: EdgeOptions,
-    truth: Path,
-    provenance: Provenance | None = None,
-) -> list[Record]:
-    """Measure a method's edge against the truth's: errors of coverage and light, and how far the edge lies outside.
+def measure_silhouette(method: Method, fabric: Fabric, options: EdgeOptions, truth: Path) -> list[Record]:
+    """Measure a method's edge against the truth's.
 
-    Parameters
-    ----------
-    method : Method
-        Must cover the fabric.
-    truth : Path
-        The pictures that `render_edge` wrote with the same options.
+    Returns
+    -------
+    list of Record
+        Root mean squared errors of the coverage, and of the light over pixels and channels; between them the distance
+        of the method's edge outside the true one, the mean over the rows, in yarn spacings. `truth` are the pictures
+        that `render_edge` wrote with the same options.
     """
-    reference = read_edge(truth)
-    found = silhouette(method, fabric, options, reference)
-    subject = Record(
-        method=method.name,
-        setting=method.setting,
-        fabric=fabric.name,
-        role=role,
-        provenance=provenance or Provenance(),
-    )
-    pixels = reference.coverage.size
+    reference, found = read_edge(truth), edge_of(method, fabric, options)
+    covered, pixels = found.coverage - reference.coverage, reference.coverage.size
+    subject = Record(method=method.name, setting=method.setting, fabric=fabric.name)
     return [
-        subject.of("silhouette_coverage", found.coverage_rmse, pixels),
-        subject.of("silhouette_displacement", found.displacement, options.rows),
-        subject.of("silhouette_light", found.light_rmse, pixels),
+        subject.of("silhouette_coverage", float(np.sqrt(np.square(covered).mean())), pixels),
+        subject.of("silhouette_displacement", float(covered.sum(axis=1).mean() * options.pixel), options.rows),
+        subject.of("silhouette_light", float(np.sqrt(np.square(found.light - reference.light).mean())), pixels),
     ]
 
 
@@ -196,67 +140,3 @@ def _edge(
     colour = shade(fabric, components, queries)
     cover = coverage.astype(np.float64).reshape(options.rows, -1)
     return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))
-
-
-_STEPS = 32  # along a stretch
-_CORRECTIONS = 3  # of Newton, which bring a step along the tangent back to the curve
-
-
-def minimum_curvature(
-    quadric: npt.ArrayLike, point: npt.ArrayLike, wo: npt.ArrayLike, spacing: float = 1.0, stretch: float = 4.0
-) -> Floats:
-    """Return the least curvature of a quadric over a stretch past each point, in 1/yarn spacings, at least 0.
-
-    Parameters
-    ----------
-    quadric : float (3, 3)
-        Symmetric A of the boundary p.Ap = 1 with outward normals Ap: diag(1/r^2, 1/r^2, 0) is a cylinder of radius r
-        around z. In the world's lengths.
-    point : float (N, 3)
-        Shading points on it.
-    wo : float (N, 3)
-        Unit vectors to the viewer; the stretch runs away from it.
-    spacing : float
-        Length of a yarn spacing in the world, > 0.
-    stretch : float
-        Length of the stretch, in yarn spacings; 0: the curvature at the point. The paper does not say how long.
-
-    Returns
-    -------
-    float64 (N,)
-        Concave places count as flat.
-    """
-    matrix, position, viewer = (np.asarray(array, np.float64) for array in (quadric, point, wo))
-    gradient = position @ matrix
-    length = np.linalg.norm(gradient, axis=-1, keepdims=True)
-    normal = gradient / length
-    ahead = _unit_along(-viewer, normal)
-
-    # The section by the plane of ray and normal: points x = (ahead, up) with x.Mx + 2 x.(0, length) = 0.
-    basis = np.stack([ahead, normal], axis=1)
-    section = np.einsum("nij,jk,nlk->nil", basis, matrix, basis)
-    linear = np.concatenate([np.zeros_like(length), length], axis=-1)
-    x, step = np.zeros_like(linear), stretch * spacing / _STEPS
-    least = np.full(len(x), np.inf)
-    for walked in range(_STEPS + 1):
-        slope = np.einsum("nij,nj->ni", section, x) + linear
-        steepness = np.linalg.norm(slope, axis=-1)
-        along = np.stack([slope[:, 1], -slope[:, 0]], axis=-1) / steepness[:, None]
-        least = np.minimum(least, np.einsum("ni,nij,nj->n", along, section, along) / steepness)
-        if walked == _STEPS or step == 0.0:
-            break
-        x = x + step * along
-        for _ in range(_CORRECTIONS):
-            slope = np.einsum("nij,nj->ni", section, x) + linear
-            value = np.einsum("ni,ni->n", slope + linear, x)
-            x = x - slope * (0.5 * value / np.square(slope).sum(axis=-1))[:, None]
-    return np.asarray(np.maximum(least, 0.0) * spacing)
-
-
-def _unit_along(direction: Floats, normal: Floats) -> Floats:
-    """Return the unit vectors of directions in the tangent planes; any tangent for a direction along the normal."""
-    flat = direction - np.sum(direction * normal, axis=-1, keepdims=True) * normal
-    size = np.linalg.norm(flat, axis=-1, keepdims=True)
-    any_tangent = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)])
-    any_tangent /= np.linalg.norm(any_tangent, axis=-1, keepdims=True)
-    return np.where(size > 1e-9, flat / np.maximum(size, 1e-300), any_tangent)

@@ -3,11 +3,11 @@
 import pytest
 
 from pipeline.analytic.exact_points import PointSampler
-from pipeline.shards.generate import ShardTask, generate_shard
-from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from reports.measure.held_out import HeldOut
 from reports.options import BenchOptions
 from reports.record import Record
 from weaves.fabric import load_fabric
@@ -82,27 +82,13 @@ def oracle():
 
 
 @pytest.fixture(scope="session")
-def dataset(tmp_path_factory):
-    """A data set of held-out rows alone: (manifest, folder)."""
-    folder = tmp_path_factory.mktemp("dataset")
-    truth = TruthOptions(relative_error=0.05, max_count=1024)
-    fabrics = {name: load_fabric(name) for name in ("denim", "twill_4_4")}
-    entries = []
-    for name, fabric in fabrics.items():
-        task = ShardTask(fabric=fabric, split="test", start=0, rows=400, seed=1, truth=truth)
-        generate_shard(task, folder / f"{name}.parquet")
-        entries.append(
-            ShardEntry(file=f"{name}.parquet", fabric=name, split="test", start=0, rows=400, sha256="0" * 64)
-        )
-    manifest = Manifest(
-        name="tiny",
-        fingerprint="0123456789abcdef",
-        roles={"seen": ["denim"], "population": [], "unseen": ["twill_4_4"]},
-        fabrics=fabrics,
-        about={"truth": truth.model_dump(mode="json")},
-        shards=entries,
-    )
-    return manifest, folder
+def dataset():
+    """Held-out rows of two fabrics: [denim, twill_4_4]."""
+    truth, rows = TruthOptions(relative_error=0.05, max_count=1024), []
+    for fabric in map(load_fabric, ("denim", "twill_4_4")):
+        queries = draw_queries(QueryOptions(), fabric.repeat, 1, 0, 400)
+        rows.append(HeldOut(fabric, queries, estimate(fabric, queries, truth, 1)))
+    return rows
 
 
 def with_random_unseen(records):

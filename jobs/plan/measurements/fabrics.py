@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
@@ -52,10 +52,8 @@ class TruthNoise(Measurement):
         from reports.measure.frames import measure_truth_frames
         from reports.measure.held_out import measure_truth
 
-        manifest, folder, about = self.dataset.opened(out)
-        records = measure_truth(manifest, folder, self.fabric.name, self.role, self.errors, about)
-        frames = out / self.frames.path
-        return records + measure_truth_frames(self.fabric, self.role, self.frame_options, frames, about)
+        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
+        return [measure_truth(rows), *measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)]
 
 
 class OnFabric(Measurement):
@@ -113,10 +111,6 @@ class OnFabric(Measurement):
             for view in self.views
         )
 
-    def picture(self, setting: str, view: View) -> Path:
-        """Return the path of the picture of a setting."""
-        return Path("-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr")
-
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
@@ -132,22 +126,19 @@ class OnFabric(Measurement):
         from reports.measure.pictures import render_method
         from reports.measure.silhouette import measure_silhouette
 
-        manifest, folder, _ = self.dataset.opened(out)
-        about, fabric, role = self.model.provenance(self.dataset.fingerprint), self.fabric, self.role
-        frames, records = out / self.frames.path, []
-        methods = self.model.methods(out)
+        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
+        methods, records = self.model.methods(out), []
         methods += self.model.variants(methods, self.ways)
-        for index, method in enumerate(methods):
-            records += measure_errors(method, manifest, folder, fabric.name, role, self.errors, about)
-            records += measure_furnace(method, fabric, role, about)
-            records += measure_aliasing(method, fabric, role, self.frame_options, frames, about)
+        for index, method in enumerate(methods, start=1):
+            records += measure_errors(method, rows, self.errors.seed)
+            records += measure_furnace(method, self.fabric)
+            records += measure_aliasing(method, self.fabric, self.frame_options, out / self.frames.path)
             if self.edge and self.edge_options:
-                records += measure_silhouette(method, fabric, role, self.edge_options, out / self.edge.path, about)
+                records += measure_silhouette(method, self.fabric, self.edge_options, out / self.edge.path)
             for view, truth in self.views.items() if method.setting in self.shown else ():
                 path = out / self.picture(method.setting, view)
-                options = self.picture_options
-                records += render_method(method, fabric, role, view, options, out / truth.path, path, about)
-            progress((index + 1) / len(methods))
+                records += render_method(method, self.fabric, view, self.picture_options, out / truth.path, path)
+            progress(index / len(methods))
         return records
 
 
@@ -158,6 +149,7 @@ class OnUnseenPopulation(Measurement):
     """
 
     kind: Literal["errors on random fabrics"] = "errors on random fabrics"
+    role: ClassVar[Role] = "unseen"
     model: Trained
     ways: RunOptions
     fabrics: tuple[Coloured, ...]
@@ -188,14 +180,13 @@ class OnUnseenPopulation(Measurement):
         """Measure one method after the other."""
         from reports.measure.held_out import measure_errors
 
-        manifest, folder, _ = self.dataset.opened(out)
-        about, records = self.model.provenance(self.dataset.fingerprint), []
-        methods = self.model.methods(out)
+        methods, records = self.model.methods(out), []
         methods += self.model.variants(methods, self.ways)
-        pairs = [(method, fabric.name) for method in methods for fabric in self.fabrics]
-        for index, (method, name) in enumerate(pairs):
-            records += measure_errors(method, manifest, folder, name, "unseen", self.errors, about)
-            progress((index + 1) / len(pairs))
+        names = [fabric.name for fabric in self.fabrics]
+        for index, method in enumerate(methods):
+            for done, rows in enumerate(self.dataset.read(out, names, self.errors.rows), start=1):
+                records += measure_errors(method, rows, self.errors.seed)
+                progress((index + done / len(names)) / len(methods))
         return records
 
 
@@ -230,9 +221,7 @@ class ErrorsBySize(Measurement):
         """Measure all classes of footprints."""
         from reports.measure.by_size import measure_errors_by_size
 
-        manifest, folder, _ = self.dataset.opened(out)
-        about = self.model.provenance(self.dataset.fingerprint)
-        return measure_errors_by_size(self.model.methods(out), manifest, folder, self.seed, about)
+        return measure_errors_by_size(self.model.methods(out), self.dataset.read(out), self.seed)
 
 
 class OfAddedMetric(Measurement):
@@ -267,9 +256,5 @@ class OfAddedMetric(Measurement):
         """Measure one method after the other."""
         from reports.measure.held_out import measure_added
 
-        manifest, folder, _ = self.dataset.opened(out)
-        about = self.model.provenance(self.dataset.fingerprint)
-        return [
-            measure_added(one, self.metric, manifest, folder, self.fabric.name, self.role, self.errors, about)
-            for one in self.model.methods(out)
-        ]
+        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
+        return [measure_added(one, self.metric, rows, self.errors.seed) for one in self.model.methods(out)]

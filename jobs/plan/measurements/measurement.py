@@ -19,7 +19,7 @@ from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    from reports.record import Record
+    from reports.record import Provenance, Record
 
 _SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
 """Fields that say what is measured, in the order of a title."""
@@ -108,6 +108,19 @@ class Measurement(Task):
         """Most threads that a method may use while it is measured."""
         return 1
 
+    def picture(self, setting: str, view: str = "") -> Path:
+        """Return the path of the picture of a setting."""
+        return Path("-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr")
+
+    @property
+    def provenance(self) -> Provenance:
+        """Data set and training that its numbers come from, where there is one."""
+        from reports.record import Provenance
+
+        dataset, model = getattr(self, "dataset", None), getattr(self, "model", None)
+        trained = {"model": " ".join(model.needs), "seed": model.seed} if model else {}
+        return Provenance(dataset=dataset.fingerprint if dataset else "", **trained)
+
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
         code, ways = {*self.code}, list(held(self, RunOptions))
@@ -165,7 +178,7 @@ class Measurement(Task):
 
         measured = self.without(list(left_out)) if left_out else self
         assert measured is not None
-        records = measured.measure(out, progress)
+        records = [self._stamped(record) for record in measured.measure(out, progress)]
         records += [
             Record(method=name, scene=getattr(self, "scene", ""), metric="not_run", value=1.0, note=reason)
             for name, reason in left_out.items()
@@ -176,8 +189,14 @@ class Measurement(Task):
         write_records(out / self.records, records, this_machine(self.threads))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Return the Records; pictures are written."""
+        """Return the Records, without what is common to all of them; pictures are written."""
         raise NotImplementedError
+
+    def _stamped(self, record: Record) -> Record:
+        """Return a Record with the provenance, and the role of the fabric where all have the same."""
+        about = self.provenance.model_copy(update={"origin": record.provenance.origin})
+        role = getattr(self, "role", record.role)
+        return record.model_copy(update={"provenance": about, "role": role})
 
 
 def _label(subject: object) -> str:

@@ -62,7 +62,7 @@ class AtExtremes(Measurement):
             fabrics.append((lustrous(fabrics[0][0]), "unseen"))
         precisions = EXTREME_PRECISIONS if self.model.networks else ()
         families = [[unchecked(one), *runs(one, precisions)] for one in self.model.methods(out)]
-        return measure_extremes(families, fabrics, self.model.provenance(), self.truth)
+        return measure_extremes(families, fabrics, self.truth)
 
 
 class Latents(Measurement):
@@ -98,9 +98,9 @@ class Latents(Measurement):
         from reports.measure.latents import measure_edits, measure_paths, pairs
 
         (method,) = self.model.methods(out)
-        about, chosen = self.model.provenance(), pairs()
-        records = measure_edits(method, chosen[0].first, provenance=about)
-        for index, pair in enumerate(chosen):
-            records += measure_paths(method, [pair], self.queries, self.truth, provenance=about)
-            progress((index + 1) / len(chosen))
+        chosen = pairs()
+        records = measure_edits(method, chosen[0].first)
+        for index, pair in enumerate(chosen, start=1):
+            records += measure_paths(method, pair, self.queries, self.truth)
+            progress(index / len(chosen))
         return records

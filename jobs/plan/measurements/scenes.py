@@ -153,10 +153,6 @@ class OnScene(Measurement):
         name = self.model.options.name
         return tuple(PictureFile("", self.scene, name, setting, self.picture(setting)) for setting in self.shown)
 
-    def picture(self, setting: str) -> Path:
-        """Return the path of the frames of a setting."""
-        return Path("-".join(filter(None, (self.stem, setting.replace(" = ", "")))) + ".exr")
-
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
@@ -170,8 +166,7 @@ class OnScene(Measurement):
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
-        shot = read_shot(out / self.shot.path)
-        return measure_scene(methods, shot, self.options, pictures, self.model.provenance())
+        return measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
 
 
 class FrameTime(Measurement):

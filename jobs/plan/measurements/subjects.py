@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pipeline.models.fallback import Fallback
     from pipeline.models.method import Method
     from pipeline.shards.manifest import Manifest
-    from reports.record import Provenance
+    from reports.measure.held_out import HeldOut
 
 
 class HeldOutRows(TaskPart):
@@ -39,13 +39,19 @@ class HeldOutRows(TaskPart):
         """The tasks that make the rows."""
         return self.rows
 
-    def opened(self, out: Path) -> tuple[Manifest, Path, Provenance]:
-        """Return the manifest, the folder, and the provenance of Records."""
+    def manifest(self, out: Path) -> Manifest:
+        """Load the manifest of the data set."""
         from pipeline.shards.manifest import Manifest
-        from reports.record import Provenance
 
-        folder = out / self.folder
-        return Manifest.load(folder), folder, Provenance(dataset=self.fingerprint)
+        return Manifest.load(out / self.folder)
+
+    def read(self, out: Path, names: Sequence[str] | None = None, rows: int | None = None) -> Iterator[HeldOut]:
+        """Yield the first rows of each fabric; left out: all rows, of all named fabrics."""
+        from reports.measure.held_out import held_out
+
+        manifest = self.manifest(out)
+        for name in names or manifest.names("seen", "unseen"):
+            yield held_out(manifest, out / self.folder, name, rows)
 
 
 class Trained(TaskPart):
@@ -77,12 +83,6 @@ class Trained(TaskPart):
         settings = self.options.settings
         preparing = self.options.prepare_seconds * (len(settings) or 1)
         return fabrics * preparing + queries * self.options.seconds[1] * (sum(settings) or 1)
-
-    def provenance(self, dataset: str = "") -> Provenance:
-        """Return the provenance of Records of this model."""
-        from reports.record import Provenance
-
-        return Provenance(dataset=dataset, model=" ".join(self.needs), seed=self.seed)
 
     def methods(self, out: Path) -> list[Method]:
         """Load its methods, one a setting."""

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, ClassVar, Final, Literal
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
 from jobs.plan.task import Progress
+from pipeline.truth.options import TruthOptions
 from reports.options import RunOptions, TimingOptions, select
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
-    from reports.record import Provenance, Record
+    from reports.record import Record
 
 
 _SECONDS_A_CALL: Final = 0.15  # of a round of one row: all queries, then each of five classes of sizes
@@ -24,13 +25,13 @@ class TimedModel(Trained):
 
     ways: RunOptions
 
-    def not_run(self, methods: list[Method], provenance: Provenance) -> list[Record]:
+    def not_run(self, methods: list[Method]) -> list[Record]:
         """Return a Record for every runtime that this machine lacks."""
         from pipeline.models.runtimes import not_run
         from reports.record import Record
 
         return [
-            Record(method=one.name, setting=name, metric="not_run", value=1.0, note=reason, provenance=provenance)
+            Record(method=one.name, setting=name, metric="not_run", value=1.0, note=reason)
             for one in methods
             for name, reason in not_run(one, self.ways.runtimes).items()
         ]
@@ -77,14 +78,12 @@ class TimeOfMethods(Measurement):
         from reports.measure.by_size import measure_by_size
         from reports.measure.held_out import measure_timing
 
-        manifest, folder, about = self.dataset.opened(out)
+        truth = TruthOptions.model_validate(self.dataset.manifest(out).about["truth"])
         loaded = [(model, model.methods(out)) for model in self.models]
         methods = [method for _, own in loaded for method in own]
         variants = [run for model, own in loaded for run in model.variants(own, model.ways)]
-        records = measure_timing(
-            methods + variants, manifest, folder, self.options, about, lambda share: progress(0.6 * share)
-        )
-        records += [record for model, own in loaded for record in model.not_run(own, about)]
-        return records + measure_by_size(
-            methods, manifest, folder, self.options, about, lambda share: progress(0.6 + 0.4 * share)
-        )
+        rows = list(self.dataset.read(out, rows=self.options.rows))
+        records = measure_timing(methods + variants, rows, truth, self.options, lambda share: progress(0.6 * share))
+        records += [record for model, own in loaded for record in model.not_run(own)]
+        rows = list(self.dataset.read(out))
+        return records + measure_by_size(methods, rows, self.options, lambda share: progress(0.6 + 0.4 * share))

@@ -34,7 +34,7 @@ from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
-from reports.record import TRUTH, Metric, Provenance, Record
+from reports.record import TRUTH, Metric, Record
 from weaves.colour import LUMINANCE
 
 if TYPE_CHECKING:
@@ -83,11 +83,7 @@ def write_truth(shot: Shot, path: Path) -> None:
 
 
 def measure_scene(
-    methods: Sequence[Fallback],
-    shot: Shot,
-    options: SceneErrorOptions,
-    pictures: Mapping[str, Path],
-    provenance: Provenance | None = None,
+    methods: Sequence[Fallback], shot: Shot, options: SceneErrorOptions, pictures: Mapping[str, Path]
 ) -> list[Record]:
     """Measure the settings of a method on a scene.
 
@@ -114,7 +110,7 @@ def measure_scene(
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
             layers = frame_layers(shown) | difference_maps(shown[0], truth, errors, RELATIVE_EPSILON)
             write_picture(pictures[method.setting], shown[0], np.ones(lit.shape, np.bool_), about, layers=layers)
-        subject = _subject(method, shot, provenance)
+        subject = _subject(method, shot)
         records += errors.records(subject)
         records.append(_colour(subject, shot, answers, image))
         records += _over_time(subject, shown, reference, options)
@@ -146,9 +142,7 @@ def _over_time(subject: Record, shown: Floats, reference: _Reference, options: S
     ]
 
 
-def time_scene(
-    methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int, provenance: Provenance | None = None
-) -> list[Record]:
+def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
     Each cloth is timed on as many of its queries as one call can answer in `LONGEST`, at least `FEWEST`. The time of
@@ -175,9 +169,8 @@ def time_scene(
     for method, frames in zip(able, 1e-6 * np.einsum("mct,c->mt", readings, counts), strict=True):
         samples = tuple(frames.tolist())
         low, median, high = quartiles(samples)
-        subject = _subject(method, shot, provenance)
-        repeats = len(samples)
-        records.append(subject.of("frame_time", median, repeats, low=low, high=high, samples=samples))
+        frame_time = _subject(method, shot).of("frame_time", median, len(samples), low=low, high=high, samples=samples)
+        records.append(frame_time)
     return records
 
 
@@ -201,10 +194,8 @@ def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float3
     return subject.of("colour_rrmse", error.relative_rmse, error.count, low=low, high=high)
 
 
-def _subject(method: Method, shot: Shot, provenance: Provenance | None) -> Record:
-    return Record(
-        method=method.name, setting=method.setting, scene=shot.name, threads=1, provenance=provenance or Provenance()
-    )
+def _subject(method: Method, shot: Shot) -> Record:
+    return Record(method=method.name, setting=method.setting, scene=shot.name, threads=1)
 
 
 def difference_maps(

@@ -102,5 +102,5 @@ def test_the_note_on_a_model_names_its_seeds(one, three):
 
 def test_records_name_the_seed(three):
     for seed, same in of(three, OnFabric).items():
-        provenance = same[0].model.provenance()
+        provenance = same[0].provenance
         assert (provenance.seed, provenance.model) == (seed, of(three, Training)[seed][0].id)

@@ -4,8 +4,7 @@ from reports.measure.by_size import EDGES, MEASURES, SIZES, measure_by_size, mea
 
 
 def test_errors_are_those_of_the_class_alone(dataset, points, options):
-    manifest, folder = dataset
-    found = measure_by_size(points, manifest, folder, options)
+    found = measure_by_size(points, dataset, options)
     assert len(SIZES) == len(EDGES) - 1
     by = {(r.metric, r.setting): r for r in found}
     assert {r.metric for r in found} == {"size_time", *(metric for metric, _ in MEASURES.values())}
@@ -18,5 +17,5 @@ def test_errors_are_those_of_the_class_alone(dataset, points, options):
     assert min(values) <= few.value <= max(values)
     assert {low for low, _ in few.curve} <= set(EDGES[:-1])
     # Errors alone are the same numbers.
-    alone = measure_errors_by_size(points, manifest, folder, options.seed)
+    alone = measure_errors_by_size(points, dataset, options.seed)
     assert alone == [record for record in found if record.metric != "size_time"]

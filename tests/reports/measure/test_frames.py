@@ -29,7 +29,7 @@ def test_point_sampling_aliases_and_the_truth_does_not(frames, options, points, 
     denim = load_fabric("denim")
 
     def measured(method):
-        return {r.metric: r.value for r in measure_aliasing(method, denim, "seen", options, frames)}
+        return {r.metric: r.value for r in measure_aliasing(method, denim, options, frames)}
 
     one, _, sixteen = (measured(method) for method in points)
     own = measured(oracle)
@@ -39,7 +39,7 @@ def test_point_sampling_aliases_and_the_truth_does_not(frames, options, points, 
 
 
 def test_truth_has_a_spectrum_and_the_motions_variance(frames, options):
-    motion, spectrum = measure_truth_frames(load_fabric("denim"), "seen", options, frames)
+    motion, spectrum = measure_truth_frames(load_fabric("denim"), options, frames)
     assert (motion.metric, spectrum.metric) == ("motion", "spectrum")
     assert 0 < motion.value < 0.2
     frequency = [k for k, _ in spectrum.curve]

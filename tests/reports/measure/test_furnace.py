@@ -39,7 +39,7 @@ class Truth(Lambertian):
 
 def test_closed_forms():
     """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
-    records = measure_furnace(Lambertian(), load_fabric("denim"), "seen")
+    records = measure_furnace(Lambertian(), load_fabric("denim"))
     values = {record.metric: record.value for record in records}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
@@ -53,7 +53,7 @@ def test_every_patch_sees_the_same_lights():
 
 
 def test_the_truth_makes_no_light():
-    for record in measure_furnace(Truth(), load_fabric("polyester_lining"), "seen"):
+    for record in measure_furnace(Truth(), load_fabric("polyester_lining")):
         assert 0 < record.value <= 1.005, record.metric
 
 
@@ -69,7 +69,7 @@ class Bright(Lambertian):
 @pytest.mark.parametrize("name", ["polyester_lining", "silk_charmeuse", "twill_4_4", "voile"])
 def test_the_brightest_method_returns_at_most_what_arrives(name):
     # The integral is a sum over 256 directions of a smooth lobe: good to 1 %.
-    found = {r.metric: r.value for r in measure_furnace(Bounded(Bright()), load_fabric(name), "seen")}
+    found = {r.metric: r.value for r in measure_furnace(Bounded(Bright()), load_fabric(name))}
     assert found["furnace_diffuse"] <= 1.01
     assert found["furnace_specular"] < 0.6
 

@@ -47,7 +47,7 @@ class Slow:
 @pytest.fixture(scope="module")
 def measured():
     yarns, *_, draft = pairs()
-    return measure_paths(Truth(), [yarns, draft], ASKED, TRUTH, rows=128)
+    return [record for pair in (yarns, draft) for record in measure_paths(Truth(), pair, ASKED, TRUTH, rows=128)]
 
 
 def test_pairs_differ_in_one_thing_and_have_one_repeat():
@@ -107,7 +107,7 @@ def test_a_network_is_measured():
     method = Woven(WovenNetwork(WovenOptions(map_texels=16, encoder_channels=4, hidden=16, latent=8)))
     assert isinstance(method, Blends)
     pair = pairs()[0]
-    records = measure_paths(method, [pair], ASKED, TRUTH, rows=64)
+    records = measure_paths(method, pair, ASKED, TRUTH, rows=64)
     blended, anew = (np.array(record.curve)[:, 1] for record in records)
     # Its ends are encoded either way.
     np.testing.assert_allclose(blended[[0, -1]], anew[[0, -1]], rtol=1e-3)

@@ -28,7 +28,7 @@ def test_truth_is_lit_where_the_view_is(truth, options):
 
 def test_mse_is_that_of_the_pictures(truth, options, points, tmp_path):
     """Oracle: the mean square of the difference of the two files over lit pixels, less the noise in the truth's."""
-    records = render_method(points[0], load_fabric("denim"), "seen", "sphere", options, truth, tmp_path / "points.exr")
+    records = render_method(points[0], load_fabric("denim"), "sphere", options, truth, tmp_path / "points.exr")
     lit = view("sphere", *options.sphere_size, options=options.view).lit
     shown, reference = read_exr(tmp_path / "points.exr"), read_exr(truth)
     measured = np.square(shown.stack(*RGB)[lit].astype(np.float64) - reference.stack(*RGB)[lit]).mean()

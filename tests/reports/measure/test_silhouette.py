@@ -10,10 +10,8 @@ from reports.measure.silhouette import (
     edge_of,
     edge_queries,
     measure_silhouette,
-    minimum_curvature,
     read_edge,
     render_edge,
-    silhouette,
     true_edge,
 )
 from reports.options import EdgeOptions
@@ -73,16 +71,32 @@ def test_pixels_see_the_cylinder_as_the_camera_does():
     assert (queries.wi[:, 2] > 0.7).all()
 
 
-def test_the_truth_finds_its_own_edge():
-    assert silhouette(Truth(), DENIM, TINY) == (0.0, 0.0, 0.0)
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    path = tmp_path_factory.mktemp("edge") / "edge.exr"
+    render_edge(DENIM, TINY, path)
+    return path
 
 
-def test_a_flat_method_covers_everything_and_is_asked_flat():
-    method, truth = Flat(), true_edge(DENIM, TINY)
-    found = silhouette(method, DENIM, TINY, truth)
+def test_the_file_holds_the_edge_and_the_truth_finds_it(rendered):
+    truth, found = true_edge(DENIM, TINY), read_edge(rendered)
+    np.testing.assert_allclose(found.coverage, truth.coverage, atol=1e-7)
+    np.testing.assert_allclose(found.light, truth.light, rtol=1e-6, atol=1e-9)
+    values = [record.value for record in measure_silhouette(Truth(), DENIM, TINY, rendered)]
+    assert values == pytest.approx([0.0, 0.0, 0.0], abs=1e-7)
+
+
+def test_a_flat_method_covers_everything_and_is_asked_flat(rendered):
+    method, truth = Flat(), read_edge(rendered)
+    coverage, displacement, light = measure_silhouette(method, DENIM, TINY, rendered)
+    assert (coverage.metric, displacement.metric, light.metric) == tuple(
+        f"silhouette_{name}" for name in ("coverage", "displacement", "light")
+    )
+    assert {(r.method, r.fabric) for r in (coverage, displacement, light)} == {("flat", "denim")}
     assert 0.05 < truth.coverage.mean() < 0.95
-    assert found.displacement == pytest.approx(0.15 * (1 - truth.coverage.mean()))
-    assert found.coverage_rmse == pytest.approx(np.sqrt(((1 - truth.coverage) ** 2).mean()))
+    assert coverage.value == pytest.approx(np.sqrt(((1 - truth.coverage) ** 2).mean()))
+    assert displacement.value == pytest.approx(0.15 * (1 - truth.coverage.mean()))
+    assert light.value == pytest.approx(np.sqrt(((edge_of(Flat(), DENIM, TINY).light - truth.light) ** 2).mean()))
     assert (method.asked[0].curvature == 0).all()
 
 
@@ -111,85 +125,3 @@ def test_opacity_falls_towards_the_outline_and_flatter_cylinders_hide_more():
     assert means[2].mean() > means[0].mean() + 0.05
 
 
-def test_records_are_those_of_the_edge_that_was_rendered(tmp_path):
-    path = tmp_path / "edge.exr"
-    render_edge(DENIM, TINY, path)
-    truth = true_edge(DENIM, TINY)
-    np.testing.assert_allclose(read_edge(path).coverage, truth.coverage, atol=1e-7)
-    np.testing.assert_allclose(read_edge(path).light, truth.light, rtol=1e-6, atol=1e-9)
-    records = measure_silhouette(Flat(), DENIM, "seen", TINY, path)
-    assert [record.metric for record in records] == [
-        "silhouette_coverage",
-        "silhouette_displacement",
-        "silhouette_light",
-    ]
-    np.testing.assert_allclose([r.value for r in records], silhouette(Flat(), DENIM, TINY, truth), rtol=1e-5)
-    assert {(r.method, r.fabric, r.role) for r in records} == {("flat", "denim", "seen")}
-
-
-RADIUS = 5.0
-CYLINDER = np.diag([1 / RADIUS**2, 1 / RADIUS**2, 0.0])
-
-
-def _unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def test_straight_across_a_cylinder_it_is_one_over_the_radius():
-    turn = np.linspace(0.0, 6.0, 7)
-    point = RADIUS * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
-    across = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=-1)
-    found = minimum_curvature(CYLINDER, point, _unit(0.2 * point / RADIUS + across))
-    np.testing.assert_allclose(found, 1 / RADIUS, rtol=1e-12)
-
-
-def test_obliquely_it_is_eulers_and_along_the_axis_zero():
-    """The section is an ellipse that the point lies on the flattest place of: its least curvature is there."""
-    angle = np.linspace(0.0, np.pi / 2, 10)
-    point = np.tile([RADIUS, 0.0, 0.0], (10, 1))
-    wo = _unit(np.stack([0.1 + 0 * angle, np.cos(angle), np.sin(angle)], axis=-1))
-    expected = np.cos(angle) ** 2 / RADIUS
-    np.testing.assert_allclose(minimum_curvature(CYLINDER, point, wo), expected, rtol=1e-9, atol=1e-12)
-    # The mean over the stretch would be greater, but for the first and the last.
-    ahead = minimum_curvature(CYLINDER, point, wo, stretch=0.0)
-    np.testing.assert_allclose(ahead, expected, rtol=1e-12, atol=1e-12)
-
-
-def test_towards_the_flat_side_of_an_ellipse_it_is_that_of_the_end_of_the_stretch():
-    """Curvature a b / (a^2 sin^2 + b^2 cos^2)^(3/2) at (a cos, b sin); the stretch's end by arc length."""
-    a, b = 8.0, 3.0
-    turn = np.linspace(0.0, np.pi / 2, 200_001)
-    arc = np.concatenate([[0], np.cumsum(np.hypot(np.diff(a * np.cos(turn)), np.diff(b * np.sin(turn))))])
-    curve = a * b / (a**2 * np.sin(turn) ** 2 + b**2 * np.cos(turn) ** 2) ** 1.5
-    start = 40_000
-    point = np.array([[a * np.cos(turn[start]), b * np.sin(turn[start]), 0.0]])
-    tangent = _unit(np.array([[-a * np.sin(turn[start]), b * np.cos(turn[start]), 0.0]]))
-    quadric = np.diag([1 / a**2, 1 / b**2, 0.0])
-    stretch = 1.5
-    end = np.searchsorted(arc, arc[start] + stretch)
-    found = minimum_curvature(quadric, point, -tangent, stretch=stretch)
-    assert found[0] == pytest.approx(curve[end], rel=2e-3)
-    # The other way the curvature grows: the least is where it starts.
-    assert minimum_curvature(quadric, point, tangent, stretch=stretch)[0] == pytest.approx(curve[start], rel=1e-9)
-    assert curve[start] > 1.3 * curve[end]
-
-
-def test_wider_yarns_see_more_curvature():
-    sphere = np.eye(3) / RADIUS**2
-    point, wo = np.array([[0.0, 0.0, RADIUS]]), np.array([[0.6, 0.0, 0.8]])
-    for spacing in (0.01, 1.0, 3.0):
-        found = minimum_curvature(sphere, point, wo, spacing=spacing)
-        assert found[0] == pytest.approx(spacing / RADIUS, rel=1e-12)
-    # A larger world with its yarns is the same picture.
-    quadric = np.diag([1 / 8.0**2, 1 / 3.0**2, 1 / 5.0**2])
-    point = np.array([[8 * 0.6, 3 * 0.8, 0.0]])
-    small = minimum_curvature(quadric, point, np.array([[0.48, 0.6, 0.64]]), 0.25)
-    large = minimum_curvature(quadric / 4.0**2, 4.0 * point, np.array([[0.48, 0.6, 0.64]]), 1.0)
-    np.testing.assert_allclose(small, large, rtol=1e-12)
-
-
-def test_concave_places_are_flat_and_a_viewer_on_the_normal_is_answered():
-    hyperboloid = np.diag([1.0, 1.0, -1.0])
-    waist = np.array([[1.0, 0.0, 0.0]])
-    assert minimum_curvature(hyperboloid, waist, np.array([[0.0, 0.0, 1.0]]), stretch=0.1).tolist() == [0.0]
-    assert minimum_curvature(np.eye(3), waist, waist)[0] == pytest.approx(1.0)
