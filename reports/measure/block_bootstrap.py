@@ -74,7 +74,7 @@ def mse_difference(
     b: npt.ArrayLike,
     truth: npt.ArrayLike,
     mask: npt.NDArray[np.bool_],
-    options: ImageOptions | None = None,
+    options: ImageOptions,
 ) -> tuple[float, float, float]:
     """Return the MSE of b less that of a, and its 95 % interval over blocks of pixels.
 
@@ -87,7 +87,6 @@ def mse_difference(
     options : ImageOptions
         Blocks and resamples.
     """
-    options = options or ImageOptions()
     first, second, t = (np.asarray(picture, np.float64)[mask] for picture in (a, b, truth))
     rows = ((second - first) * (second + first - 2.0 * t)).mean(axis=1)
     _, low, high = block_interval(rows, mask, options.block, options.resamples, options.seed)

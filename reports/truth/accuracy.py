@@ -8,10 +8,9 @@ true error e. "Points saved" is that number over the points used.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +20,12 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS
-from reports.measure.timing import set_threads
+from reports.measure.timing import milliseconds, set_threads
 from reports.truth.row_records import RowRecords
-from reports.truth.throughput import FABRICS
 from weaves.fabric import Fabric, load_fabric
+
+FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
+"""One of each family, and the largest repeats."""
 
 REFERENCE: Final = 1 << 16
 """Points of a converged answer."""
@@ -48,22 +49,32 @@ class Accuracy:
     """Estimator, and requested points or error."""
     fabric: str
     """On which cloth."""
-    rmse: float
+    rmse: Annotated[float, "true_rmse"]
     """Root-mean-square error of .3 (S_warp + S_weft) + .5 (C_warp + C_weft) over its mean."""
-    true_error: float
-    """Median relative error."""
-    stated_error: float
-    """Median stated one."""
-    points: float
+    true_error: Annotated[float, "true_error"]
+    stated_error: Annotated[float, "stated_error"]
+    points: Annotated[float, "points"]
     """Points, or nodes, a query; the mean."""
-    rate: float
-    """Queries a second; the median of a few calls."""
-    saved: float
+    rate: Annotated[float, "query_rate"]
+    saved: Annotated[float, "points_saved"]
     """Points that `mc` would need for the same true error over those used."""
-    reference: float
+    reference: Annotated[float, "reference_error"]
     """Median relative error that the reference states."""
     count: int
     """Queries."""
+
+
+def default_queries(names: Sequence[str], rows: int, seed: int) -> Iterator[tuple[Fabric, Queries]]:
+    """Yield presets with queries of the default distribution; what follows runs on one thread."""
+    set_threads(1)
+    for fabric in map(load_fabric, names):
+        yield fabric, draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
+
+
+def seconds_a_query(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
+    """Return the time of one query; the median of a few calls."""
+    calls = [milliseconds(lambda: estimate(fabric, queries, options, _SEED)) for _ in range(_REPEATS)]
+    return 1e-3 * float(np.median(calls)) / len(queries.u)
 
 
 def fixed(estimator: EstimatorName, count: int) -> TruthOptions:
@@ -94,10 +105,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
     reference : int
         Points of a converged answer, a power of two.
     """
-    set_threads(1)
-    for name in fabrics:
-        fabric = load_fabric(name)
-        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+    for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
         found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
         spread = _spread([row for row in found if row.setting.startswith("mc,")])
@@ -109,11 +117,6 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
 def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, options: TruthOptions) -> Accuracy:
     """Return the errors and the cost of one setting; what it saves is not known yet."""
     answers = estimate(fabric, queries, options, _SEED)
-    times = []
-    for _ in range(_REPEATS):
-        start = time.perf_counter()
-        estimate(fabric, queries, options, _SEED)
-        times.append(time.perf_counter() - start)
     lit = np.linalg.norm(truth.mean, axis=1) > _DARK
     size = np.linalg.norm(truth.mean[lit], axis=1)
     wrong = np.linalg.norm(answers.mean[lit] - truth.mean[lit], axis=1) / size
@@ -126,7 +129,7 @@ def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, opt
         true_error=float(np.median(wrong)),
         stated_error=float(np.median(stated)),
         points=float(answers.count.mean()),
-        rate=len(lit) / float(np.median(times)),
+        rate=1.0 / seconds_a_query(fabric, queries, options),
         saved=1.0,
         reference=float(np.median(np.linalg.norm(truth.standard_error[lit], axis=1) / size)),
         count=len(lit),
@@ -138,17 +141,5 @@ def _spread(random: Sequence[Accuracy]) -> float:
     return float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
 
 
-RECORDS: Final = RowRecords(
-    Accuracy,
-    {
-        "rmse": "true_rmse",
-        "true_error": "true_error",
-        "stated_error": "stated_error",
-        "points": "points",
-        "rate": "query_rate",
-        "saved": "points_saved",
-        "reference": "reference_error",
-    },
-    setting=("setting",),
-)
+RECORDS: Final = RowRecords(Accuracy, setting=("setting",))
 """Accuracies as Records."""

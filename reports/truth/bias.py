@@ -10,20 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.measure.timing import set_threads
-from reports.truth.accuracy import fixed
+from reports.truth.accuracy import FABRICS, default_queries, fixed
 from reports.truth.row_records import RowRecords
-from reports.truth.throughput import FABRICS
-from weaves.fabric import load_fabric
 
 LIMIT: Final = 0.003
 """Bias that is small enough."""
@@ -48,7 +44,7 @@ class Bias:
     """One of `SIDES`."""
     component: str
     """One of `COMPONENTS`."""
-    value: float
+    value: Annotated[float, "bias"]
     """Relative to the mean of the component."""
     standard_error: float
     """Of `value`, from the spread over queries."""
@@ -75,17 +71,14 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
     reference : int
         Points of a reference answer, a power of two.
     """
-    set_threads(1)
-    for name in fabrics:
-        fabric = load_fabric(name)
-        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+    for fabric, queries in default_queries(fabrics, rows, _SEED):
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             lit = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
             truth = estimate(fabric, lit, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
             found = estimate(fabric, lit, TruthOptions(estimator="node_table"), _SEED).mean.astype(np.float64)
             for component, one, other in zip(COMPONENTS, found.T, truth.T, strict=True):
                 value, error = bias_of(one, other)
-                yield Bias(name, side, component, value, error, rows)
+                yield Bias(fabric.name, side, component, value, error, rows)
 
 
 def bias_of(found: Floats, truth: Floats) -> tuple[float, float]:
@@ -101,11 +94,5 @@ def bias_of(found: Floats, truth: Floats) -> tuple[float, float]:
     return ratio, spread / math.sqrt(len(truth)) / mean
 
 
-RECORDS: Final = RowRecords(
-    Bias,
-    {"value": "bias"},
-    setting=("side", "component"),
-    once={"standard_error": "standard_error"},
-    joint=": ",
-)
+RECORDS: Final = RowRecords(Bias, setting=("side", "component"), once={"standard_error": "standard_error"}, joint=": ")
 """Biases as Records."""

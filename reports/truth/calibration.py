@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -82,17 +82,17 @@ class Calibration:
     """Name of the estimator."""
     kind: str
     """One of `CLASSES`."""
-    ratio: float
+    ratio: Annotated[float, "error_ratio"]
     """rms(error) / rms(standard error), over the four components."""
-    exceeded: float
+    exceeded: Annotated[float, "bound_exceeded"]
     """Share of errors beyond their bound."""
     low: float | None
     """Lower end of the ratio's interval, at `LEVEL`; None in Records of before intervals."""
     high: float | None
     """Upper end."""
-    ratio_through: float
+    ratio_through: Annotated[float, "error_ratio_through"]
     """`ratio` of the transparency."""
-    exceeded_through: float
+    exceeded_through: Annotated[float, "bound_exceeded_through"]
     """`exceeded` of the transparency."""
     count: int
     """Queries."""
@@ -210,16 +210,5 @@ def interval(wrong: Floats, error: Floats, doubt: Floats) -> tuple[float, float]
     return math.exp(0.5 * (middle - reach)), math.exp(0.5 * (middle + reach))
 
 
-RECORDS: Final = RowRecords(
-    Calibration,
-    {
-        "ratio": "error_ratio",
-        "exceeded": "bound_exceeded",
-        "ratio_through": "error_ratio_through",
-        "exceeded_through": "bound_exceeded_through",
-    },
-    setting=("estimator", "kind"),
-    once={"low": "low", "high": "high"},
-    joint=": ",
-)
+RECORDS: Final = RowRecords(Calibration, setting=("estimator", "kind"), once={"low": "low", "high": "high"}, joint=": ")
 """Calibrations as Records."""

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED
-from pipeline.truth.estimator import estimate, uncalibrated
+from pipeline.truth.estimator import uncalibrated
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
-from reports.measure.timing import set_threads
+from reports.truth.accuracy import FABRICS, default_queries, seconds_a_query
 from reports.truth.row_records import RowRecords
-from reports.truth.throughput import FABRICS
-from weaves.fabric import Fabric, load_fabric
 
 CLASSES: Final = ("table alone", "borders refined", "sampled")
 """How a query is answered, the cheapest first."""
@@ -26,7 +21,6 @@ RELATIVE_ERROR: Final = 0.01
 """Requested error."""
 
 _ROWS = 1000
-_REPEATS = 3
 _SEED = 23
 _CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}
 
@@ -39,12 +33,9 @@ class Effort:
     """One of `CLASSES`."""
     fabric: str
     """Name of the cloth."""
-    share: float
-    """Share of the queries."""
-    points: float
-    """Nodes and points a query of this kind."""
-    seconds: float
-    """Time of a query of this kind."""
+    share: Annotated[float, "kind_share"]
+    points: Annotated[float, "kind_points"]
+    seconds: Annotated[float, "kind_time"]
     count: int
     """Queries of all kinds."""
 
@@ -59,10 +50,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Eff
     fabrics : sequence of str
         Presets.
     """
-    set_threads(1)
-    for name in fabrics:
-        fabric = load_fabric(name)
-        queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, rows)
+    for fabric, queries in default_queries(fabrics, rows, _SEED):
         options = TruthOptions(relative_error=RELATIVE_ERROR, max_count=1 << 14)
         answers = uncalibrated(fabric, queries, options, _SEED)
         kinds = np.array([_CLASS_OF[stage] for stage in answers.stage.tolist()])
@@ -70,27 +58,13 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Eff
             chosen = np.flatnonzero(kinds == number)
             yield Effort(
                 kind=kind,
-                fabric=name,
+                fabric=fabric.name,
                 share=chosen.size / rows,
                 points=float(answers.count[chosen].mean()) if chosen.size else 0.0,
-                seconds=_seconds(fabric, queries.take(chosen), options) if chosen.size else 0.0,
+                seconds=seconds_a_query(fabric, queries.take(chosen), options) if chosen.size else 0.0,
                 count=rows,
             )
 
 
-def _seconds(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
-    """Return the median time of a query among others of its kind."""
-    times = []
-    for _ in range(_REPEATS):
-        start = time.perf_counter()
-        estimate(fabric, queries, options, _SEED)
-        times.append(time.perf_counter() - start)
-    return float(np.median(times)) / len(queries.u)
-
-
-RECORDS: Final = RowRecords(
-    Effort,
-    {"share": "kind_share", "points": "kind_points", "seconds": "kind_time"},
-    setting=("kind",),
-)
+RECORDS: Final = RowRecords(Effort, setting=("kind",))
 """Efforts as Records."""

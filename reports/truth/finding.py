@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -38,13 +38,13 @@ class Finding:
     corner: str  # over which inputs
     arithmetic: str  # float32 or float64: what computes it; the next better one is the reference
     count: int  # inputs
-    worst: float  # worst relative error of the finite values
+    worst: Annotated[float, "worst_error"]  # relative, of the finite values
     at: str  # the input that did it
-    listed: float  # the error this form is known to make
-    not_finite: int  # values that are NaN or infinite
-    negative: int  # values below 0 where none can be
-    naive: float = math.nan  # worst relative error of the textbook's form; NaN if there is none
-    naive_not_finite: int = 0  # how often that one is NaN or infinite
+    listed: Annotated[float, "listed_error"]  # the error this form is known to make
+    not_finite: Annotated[int, "not_finite"]  # values that are NaN or infinite
+    negative: Annotated[int, "negative"]  # values below 0 where none can be
+    naive: Annotated[float, "naive_error"] = math.nan  # of the textbook's form; NaN if there is none
+    naive_not_finite: Annotated[int, "naive_not_finite"] = 0  # how often that one is NaN or infinite
 
     @property
     def limit(self) -> float:
@@ -156,14 +156,6 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
 
 RECORDS: Final = RowRecords(
     Finding,
-    {
-        "worst": "worst_error",
-        "listed": "listed_error",
-        "naive": "naive_error",
-        "not_finite": "not_finite",
-        "negative": "negative",
-        "naive_not_finite": "naive_not_finite",
-    },
     setting=("expression", "corner"),
     method_field="arithmetic",
     once={"note": "at"},

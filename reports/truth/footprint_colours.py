@@ -17,7 +17,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
@@ -48,13 +48,10 @@ class ColourLoss:
     """Name of the cloth."""
     size: str
     """Standard deviation of the footprints, in yarn spacings."""
-    loss: float
-    """Root mean square of the difference, relative to that of the exact colours."""
-    bias: float
-    """Relative difference of the means."""
-    seconds: float
-    """Time of a query's mean colours."""
-    exact_seconds: float
+    loss: Annotated[float, "colour_loss"]
+    bias: Annotated[float, "colour_bias"]
+    seconds: Annotated[float, "mean_colours_time"]
+    exact_seconds: Annotated[float, "exact_colours_time"]
     """Time of a query's exact colours, to a standard error of .3 %."""
     count: int
     """Queries."""
@@ -84,14 +81,5 @@ def measure(
             yield ColourLoss(name, f"{size:g}", loss, bias, (half - begun) / rows, (end - half) / rows, rows)
 
 
-RECORDS: Final = RowRecords(
-    ColourLoss,
-    {
-        "loss": "colour_loss",
-        "bias": "colour_bias",
-        "seconds": "mean_colours_time",
-        "exact_seconds": "exact_colours_time",
-    },
-    setting=("size",),
-)
+RECORDS: Final = RowRecords(ColourLoss, setting=("size",))
 """Losses as Records."""

@@ -15,7 +15,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -57,22 +57,16 @@ class Traced:
     """The scene."""
     samples: str
     """Samples a pixel, as text: it is part of the setting."""
-    error: float
-    """Mean squared error of linear RGB over the squared mean of the frame."""
-    seconds: float
+    error: Annotated[float, "traced_error"]
+    seconds: Annotated[float, "traced_time"]
     """Seconds of a processor for a frame."""
     count: int
     """Frames."""
-    gain: float = math.nan
+    gain: Annotated[float, "traced_gain"] = math.nan
     """Error of one point a sample in equal time over this error; NaN for one point a sample itself, and unknown."""
 
 
-RECORDS: Final = RowRecords(
-    Traced,
-    {"error": "traced_error", "seconds": "traced_time", "gain": "traced_gain"},
-    setting=("samples",),
-    method_field="method",
-)
+RECORDS: Final = RowRecords(Traced, setting=("samples",), method_field="method")
 """Frames as Records."""
 
 

@@ -1,7 +1,7 @@
 """Dataclasses as Records and back: one Record for each measured field of a row.
 
-`RowRecords` describes a class of rows once: the fields that name what was measured, and the metric of each
-measured field. A field that is NaN has no Record; reading gives it the default of its class.
+A measured field is annotated with its metric (`reports.catalogue`), the others name what was measured. A field that is
+NaN has no Record; reading gives it the default of its class.
 """
 
 from __future__ import annotations
@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from functools import cached_property
 from typing import Any, Generic, TypeVar, get_type_hints
 
+from reports.catalogue import METRICS
 from reports.record import TRUTH, Metric, Record
 
 Row = TypeVar("Row")
@@ -21,9 +23,7 @@ class RowRecords(Generic[Row]):
     """How the rows of one measurement are written as Records."""
 
     row: type[Row]
-    """A dataclass."""
-    metrics: Mapping[str, Metric]
-    """Metric of each measured field."""
+    """A dataclass; ``Annotated[float, "traced_error"]`` is the type of a measured field."""
     setting: tuple[str, ...]
     """Fields that together are the setting, joined by `joint`; only the last one may hold the separator."""
     method: str = TRUTH
@@ -34,6 +34,13 @@ class RowRecords(Generic[Row]):
     """Attributes of the Record of the first metric, such as ``note``, and the field that each holds."""
     joint: str = " | "
     """Separator of the parts of a setting."""
+
+    @cached_property
+    def metrics(self) -> dict[str, Metric]:
+        """Metric of each measured field, in the order of the catalogue."""
+        types = get_type_hints(self.row, include_extras=True)
+        fields_of = {kind.__metadata__[0]: name for name, kind in types.items() if hasattr(kind, "__metadata__")}
+        return {fields_of[metric]: metric for metric in METRICS if metric in fields_of}
 
     def to_records(self, found: Iterable[Row]) -> list[Record]:
         """Return one Record for each number."""

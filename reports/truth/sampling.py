@@ -24,7 +24,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -67,13 +67,11 @@ class VarianceSaving:
     """One of `SETTINGS`."""
     fabric: str
     """On which cloth; "(specular)" where its diffuse light is left out; or in which scene."""
-    variance_saved: float
-    """Variance of cosine sampling over the sampler's."""
-    saved_in_time: float
-    """Variance of cosine sampling times its time over those of the sampler."""
-    sample_time: float
+    variance_saved: Annotated[float, "variance_saved"]
+    saved_in_time: Annotated[float, "saved_in_time"]
+    sample_time: Annotated[float, "sample_time"]
     """Nanoseconds of a direction with its density."""
-    estimate_time: float
+    estimate_time: Annotated[float, "estimate_time"]
     """Nanoseconds of a direction with its density and value."""
     count: int
     """Directions."""
@@ -99,17 +97,7 @@ def measure(
         yield from _savings(scene_subjects(name, looks), f"scene {name}")
 
 
-RECORDS: Final = RowRecords(
-    VarianceSaving,
-    {
-        "variance_saved": "variance_saved",
-        "saved_in_time": "saved_in_time",
-        "sample_time": "sample_time",
-        "estimate_time": "estimate_time",
-    },
-    setting=("sampler",),
-    method="sampler",
-)
+RECORDS: Final = RowRecords(VarianceSaving, setting=("sampler",), method="sampler")
 """Savings as Records."""
 
 

@@ -13,7 +13,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import partial
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -41,13 +42,11 @@ from pipeline.truth.node_table.kernels import (
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
-from reports.measure.timing import set_threads
+from reports.measure.timing import quartiles, set_threads
+from reports.truth.accuracy import FABRICS, fixed
 from reports.truth.row_records import RowRecords
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import surface_at
-
-FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
-"""One of each family, and the largest repeats."""
 
 _REPEATS = 5
 _TURNS = 15  # of one thread and two
@@ -62,7 +61,7 @@ class Rate:
     """Work that was counted."""
     fabric: str
     """Name of the cloth."""
-    value: float
+    value: Annotated[float, "rate"]
     """In `unit`; the median."""
     low: float
     """First quartile."""
@@ -90,29 +89,31 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
     yield from _points()
     for name in fabrics:
         yield from _queries(load_fabric(name), rows)
-    yield _two_threads(load_fabric(fabrics[0]), rows)
-    yield from _models(load_fabric(fabrics[0]))
-    yield _memory(load_fabric(fabrics[0]), rows)
+    fabric, options = load_fabric(fabrics[0]), TruthOptions(estimator="node_table")
+    yield _threads_compared("queries", fabric, lambda queries: estimate(fabric, queries, options, _SEED), 4 * rows)
+    yield from _models(fabric)
+    yield _memory(fabric, rows)
 
 
 RECORDS: Final = RowRecords(
     Rate,
-    {"value": "rate"},
     setting=("what",),
     once={"low": "low", "high": "high", "unit": "unit", "note": "note"},
 )
 """Rates as Records."""
 
 
-def _rate(call: Callable[[], float], what: str, fabric: str, unit: str, note: str = "") -> Rate:
-    """Time a call that says how much it did."""
+def _rate(
+    call: Callable[[], Any], counted: Callable[[Any], float], what: str, fabric: str, unit: str, note: str = ""
+) -> Rate:
+    """Time a call; `counted` says how much is in its result."""
     call()
     rates = []
     for _ in range(_REPEATS):
         start = time.perf_counter()
         done = call()
-        rates.append(done / (time.perf_counter() - start))
-    low, middle, high = np.percentile(rates, [25, 50, 75]).tolist()
+        rates.append(counted(done) / (time.perf_counter() - start))
+    low, middle, high = quartiles(rates)
     return Rate(what, fabric, middle, low, high, unit, note)
 
 
@@ -124,21 +125,18 @@ def _points() -> Iterator[Rate]:
     queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, _SEED, 0, 2000)
     columns = columns_of(queries)
 
-    plain = _rate(lambda: float(_numpy_points(fabric, table, queries)), "points, NumPy", fabric.name, "points/s")
+    plain = _rate(lambda: _numpy_points(fabric, table, queries), int, "points, NumPy", fabric.name, "points/s")
     yield plain
     shares = no_shares(table.normal.shape[1])._replace(weight=table.evenly)
     for name, evaluate in (("specular", _evaluate_speculars), ("everything", _evaluate_all)):
-        rate = _rate(
-            lambda evaluate=evaluate: float(evaluate(model, table, columns, shares)),  # type: ignore[misc]
-            f"points, {name}",
-            fabric.name,
-            "points/s",
-        )
+        call = partial(evaluate, model, table, columns, shares)
+        rate = _rate(call, float, f"points, {name}", fabric.name, "points/s")
         yield replace(rate, note=f"{rate.value / plain.value:.0f} x NumPy")
-    exact = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1024, max_count=1024)
+    exact = fixed("owen", 1024)
     few = queries.take(slice(200))
     yield _rate(
-        lambda: float(estimate(fabric, few, exact, _SEED).count.sum()),
+        lambda: estimate(fabric, few, exact, _SEED),
+        lambda answers: answers.count.sum(),
         "points, sampled with exact visibility",
         fabric.name,
         "points/s",
@@ -193,7 +191,8 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
         reached = float(np.mean(doubt[lit] <= error * size[lit]))
         saved = _saved(fabric, queries.take(slice(200)), options)
         yield _rate(
-            lambda options=options: float(len(estimate(fabric, queries, options, _SEED).count)),  # type: ignore[misc]
+            partial(estimate, fabric, queries, options, _SEED),
+            lambda answers: len(answers.count),
             f"queries, {estimator}" + (f" at {error:.0%}" if estimator == "auto" else ""),
             fabric.name,
             "queries/s",
@@ -205,23 +204,11 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
 def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
     """Return the median ratio of points that independent sampling needs for the same stated error to those used."""
     answers = estimate(fabric, queries, options, _SEED)
-    count = 4096
-    plain = TruthOptions(estimator="mc", relative_error=1e-9, absolute_error=0.0, min_count=count, max_count=count)
-    random = estimate(fabric, queries, plain, _SEED)
+    random = estimate(fabric, queries, fixed("mc", 4096), _SEED)
     doubt, random_doubt = (np.linalg.norm(a.standard_error, axis=1) for a in (answers, random))
     lit = np.linalg.norm(answers.mean, axis=1) > 1e-3
     needed = random.count[lit] * (random_doubt[lit] / np.maximum(doubt[lit], 1e-12)) ** 2
     return float(np.median(needed / answers.count[lit]))
-
-
-def _two_threads(fabric: Fabric, rows: int) -> Rate:
-    """Return how much faster two threads answer than one; kernels run without the interpreter's lock."""
-    options = TruthOptions(estimator="node_table")
-
-    def answer(queries: Queries) -> object:
-        return estimate(fabric, queries, options, _SEED)
-
-    return _threads_compared("queries", fabric, answer, 4 * rows)
 
 
 def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], object], rows: int) -> Rate:
@@ -239,7 +226,7 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
     with ThreadPoolExecutor(2) as pool:
         found = [(both(map), both(pool.map)) for _ in range(1 + _TURNS)][1:]
     one, two = zip(*found, strict=True)
-    low, middle, high = np.percentile(two, [25, 50, 75]).tolist()
+    low, middle, high = quartiles(two)
     note = f"{max(two) / max(one):.2f} x one thread"
     return Rate(f"{what}, two threads", fabric.name, middle, low, high, "queries/s", note, _TURNS)
 
@@ -250,15 +237,8 @@ def _models(fabric: Fabric) -> Iterator[Rate]:
     methods: list[Method] = [*map(SoftNodes, DETAILS), *load_model(pretrained_folder("selvage"))]
     for method in methods:
         what = " ".join(filter(None, ("queries,", method.name, method.setting)))
-
-        def answer(asked: Queries, method: Method = method) -> object:
-            return method.predict(fabric, asked)
-
-        def count(answer: Callable[[Queries], object] = answer) -> float:
-            answer(queries)
-            return float(len(queries.u))
-
-        yield _rate(count, what, fabric.name, "queries/s")
+        answer = partial(method.predict, fabric)
+        yield _rate(partial(answer, queries), len, what, fabric.name, "queries/s")
         yield _threads_compared(what, fabric, answer, 4 * CHUNK_ROWS)
 
 

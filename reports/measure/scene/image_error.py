@@ -3,7 +3,7 @@
 m is the method's value, t the truth's, s its standard error, all linear RGB, <.> the mean over the lit pixels (the
 mask) and the channels.
 
-linear light    MSE and relative MSE as in `reports.error`, noise subtracted. Components: `light_errors`.
+linear light    MSE and relative MSE as in `reports.error`, noise subtracted.
 display light   PSNR, SSIM, FLIP, HDR-FLIP and CIEDE2000, means of maps. PSNR is infinite where pictures are equal.
 
 Noise floor: of MSE and relative MSE what was subtracted. The other measures are no sums of squares, nothing can be
@@ -59,6 +59,7 @@ DISPLAY_EXPOSURE: Final = 1.6
 
 _SSIM_SIGMA: Final = 1.5  # of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them
 _PIXELS_PER_DEGREE: Final = 67.0  # at which FLIP sees pictures: a 4K display .7 m wide from .7 m
+_DEFAULTS: Final = ImageOptions()
 _TONE_MAPPER: Final = "aces"  # by which HDR-FLIP shows its exposures
 
 
@@ -109,7 +110,7 @@ def image_errors(
     truth: npt.ArrayLike,
     standard_error: npt.ArrayLike,
     mask: npt.ArrayLike,
-    options: ImageOptions | None = None,
+    options: ImageOptions = _DEFAULTS,
     floor: Mapping[Metric, float] | None = None,
 ) -> ImageErrors:
     """Measure a picture against the truth's.
@@ -126,14 +127,10 @@ def image_errors(
     Raises
     ------
     BadInput
-        If sizes differ, a value that counts is not finite, the truth is dark, or nothing that counts is left.
+        If a value that counts is not finite, the truth is dark, or fewer than two blocks of pixels count.
     """
-    options = options or ImageOptions()
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
-    window = 2 * int(3.5 * _SSIM_SIGMA + 0.5) + 1
-    if t.shape[2] != 3 or min(lit.shape) < window:
-        raise BadInput("image errors", "size", t.shape, f"SSIM needs {window} pixels each way, and colour 3 channels")
-    mse, relative = light_errors(m, t, s, lit, options)
+    mse, relative = _light_errors(m[lit], t[lit], s[lit], lit, options)
     maps = perceived_maps(m, t, lit)
     floors = floor or noise_floor(t, s, lit, options)
     perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
@@ -141,30 +138,17 @@ def image_errors(
 
 
 def noise_floor(
-    truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions | None = None
+    truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, options: ImageOptions = _DEFAULTS
 ) -> dict[Metric, float]:
     """Return the scores of a noised copy of the truth, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
-    options = options or ImageOptions()
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
     noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], 1))
     maps = perceived_maps(noised, t, lit)
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
-def light_errors(
-    picture: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    standard_error: npt.ArrayLike,
-    mask: npt.ArrayLike,
-    options: ImageOptions | None = None,
-) -> tuple[Error, Error]:
-    """Return MSE and relative MSE of pictures with any channels, (H, W, C): of a component, C = 1.
-
-    Other arguments and errors are those of `image_errors`.
-    """
-    options = options or ImageOptions()
-    m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
-    m, t, s = m[lit], t[lit], s[lit]
+def _light_errors(m: Floats, t: Floats, s: Floats, lit: Mask, options: ImageOptions) -> tuple[Error, Error]:
+    """Return MSE and relative MSE; values, truth and standard error of the lit pixels, (N, 3)."""
     w = relative_weight(t, RELATIVE_EPSILON)
     squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
     errors = squared_error(m, t, s, 0), relative_squared_error(m, t, s, RELATIVE_EPSILON, 0)
@@ -201,14 +185,9 @@ def _checked(
     """Return the arguments as arrays, or say which of them cannot be used."""
     m, t, s = (np.asarray(values, np.float64) for values in (picture, truth, standard_error))
     lit = np.asarray(mask, dtype=np.bool_)
-    named = {"picture": m, "truth": t, "standard error": s}
-    for name, values in named.items():
-        if values.ndim != 3 or values.shape != t.shape or values.shape[:2] != lit.shape:
-            size = f"height, width, channels alike for all, and those of the mask {lit.shape} are needed"
-            raise BadInput("image errors", f"size of the {name}", values.shape, size)
     if not lit.any() or blocks(lit, o.block).max() < 1:
         raise BadInput("image errors", "lit pixels", int(lit.sum()), "at least two blocks of the picture must be lit")
-    for name, values in named.items():
+    for name, values in (("picture", m), ("truth", t), ("standard error", s)):
         if not np.isfinite(values[lit]).all():
             raise BadInput("image errors", name, "not finite", "every lit pixel needs a number")
     if min(t[lit].min(), s[lit].min()) < 0 or t[lit].max() == 0:

@@ -18,32 +18,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.models.fallback import Fallback
-from reports.error import COLOUR_WEIGHTS, squared_error
+from reports.error import COLOUR_WEIGHTS, relative_weight, squared_error
 from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON, image_errors, noise_floor
+from reports.measure.scene.image_error import (
+    DISPLAY_EXPOSURE,
+    RELATIVE_EPSILON,
+    ImageErrors,
+    image_errors,
+    noise_floor,
+)
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
-from reports.record import TRUTH, Metric, Record
+from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 
 if TYPE_CHECKING:
     from pipeline.models.method import Method
-from typing import Any
-
-from reports.error import relative_weight
-from reports.measure.scene.image_error import ImageErrors
-from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
 
@@ -60,19 +62,6 @@ _DISTANCE: Final = 0.7472  # of the eye, in metres
 _PEAK: Final = 200.0  # candela per square metre
 _CONTRAST: Final = 1000.0  # luminance of white over that of black
 _FRAMES_PER_SECOND: Final = 30.0
-
-
-class _Reference(NamedTuple):
-    """The truth's frames: the reference of every method."""
-
-    pictures: Floats
-    """(F, H, W, 3)"""
-    noise: Floats
-    """Standard errors of `pictures`."""
-    lit: npt.NDArray[np.bool_]
-    """Pixels of lit cloth, (F, H, W)."""
-    floor: dict[Metric, float]
-    """Scores of a noised copy of the first frame."""
 
 
 def write_truth(shot: Shot, path: Path) -> None:
@@ -99,47 +88,42 @@ def measure_scene(
         Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
         of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.scene_errors`).
     """
-    image, reference = options.image, _reference(shot, options.image)
-    truth, noise, lit = reference.pictures[0], reference.noise[0], reference.lit[0]
-    records = []
+    image, truths, noises, lit = options.image, shot.pictures(), shot.noise(), shot.lit
+    floor, records = noise_floor(truths[0], noises[0], lit[0], image), []
     for method in (one for one in methods if shot.covered_by(one)):
         answers = shot.answers(method, options.seed)
         shown = shot.pictures(answers)
-        errors = image_errors(shown[0], truth, noise, lit, image, reference.floor)
+        errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            layers = frame_layers(shown) | difference_maps(shown[0], truth, errors, RELATIVE_EPSILON)
-            write_picture(pictures[method.setting], shown[0], np.ones(lit.shape, np.bool_), about, layers=layers)
+            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors, RELATIVE_EPSILON)
+            write_picture(pictures[method.setting], shown[0], np.ones_like(lit[0]), about, layers=layers)
         subject = _subject(method, shot)
         records += errors.records(subject)
         records.append(_colour(subject, shot, answers, image))
-        records += _over_time(subject, shown, reference, options)
+        own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, truths, noises))
+        records += _over_time(subject, own, truth, noise, np.asarray(lit.all(axis=0)), image)
         outside = [method.out_of_domain(cloth.fabric, cloth.queries) for cloth in shot.cloths]
         records.append(subject.of("fallback_share", float(np.concatenate(outside).mean()), sum(map(len, outside))))
     return records
 
 
-def _reference(shot: Shot, image: ImageOptions) -> _Reference:
-    pictures, noise, lit = shot.pictures(), shot.noise(), shot.lit
-    return _Reference(pictures, noise, lit, noise_floor(pictures[0], noise[0], lit[0], image))
+def _over_time(
+    subject: Record, own: Floats, truth: Floats, noise: Floats, still: npt.NDArray[np.bool_], image: ImageOptions
+) -> list[Record]:
+    """Return the aliasing of a method's luminance, and FovVideoVDP's score where that is installed.
 
-
-def _over_time(subject: Record, shown: Floats, reference: _Reference, options: SceneErrorOptions) -> list[Record]:
-    """Return the aliasing of a method's frames, and FovVideoVDP's score where that is installed."""
-    own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, reference.pictures, reference.noise))
-    still, image = np.asarray(reference.lit.all(axis=0)), options.image
+    `still` are the pixels that show lit cloth all the way, if there are any.
+    """
     records = []
-    if still.any():  # else no pixel shows lit cloth all the way
+    if still.any():
         value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
         scale = truth[:, still].mean() ** 2
         rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
         _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
         records.append(subject.of("flicker", value, len(own), low=low, high=high))
-    return [
-        *records,
-        subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)),
-        *fovvideovdp_records(subject, own, truth),
-    ]
+    records.append(subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)))
+    return records + fovvideovdp(subject, own, truth)
 
 
 def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int) -> list[Record]:
@@ -224,52 +208,20 @@ def relative_differences(
     return maps
 
 
-def absence() -> str:
-    """Return one sentence that says why the measure is missing; empty where it is not."""
-    try:
-        _library()
-    except ImportError as error:
-        return f"FovVideoVDP is not measured: {error}; pip install pyfvvdp adds it."
-    return ""
-
-
-def fovvideovdp(frames: npt.ArrayLike, truth: npt.ArrayLike) -> float | None:
-    """Return the quality of a film in JOD; None where pyfvvdp is not installed.
+def fovvideovdp(subject: Record, film: Floats, truth: Floats) -> list[Record]:
+    """Return the quality of a film in JOD as a Record; nothing where pyfvvdp is not installed.
 
     Parameters
     ----------
-    frames, truth : array_like (F, H, W)
+    film, truth : float64 (F, H, W)
         Linear luminance of the method's frames and of the truth's, irradiance included (as in
         `reports.measure.pictures`).
-
-    Raises
-    ------
-    BadInput
-        If sizes differ, there are fewer than two frames, or a value is not finite.
     """
-    film, reference = (np.asarray(values, np.float64) for values in (frames, truth))
-    if film.shape != reference.shape or film.ndim != 3 or len(film) < 2:
-        raise BadInput(
-            "FovVideoVDP", "frames", film.shape, f"two or more of the truth's size {reference.shape} are needed"
-        )
-    if not (np.isfinite(film).all() and np.isfinite(reference).all()):
-        raise BadInput("FovVideoVDP", "frames", "not finite", "every pixel needs a number")
-    if absence():
-        return None
-    metric = _metric()
-    light = [(_PEAK * np.clip(DISPLAY_EXPOSURE * a, 0.0, 1.0)).astype(np.float32) for a in (film, reference)]
-    return float(metric.predict(*light, dim_order="FHW", frames_per_second=_FRAMES_PER_SECOND)[0])
-
-
-def fovvideovdp_records(subject: Record, frames: npt.ArrayLike, truth: npt.ArrayLike) -> list[Record]:
-    """Return the score as a Record of `subject`; none where pyfvvdp is not installed."""
-    score = fovvideovdp(frames, truth)
-    return [] if score is None else [subject.of("fovvideovdp", score, len(np.asarray(truth)))]
-
-
-def _metric() -> Any:
-    library = _library()
-    return library.fvvdp(
+    try:
+        library: Any = import_module("pyfvvdp")
+    except ImportError:
+        return []
+    metric = library.fvvdp(
         display_photometry=library.fvvdp_display_photo_eotf(_PEAK, contrast=_CONTRAST, EOTF="linear"),
         display_geometry=library.fvvdp_display_geometry(
             _RESOLUTION, distance_m=_DISTANCE, diagonal_size_inches=_DIAGONAL
@@ -277,9 +229,6 @@ def _metric() -> Any:
         device="cpu",
         quiet=True,
     )
-
-
-def _library() -> Any:
-    import pyfvvdp
-
-    return pyfvvdp
+    light = [(_PEAK * np.clip(DISPLAY_EXPOSURE * frames, 0.0, 1.0)).astype(np.float32) for frames in (film, truth)]
+    score = float(metric.predict(*light, dim_order="FHW", frames_per_second=_FRAMES_PER_SECOND)[0])
+    return [subject.of("fovvideovdp", score, len(film))]

@@ -123,5 +123,3 @@ def test_opacity_falls_towards_the_outline_and_flatter_cylinders_hide_more():
     assert (means[1] > means[0] - 0.02).all()
     assert (means[2] > means[1] - 0.02).all()
     assert means[2].mean() > means[0].mean() + 0.05
-
-

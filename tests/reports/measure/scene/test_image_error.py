@@ -1,15 +1,11 @@
 import itertools
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from reports.error import squared_error
-from reports.measure.scene.image_error import DISPLAY_EXPOSURE, PERCEIVED, image_errors, light_errors, noise_floor
-from reports.options import ImageOptions
+from reports.measure.scene.image_error import DISPLAY_EXPOSURE, PERCEIVED, image_errors, noise_floor
 from reports.record import Record
 from weaves.colour import linear_rgb
 from weaves.errors import BadInput
@@ -149,21 +145,13 @@ def test_a_given_floor_is_taken():
     assert {measure.floor for measure in errors.perceived.values()} == {0.5}
 
 
-@pytest.mark.parametrize("garbage", [np.nan, -3.0, 1e30])
-def test_what_is_outside_the_mask_does_not_matter(garbage):
-    outside = ~DISC[..., None]
+def test_what_is_outside_the_mask_does_not_matter():
+    garbage = np.random.default_rng(3).choice([np.nan, -3.0, 1e30], CLOTH.shape)
     clean = image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC)
-    found = image_errors(*(np.where(outside, garbage, a) for a in (1.1 * CLOTH, CLOTH, 0.01 * CLOTH)), DISC)
+    found = image_errors(*(np.where(DISC[..., None], a, garbage) for a in (1.1 * CLOTH, CLOTH, 0.01 * CLOTH)), DISC)
     assert (found.mse, found.mse_relative, found.perceived) == (clean.mse, clean.mse_relative, clean.perceived)
+    assert all((found.maps[name] == clean.maps[name]).all() for name in clean.maps)
     assert all(measure.pixels == DISC.sum() for measure in found.perceived.values())
-
-
-def test_components_are_measured_one_at_a_time():
-    component, truth, size = 1.2 * CLOTH[..., :1], CLOTH[..., :1], 0.02 * CLOTH[..., :1]
-    mse, relative = light_errors(component, truth, size, DISC)
-    expected = squared_error(component[DISC], truth[DISC], size[DISC])
-    assert (mse.value, mse.measured, mse.noise) == (expected.value, expected.measured, expected.noise)
-    assert relative.measured == pytest.approx(0.04, rel=0.02)
 
 
 def test_a_record_for_every_number():
@@ -192,9 +180,6 @@ def broken(array, value):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"picture": CLOTH[:-1]}, r"size of the picture = \(63, 64, 3\)"),
-        ({"standard_error": CLOTH[..., :1]}, "size of the standard error"),
-        ({"mask": ALL[:, 1:]}, "size of the picture"),
         ({"picture": broken(CLOTH, np.nan)}, "picture = 'not finite'"),
         ({"truth": broken(CLOTH, np.inf)}, "truth = 'not finite'"),
         ({"standard_error": broken(EXACT, np.nan)}, "standard error = 'not finite'"),
@@ -202,16 +187,10 @@ def broken(array, value):
         ({"truth": EXACT}, "dark"),
         ({"mask": ~ALL}, "lit pixels = 0"),
         ({"mask": np.logical_and(X == 3, Y == 4)}, "lit pixels = 1"),
-        ({"small": 10, "options": ImageOptions(block=2)}, "needs 11 pixels"),
-        ({"channels": 2}, "3 channels"),
     ],
 )
 def test_what_cannot_be_measured_is_bad_input(change, sentence):
     given = {"picture": CLOTH, "truth": CLOTH, "standard_error": EXACT, "mask": ALL} | change
-    side, channels = given.pop("small", None), given.pop("channels", None)
-    pictures = ("picture", "truth", "standard_error")
-    given |= {name: given[name][:side, :side, :channels] for name in pictures if side or channels}
-    given |= {"mask": given["mask"][:side, :side]} if side else {}
     with pytest.raises(BadInput, match=sentence) as raised:
         image_errors(**given)
     assert "\n" not in str(raised.value)
@@ -219,16 +198,6 @@ def test_what_cannot_be_measured_is_bad_input(change, sentence):
 
 def test_a_nearly_dark_truth_does_not_end_the_process():
     """FLIP leaves the process (exit code 255) if the reference is below 1e-8: it must never see one."""
-    code = (
-        "import numpy as np; from reports.measure.scene.image_error import image_errors as e;"
-        "t = np.full((32, 32, 3), 1e-9);"
-        "print(e(2 * t, t, 0 * t, np.ones((32, 32), bool)).perceived['flip_hdr'].value > 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
-
-
-def test_the_same_numbers_every_time():
-    first, second = (image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC) for _ in range(2))
-    assert first.perceived == second.perceived
-    assert all((first.maps[name] == second.maps[name]).all() for name in first.maps)
+    dark = np.full((32, 32, 3), 1e-9)
+    errors = image_errors(2 * dark, dark, 0 * dark, np.ones((32, 32), bool))
+    assert errors.perceived["flip_hdr"].value > 0
