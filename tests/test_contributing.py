@@ -63,7 +63,7 @@ from weaves.fabric import load_fabric
 u = np.zeros(3, np.float32)
 up = np.tile(np.float32([0, 0, 1]), (3, 1))
 answers = Answers.opaque(np.full((3, 4), 0.1, np.float32), np.full((3, 4), 1e-3, np.float32), np.ones(3, np.int32))
-rows = held_out.HeldOut(load_fabric("denim"), Queries.round(u, u, u + 1, up, up), answers)
+rows = held_out.HeldOutFabric(load_fabric("denim"), Queries.round(u, u, u + 1, up, up), answers)
 class Method:
     name, setting = "off", ""
     def prepare(self, fabric): ...

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from pipeline.fingerprint import fingerprint
 from reports.error import COLOUR_WEIGHTS, colour_error
-from reports.measure.held_out import HeldOut
+from reports.measure.held_out import HeldOutFabric
 from reports.measure.timing import Contender, affordable, time_side_by_side
 from reports.options import TimingOptions
 from reports.record import Metric, Record
@@ -53,7 +53,7 @@ FEWEST: Final = 512
 
 def measure_by_size(
     methods: Sequence[Method],
-    fabrics: Iterable[HeldOut],
+    fabrics: Iterable[HeldOutFabric],
     options: TimingOptions,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Record]:
@@ -94,15 +94,15 @@ def measure_by_size(
     return records
 
 
-def measure_errors_by_size(methods: Sequence[Method], fabrics: Iterable[HeldOut], seed: int) -> list[Record]:
+def measure_errors_by_size(methods: Sequence[Method], fabrics: Iterable[HeldOutFabric], seed: int) -> list[Record]:
     """Measure errors as `measure_by_size` does, without times; `seed` is that of random methods."""
     classes, shares = _classes(fabrics)
     return [record for method in methods for record in _errors(method, classes, shares, seed)[1]]
 
 
-def _classes(fabrics: Iterable[HeldOut]) -> tuple[dict[float, list[HeldOut]], dict[float, float]]:
+def _classes(fabrics: Iterable[HeldOutFabric]) -> tuple[dict[float, list[HeldOutFabric]], dict[float, float]]:
     """Return the queries and the truth of each class by its lower edge, and the share of all queries it holds."""
-    classes: dict[float, list[HeldOut]] = {}
+    classes: dict[float, list[HeldOutFabric]] = {}
     counts: dict[float, int] = {}
     for fabric, queries, answers in fabrics:
         size = np.sqrt(queries.sigma * queries.sigma_minor)
@@ -110,13 +110,13 @@ def _classes(fabrics: Iterable[HeldOut]) -> tuple[dict[float, list[HeldOut]], di
             chosen = np.flatnonzero((size >= low) & (size < high))
             if chosen.size:
                 counts[low] = counts.get(low, 0) + chosen.size
-                classes.setdefault(low, []).append(HeldOut(fabric, queries.take(chosen), answers.take(chosen)))
+                classes.setdefault(low, []).append(HeldOutFabric(fabric, queries.take(chosen), answers.take(chosen)))
     total = sum(counts.values())
     return {low: classes[low] for low in sorted(classes)}, {low: count / total for low, count in counts.items()}
 
 
 def _errors(
-    method: Method, classes: Mapping[float, Sequence[HeldOut]], shares: Mapping[float, float], seed: int
+    method: Method, classes: Mapping[float, Sequence[HeldOutFabric]], shares: Mapping[float, float], seed: int
 ) -> tuple[Record, list[Record]]:
     """Return the subject, and each error, the mean over fabrics; 0 where it is lost in the noise of the truth."""
     curves: dict[str, list[tuple[float, float]]] = {name: [] for name in MEASURES}

@@ -48,7 +48,7 @@ _COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
 )
 
 
-class HeldOut(NamedTuple):
+class HeldOutFabric(NamedTuple):
     """Held-out queries about a fabric, with the truth's answers."""
 
     fabric: Fabric
@@ -63,13 +63,13 @@ class HeldOut(NamedTuple):
         return method.predict(self.fabric, self.queries, own), subject
 
 
-def held_out(manifest: Manifest, folder: Path, name: str, rows: int | None = None) -> HeldOut:
+def held_out(manifest: Manifest, folder: Path, name: str, rows: int | None = None) -> HeldOutFabric:
     """Return the first rows of a fabric's test split; all of them if `rows` is not given."""
     queries, answers = manifest.read(folder, name, "test")
-    return HeldOut(manifest.fabrics[name], queries.take(slice(rows)), answers.take(slice(rows)))
+    return HeldOutFabric(manifest.fabrics[name], queries.take(slice(rows)), answers.take(slice(rows)))
 
 
-def measure_errors(method: Method, rows: HeldOut, seed: int) -> list[Record]:
+def measure_errors(method: Method, rows: HeldOutFabric, seed: int) -> list[Record]:
     """Measure a method: MSE in colour, and relative errors (`reports.error`); `seed` is that of random methods."""
     truth, (values, subject) = rows.truth, rows.answered(method, seed)
     records = subject.of_error(colour_error(values, truth, colours_of(rows.fabric, rows.queries)))
@@ -83,7 +83,7 @@ def measure_errors(method: Method, rows: HeldOut, seed: int) -> list[Record]:
     return records
 
 
-def measure_added(method: Method, metric: AddedMetric, rows: HeldOut, seed: int) -> Record:
+def measure_added(method: Method, metric: AddedMetric, rows: HeldOutFabric, seed: int) -> Record:
     """Measure a metric from outside; arguments as for `measure_errors`.
 
     Raises
@@ -98,7 +98,7 @@ def measure_added(method: Method, metric: AddedMetric, rows: HeldOut, seed: int)
     return subject.of(metric.row.name, value, len(values)).made_by(metric.origin)
 
 
-def measure_truth(rows: HeldOut) -> Record:
+def measure_truth(rows: HeldOutFabric) -> Record:
     """Measure the truth: median and quartiles of |standard error| / |mean|.
 
     Both are norms over the four components, as in the estimator's stopping rule.
@@ -112,7 +112,7 @@ def measure_truth(rows: HeldOut) -> Record:
 
 def measure_timing(
     methods: Sequence[Method],
-    fabrics: Sequence[HeldOut],
+    fabrics: Sequence[HeldOutFabric],
     truth: TruthOptions,
     options: TimingOptions,
     progress: Callable[[float], None] = lambda share: None,

@@ -7,7 +7,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.measure.held_out import HeldOut
+from reports.measure.held_out import HeldOutFabric
 from reports.options import BenchOptions
 from reports.record import Record
 from weaves.fabric import load_fabric
@@ -87,7 +87,7 @@ def dataset():
     truth, rows = TruthOptions(relative_error=0.05, max_count=1024), []
     for fabric in map(load_fabric, ("denim", "twill_4_4")):
         queries = draw_queries(QueryOptions(), fabric.repeat, 1, 0, 400)
-        rows.append(HeldOut(fabric, queries, estimate(fabric, queries, truth, 1)))
+        rows.append(HeldOutFabric(fabric, queries, estimate(fabric, queries, truth, 1)))
     return rows
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pipeline.models.fallback import Fallback
     from pipeline.models.method import Method
     from pipeline.shards.manifest import Manifest
-    from reports.measure.held_out import HeldOut
+    from reports.measure.held_out import HeldOutFabric
 
 
 class HeldOutRows(TaskPart):
@@ -45,7 +45,7 @@ class HeldOutRows(TaskPart):
 
         return Manifest.load(out / self.folder)
 
-    def read(self, out: Path, names: Sequence[str] | None = None, rows: int | None = None) -> Iterator[HeldOut]:
+    def read(self, out: Path, names: Sequence[str] | None = None, rows: int | None = None) -> Iterator[HeldOutFabric]:
         """Yield the first rows of each fabric; left out: all rows, of all named fabrics."""
         from reports.measure.held_out import held_out
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.options import TruthOptions
-from reports.measure.held_out import EDITS, HeldOut, measure_errors, measure_timing, measure_truth
+from reports.measure.held_out import EDITS, HeldOutFabric, measure_errors, measure_timing, measure_truth
 
 TRUTH = TruthOptions(relative_error=0.05, max_count=1024)
 
@@ -25,7 +25,7 @@ def test_more_points_err_less_and_the_truth_hardly(dataset, points, oracle):
 
 
 def test_repeats_agree_and_random_methods_draw_anew_with_another_seed(dataset, points):
-    few = HeldOut(dataset[0].fabric, dataset[0].queries.take(slice(100)), dataset[0].truth.take(slice(100)))
+    few = HeldOutFabric(dataset[0].fabric, dataset[0].queries.take(slice(100)), dataset[0].truth.take(slice(100)))
     first, again, other = (measure_errors(points[0], few, seed) for seed in (0, 0, 1))
     assert first == again
     assert first[0].count == 100
