@@ -62,8 +62,8 @@ def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
             if metric_row(record.metric).of_machine:
                 records.append(own)
                 continue
-            key = _subject(record)
-            first = known.setdefault(key, record)
+            subject = record.subject("dataset", "model", "seed", "origin", "version")  # whatever the recipe is called
+            first = known.setdefault(subject, record)
             if first is record:
                 records.append(record)
             elif _number(first) == _number(record):
@@ -78,13 +78,6 @@ def refuse_several(records: Sequence[Record], where: str) -> None:
     """Raise BadInput if Records hold the numbers of several machines."""
     if any(record.provenance.machine for record in records):
         raise BadInput(where, "", "holds Records of several machines", "the Records of one machine are needed")
-
-
-def _subject(record: Record) -> tuple[object, ...]:
-    """Return what a number is of, whatever the name of the recipe."""
-    about = record.provenance
-    own = (record.method, record.setting, record.fabric, record.role, record.scene, record.metric, record.threads)
-    return (*own, record.note, about.dataset, about.model, about.seed, about.origin, about.version)
 
 
 def _number(record: Record) -> tuple[object, ...]:

@@ -78,12 +78,12 @@ class ImageOptions(Frozen):
     """Of the resamples and of the noised copy of the truth."""
 
 
-class _SceneSeed(Frozen):
+class _Seeded(Frozen):
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of the truth's points and of the points of random methods."""
 
 
-class ShotOptions(_SceneSeed):
+class ShotOptions(_Seeded):
     """The frames of a scene, and how true their truth is (`reports.measure.scene.shot`)."""
 
     size: tuple[Side, Side] = (96, 72)
@@ -98,7 +98,7 @@ class ShotOptions(_SceneSeed):
     """How true the other frames are."""
 
 
-class SceneErrorOptions(_SceneSeed):
+class SceneErrorOptions(_Seeded):
     """How the frames of a method are compared with the truth's."""
 
     footprint: RoundFootprint = "geometric_mean"
@@ -114,17 +114,12 @@ class SceneBenchOptions(SceneErrorOptions, ShotOptions):
     """Scenes of the package, or paths of scenes as `pipeline.scenes.catalogue` reads them."""
 
 
-class _SeededOptions(Frozen):
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    """Seed of the truth of the pictures and of the random points of the baseline."""
-
-
-class _ViewedOptions(_SeededOptions):
+class _ViewedOptions(_Seeded):
     view: ViewOptions = ViewOptions()
     """Camera, light and scale."""
 
 
-class ErrorOptions(_SeededOptions):
+class ErrorOptions(_Seeded):
     """Errors on held-out queries."""
 
     rows: int = Field(default=16_384, ge=64, le=2**24)

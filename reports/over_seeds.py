@@ -20,11 +20,14 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from reports.record import Record
+from reports.record import Provenance, Record
 
 LEAST: Final = "_least"
 MOST: Final = "_most"
 """Ends of the names of the columns of a range."""
+
+_NUMBERS: Final = ("value", "standard_error", "low", "high")
+_SHARED: Final = [name for name in Provenance.model_fields if name not in ("model", "seed")]
 
 Table = Callable[[Sequence[Record]], pd.DataFrame]
 
@@ -60,7 +63,7 @@ def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> lis
     groups: dict[Hashable, list[Record]] = {}
     for index, record in enumerate(records):
         # Records of no training are never of the same number.
-        groups.setdefault(_subject(record) if record.provenance.model else index, []).append(record)
+        groups.setdefault(record.subject(*_SHARED) if record.provenance.model else index, []).append(record)
     ordered = (sorted(group, key=lambda record: record.provenance.seed) for group in groups.values())
     return [_condensed(group, statistic) for group in ordered]
 
@@ -129,18 +132,6 @@ def over_seeds(
     return decorated
 
 
-def is_range(column: str) -> bool:
-    """Return whether a column of a table is the number of trainings or an end of a range."""
-    return column == "seeds" or column.endswith((LEAST, MOST))
-
-
-def _subject(record: Record) -> Hashable:
-    """Return what a number is of, whichever training it is measured of."""
-    about = tuple(value for name, value in record.provenance if name not in ("model", "seed"))
-    own = (record.method, record.setting, record.fabric, record.role, record.scene, record.metric, record.threads)
-    return (*own, record.note, *about)
-
-
 def _condensed(group: Sequence[Record], statistic: Statistic) -> Record:
     """Return one Record for the same number of several trainings."""
     first = group[0]
@@ -155,10 +146,7 @@ def _condensed(group: Sequence[Record], statistic: Statistic) -> Record:
     shared = [x for x, _ in first.curve if all(x in curve for curve in curves)]
     return first.model_copy(
         update={
-            "value": statistic([record.value for record in group]),
-            "standard_error": of([record.standard_error for record in group]),
-            "low": of([record.low for record in group]),
-            "high": of([record.high for record in group]),
+            **{name: of([getattr(record, name) for record in group]) for name in _NUMBERS},
             "curve": tuple((x, statistic([curve[x] for curve in curves])) for x in shared),
             "samples": (),
         }

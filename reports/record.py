@@ -140,6 +140,11 @@ class Record(Frozen):
         bounds = {"standard_error": standard_error, "low": low, "high": high, "curve": curve, "samples": samples}
         return Record.model_validate(self.model_dump() | number | bounds)
 
+    def subject(self, *provenance: str) -> tuple[object, ...]:
+        """Return what the number is of, with these fields of its provenance."""
+        own = (self.method, self.setting, self.fabric, self.role, self.scene, self.metric, self.threads, self.note)
+        return (*own, *(getattr(self.provenance, name) for name in provenance))
+
     def made_by(self, origin: str) -> Record:
         """Return the Record with the origin of a method or metric from outside the package."""
         origins = "; ".join(filter(None, (self.provenance.origin, origin)))
@@ -179,21 +184,17 @@ class Machine(Frozen):
     """Versions of the packages."""
     date: str
     """UTC, ISO 8601."""
-
-
-class _MachineFile(Machine):
-    """Content of ``NAME.machine.json``."""
-
     sha256: str = ""
-    """Hash over the Records beside it and over its other fields; files of earlier versions have none."""
+    """Hash over the Records beside it and over the other fields; in files of earlier versions there is none."""
+
+    def beside(self, records: str) -> Machine:
+        """Return the machine with the hash over the SHA-256 of Records and over its other fields."""
+        own = self.model_dump_json(exclude={"sha256"})
+        return self.model_copy(update={"sha256": hashlib.sha256((records + own).encode()).hexdigest()})
 
     def encoded(self) -> bytes:
-        """Return the bytes of the file."""
+        """Return the bytes of its file."""
         return self.model_dump_json(indent=1, exclude_unset=True).encode() + b"\n"
-
-    def hash(self, records: str) -> str:
-        """Return the hash over the SHA-256 of Records and over the other fields."""
-        return hashlib.sha256(records.encode() + self.model_dump_json(exclude={"sha256"}).encode()).hexdigest()
 
 
 def this_machine(threads: int) -> Machine:
@@ -213,8 +214,7 @@ def write_records(path: Path, records: Sequence[Record], machine: Machine) -> No
     """Write a task's records to `path` (``NAME.json``) and the machine beside it."""
     lines = ",\n".join(json.dumps(_compact(record)) for record in records)
     content = f"[\n{lines}\n]\n".encode()
-    hash = _MachineFile(**dict(machine)).hash(hashlib.sha256(content).hexdigest())
-    atomic_write(machine_path(path), _MachineFile(**dict(machine), sha256=hash).encoded())
+    atomic_write(machine_path(path), machine.beside(hashlib.sha256(content).hexdigest()).encoded())
     atomic_write(path, content)
 
 
@@ -247,13 +247,13 @@ def read_machine(path: Path) -> Machine:
     """Read the machine of the records in `path`; BadInput if it is missing, or one of both files is damaged."""
     beside = machine_path(path)
     try:
-        machine = _MachineFile.model_validate(read_json(beside, MIB, "a file of one machine"))
-        whole = beside.read_bytes() == machine.encoded() and machine.sha256 == machine.hash(file_sha256(path))
+        machine = Machine.model_validate(read_json(beside, MIB, "a file of one machine"))
+        whole = beside.read_bytes() == machine.encoded() and machine == machine.beside(file_sha256(path))
     except (OSError, ValidationError) as error:
         raise BadInput(str(beside), "", "missing or damaged", "run the benchmark again") from error
     if "sha256" in machine.model_fields_set and not whole:
         raise BadInput(str(path), "", f"damaged, or {beside.name} is: hashes differ", "run the benchmark again")
-    return Machine(**machine.model_dump(exclude={"sha256"}))
+    return machine
 
 
 def to_table(records: Iterable[Record]) -> pd.DataFrame:
@@ -273,11 +273,9 @@ def _compact(record: Record) -> dict[str, object]:
 def _cpu() -> str:
     """Return the processor's model name, as Linux reports it."""
     info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    lines = info.read_text().splitlines() if info.is_file() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()
 
 
 def _version(package: str) -> str:

@@ -21,23 +21,23 @@ from weaves.colour import LUMINANCE, linear_rgb
 Marker = str | tuple[int, Literal[0, 1, 2], int]
 """Of matplotlib: a name, or (number of corners, 0 for a polygon and 1 for a star, angle)."""
 
-MARKERS: Final[Mapping[str, Marker]] = {
-    TRUTH: "X",
-    "woven": "o",
-    "neumip": "v",
-    "selvage": "*",
-    "curved": "<",
-    "curved_grazing": "d",
-    "unified_btf": "h",
-    "btf_autoencoder": "p",
-    "point_sampled": "s",
-    "r2_points": "D",
-    "prefiltered": "P",
-    "map_material": (8, 1, 0),
-    "soft_nodes": ">",
-    "summed_area": (5, 0, 0),
+METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
+    TRUTH: ("X", "#23252b", "#ecebe6"),
+    "woven": ("o", "#3d55cc", "#8fa2ff"),
+    "neumip": ("v", "#0b8f77", "#45d0b0"),
+    "selvage": ("*", "#1a86bd", "#62c3f5"),
+    "curved": ("<", "#5a7d1f", "#b3d46a"),
+    "curved_grazing": ("d", "#848f0c", "#dde26a"),
+    "unified_btf": ("h", "#8a5a2b", "#cf9a66"),
+    "btf_autoencoder": ("p", "#a87947", "#e6c6a3"),
+    "point_sampled": ("s", "#d9622b", "#ff9a5c"),
+    "r2_points": ("D", "#a67806", "#e3bf4e"),
+    "prefiltered": ("P", "#6f7484", "#a7adbd"),
+    "map_material": ((8, 1, 0), "#b3263f", "#ff8fa3"),
+    "soft_nodes": (">", "#d24fa2", "#f9a8d8"),
+    "summed_area": ((5, 0, 0), "#2e8b3c", "#7fe08c"),
 }
-"""Marks of methods in plots, no two alike: no method is known by its colour alone."""
+"""Mark and colours, light and dark, of each method. No two marks are alike: no method is known by colour alone."""
 
 MARKS: Final[tuple[Marker, ...]] = ((4, 1, 0), (5, 0, 180), (3, 1, 0), (6, 1, 0), "H")
 """Marks of methods that are not known, one after the other; their number and that of spare colours share no factor."""
@@ -112,6 +112,8 @@ class Scheme:
         return replace(self, methods={**self.methods, **self.colours(names)}, marks={**self.marks, **marks})
 
 
+_MARKERS: Final = {name: marker for name, (marker, _, _) in METHODS.items()}
+
 LIGHT: Final = Scheme(
     name="light",
     ink="#23252b",
@@ -121,23 +123,8 @@ LIGHT: Final = Scheme(
     card="#ffffff",
     tint="#f1eee7",
     focus="#2340b8",
-    methods={
-        TRUTH: "#23252b",
-        "woven": "#3d55cc",
-        "neumip": "#0b8f77",
-        "selvage": "#1a86bd",
-        "curved": "#5a7d1f",
-        "curved_grazing": "#848f0c",
-        "unified_btf": "#8a5a2b",
-        "btf_autoencoder": "#a87947",
-        "point_sampled": "#d9622b",
-        "r2_points": "#a67806",
-        "prefiltered": "#6f7484",
-        "map_material": "#b3263f",
-        "soft_nodes": "#d24fa2",
-        "summed_area": "#2e8b3c",
-    },
-    marks=MARKERS,
+    methods={name: light for name, (_, light, _) in METHODS.items()},
+    marks=_MARKERS,
     others=("#7a5cf0", "#148f4a", "#a3352b", "#0e7c9b", "#b97400", "#9c4f86"),
 )
 DARK: Final = Scheme(
@@ -149,22 +136,7 @@ DARK: Final = Scheme(
     card="#1f2126",
     tint="#24262c",
     focus="#a9b8ff",
-    methods={
-        TRUTH: "#ecebe6",
-        "woven": "#8fa2ff",
-        "neumip": "#45d0b0",
-        "selvage": "#62c3f5",
-        "curved": "#b3d46a",
-        "curved_grazing": "#dde26a",
-        "unified_btf": "#cf9a66",
-        "btf_autoencoder": "#e6c6a3",
-        "point_sampled": "#ff9a5c",
-        "r2_points": "#e3bf4e",
-        "prefiltered": "#a7adbd",
-        "map_material": "#ff8fa3",
-        "soft_nodes": "#f9a8d8",
-        "summed_area": "#7fe08c",
-    },
-    marks=MARKERS,
+    methods={name: dark for name, (_, _, dark) in METHODS.items()},
+    marks=_MARKERS,
     others=("#b3a1ff", "#5fd58f", "#f08a80", "#5cc6e0", "#f0b54a", "#dba0c8"),
 )

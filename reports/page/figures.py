@@ -102,25 +102,14 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
             own = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
             for mean in rows(own):
                 if mean.mse_least < mean.mse_most:
-                    axes.plot(
-                        [mean.mse_least, mean.mse_most], [row, row], linewidth=7, alpha=0.3, color=colours[method],
-                        solid_capstyle="butt",
-                    )  # fmt: skip
+                    ends = [mean.mse_least, mean.mse_most]
+                    axes.plot(ends, [row, row], lw=7, alpha=0.3, color=colours[method], solid_capstyle="butt")
                 spread = _bounds(mean.mse, mean.low, mean.high)
                 _mark(axes, mean.mse, row, colours[method], role, scheme.marker(method), xerr=spread)
         noise = table.loc[table["role"] == role, "truth_noise"].mean()
         axes.axvline(noise, color=scheme.muted, linewidth=0.9, linestyle=(0, (4, 3)))
         # Above the first row no mark can lie.
-        axes.annotate(
-            "noise of the truth (subtracted)",
-            (noise, 1.0),
-            xytext=(4, -2),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-            color=scheme.muted,
-        )
+        _remark(axes, scheme, "noise of the truth (subtracted)", (noise, 1.0), (4, -2))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel="MSE, linear RGB", xscale="log")
         axes.grid(axis="y", visible=False)
     _name_rows(panels[0], places, above=0.5)
@@ -135,8 +124,8 @@ def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     columns = {"flicker": "Flicker", "excess_energy": "Excess energy at high frequencies"}
     for axes, (column, title) in zip(panels, columns.items(), strict=True):
         smallest = float(table[column].abs().replace(0.0, math.nan).min())
-        threshold = 10 ** math.floor(math.log10(smallest)) if math.isfinite(smallest) else 1e-6
-        axes.set_xscale("symlog", linthresh=(threshold := max(threshold, 1e-5)))
+        threshold = max(10 ** math.floor(math.log10(smallest)), 1e-5) if math.isfinite(smallest) else 1e-5
+        axes.set_xscale("symlog", linthresh=threshold)
         axes.axvline(0, color=scheme.muted, linewidth=1.0)
         for measured in rows(table):
             row = places[measured.method, measured.setting]
@@ -162,10 +151,7 @@ def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[floa
     figure, (axes,) = new_figure(9.2, height)
     colours = scheme.colours(method for method, _ in shown)
     axes.axvspan(HALF_NYQUIST, 0.5, color=scheme.line, alpha=0.35, linewidth=0)
-    axes.annotate(
-        "counted as aliasing where it exceeds the truth", (HALF_NYQUIST, 0.98), xytext=(6, 0),
-        xycoords=("data", "axes fraction"), textcoords="offset points", va="top", fontsize=8, color=scheme.muted,
-    )  # fmt: skip
+    _remark(axes, scheme, "counted as aliasing where it exceeds the truth", (HALF_NYQUIST, 0.98), (6, 0))
     axes.set(
         xlim=(0, 0.62), yscale="log", xlabel="frequency, cycles a pixel",
         ylabel="power over the truth's squared mean", xticks=[0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5],
@@ -193,6 +179,14 @@ def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[floa
         )
     axes.yaxis.set_minor_formatter(NullFormatter())
     return figure
+
+
+def _remark(axes: Axes, scheme: Scheme, words: str, at: tuple[float, float], offset: tuple[float, float]) -> None:
+    """Write on a panel; the place is in data and in shares of the panel's height, the offset in points."""
+    axes.annotate(
+        words, at, xytext=offset, xycoords=("data", "axes fraction"), textcoords="offset points", va="top", fontsize=8,
+        color=scheme.muted,
+    )  # fmt: skip
 
 
 def _signed_decades(values: Sequence[float], smallest: float) -> list[float]:
@@ -254,10 +248,7 @@ def _height(places: Mapping[tuple[str, str], float]) -> float:
 
 def _values(fabrics: pd.DataFrame, role: str, method: str, setting: str) -> pd.Series[float]:
     """Return a method's MSE on each fabric of a role that it covers."""
-    label = f"{method} {setting}".strip()
-    if label not in fabrics:
-        return pd.Series(dtype=float)
-    return fabrics.loc[fabrics["role"] == role, label].dropna()
+    return fabrics.reindex(columns=[f"{method} {setting}".strip()])[fabrics["role"] == role].iloc[:, 0].dropna()
 
 
 def _name_rows(axes: Axes, places: Mapping[tuple[str, str], float], above: float = 0.0) -> None:
@@ -273,18 +264,8 @@ def _name_rows(axes: Axes, places: Mapping[tuple[str, str], float], above: float
 
 def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: Marker, **bars: Any) -> None:
     """Put a method's mark: filled where seen, open where unseen."""
-    face = colour if role == "seen" else "none"
-    axes.errorbar(
-        x,
-        y,
-        marker=shape,
-        markersize=7,
-        color=colour,
-        markerfacecolor=face,
-        markeredgewidth=1.6,
-        elinewidth=1.6,
-        **bars,
-    )
+    looks: dict[str, Any] = {"marker": shape, "markersize": 7, "markeredgewidth": 1.6, "elinewidth": 1.6} | bars
+    axes.errorbar(x, y, color=colour, markerfacecolor=colour if role == "seen" else "none", **looks)
 
 
 def _bounds(value: float, low: float, high: float) -> list[list[float]]:

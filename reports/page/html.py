@@ -16,7 +16,7 @@ from reports.catalogue import METRICS
 from reports.images import tiles
 from reports.images.tiles import EXPOSURE, hex_colour
 from reports.over_seeds import first_training
-from reports.page.alt_texts import PLOT_TITLES, alt_texts
+from reports.page.alt_texts import alt_texts
 from reports.page.colours import DARK, LIGHT, Scheme
 from reports.page.content import PageInput
 from reports.page.pictures import SHOWN, films, strips
@@ -62,7 +62,7 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         "limits": [*every["limits"].intro, *lacking(page.records)],
         "live": {fabric: plain(fabric) for fabric in page.live},
         "plots": plots,
-        "plot_titles": PLOT_TITLES,
+        "plot_words": WORDS["plots"],
         "alt_texts": alt_texts(ranged),
         "definitions": {row.title: row.definition for row in METRICS.values() if row.definition} | WORDS["definitions"],
         "schemes": schemes(page),
@@ -130,7 +130,7 @@ def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]
     """Return a sentence for each learnt method, published ones first; the first of them quotes its paper."""
     published = {note.name for note in page.models if note.published}
     untrained = {note.name for note in page.models if not note.learns}
-    keys = learnt(frames["errors"], untrained) if len(frames["errors"]) else []
+    keys = learnt(frames["errors"], untrained)
     keys.sort(key=lambda key: key[0] not in published)
     sentences = [
         headline(*key, frames["errors"], frames["timing"], paper=not index and key[0] in published)

@@ -81,26 +81,20 @@ def _plots(frames: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
     """Draw every plot that there are numbers for, in both schemes."""
     errors, timing, aliasing = frames["errors"], frames["timing"], frames["aliasing"]
     curves = summary.spectra(page.records)
-    plots: dict[str, tuple[Any, ...]] = {}
-    if len(errors):
-        plots["errors"] = (figures.errors, errors, frames["errors_by_fabric"])
-    if frames["tradeoff"]["error"].notna().any():
-        plots["error-against-time"] = (front_figures.error_against_time, frames["tradeoff"])
-        plots["error-against-bytes"] = (front_figures.error_against_bytes, frames["tradeoff"])
-    if frames["tradeoff"]["flicker"].notna().any():
-        plots["aliasing-against-time"] = (front_figures.aliasing_against_time, frames["tradeoff"])
-    if len(frames["by_size"]):
-        plots["error-by-size"] = (front_figures.error_by_size, frames["by_size"])
-    if frames["scenes"]["frame_time"].notna().any():
-        plots["scenes"] = (front_figures.scenes, frames["scenes"])
-    if len(aliasing):
-        plots["aliasing"] = (figures.aliasing, aliasing)
-    if curves:
-        plots["spectra"] = (figures.spectra, curves)
-    if len(timing):
-        plots["timing"] = (figures.timing, timing)
-    for name, (plot, *data) in plots.items():
-        for scheme in schemes(page).values():
+    tradeoff, scenes = frames["tradeoff"], frames["scenes"]
+    plots: dict[str, tuple[Any, ...]] = {
+        "errors": (len(errors) > 0, figures.errors, errors, frames["errors_by_fabric"]),
+        "error-against-time": (tradeoff["error"].notna().any(), front_figures.error_against_time, tradeoff),
+        "error-against-bytes": (tradeoff["error"].notna().any(), front_figures.error_against_bytes, tradeoff),
+        "aliasing-against-time": (tradeoff["flicker"].notna().any(), front_figures.aliasing_against_time, tradeoff),
+        "error-by-size": (len(frames["by_size"]) > 0, front_figures.error_by_size, frames["by_size"]),
+        "scenes": (scenes["frame_time"].notna().any(), front_figures.scenes, scenes),
+        "aliasing": (len(aliasing) > 0, figures.aliasing, aliasing),
+        "spectra": (len(curves) > 0, figures.spectra, curves),
+        "timing": (len(timing) > 0, figures.timing, timing),
+    }
+    for name, (measured, plot, *data) in plots.items():
+        for scheme in schemes(page).values() if measured else ():
             yield f"{name}-{scheme.name}.png", render(plot, scheme, *data)
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import pandas as pd
 
 from reports.record import Machine, Record
-from reports.tables.number_format import NONE, fixed_to, listed, missing, span, times
+from reports.tables.number_format import NONE, fixed_to, listed, scientific, times
 from reports.tables.page_tables import page_frames, sections
 from reports.tables.sentences import BOUNDED
 from reports.tables.summary import (
@@ -27,7 +27,7 @@ from reports.tables.summary import (
     summary_table,
     unranged,
 )
-from reports.tables.table import markdown_table
+from reports.tables.table import markdown_table, number
 from weaves.errors import BadInput
 
 README_BLOCK: Final = "quick"
@@ -76,22 +76,22 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             where, "", "lacks errors, flicker or times of two random points", "Records of a whole page are needed"
         )
     left_out = unranged(errors)
-    ratios = {(row.method, row.setting, row.role): _ratio(row) for row in rows(errors)}
-    ratios |= {(method, setting, role): NONE for role, method, setting in left_out}
-    printed, lines = _printed_times(old), []
-    numbers: dict[Any, dict[Any, float]] = {key: dict(row) for key, row in condensed.to_dict("index").items()}
-    for key, words in README_METHODS.items():
-        if row := numbers.get(key):
-            own = (ratios.get((*key, role), NONE) for role in ("seen", "unseen"))
+    ratios = {(row.role, row.method, row.setting): _ratio(row) for row in rows(errors)} | dict.fromkeys(left_out, NONE)
+    printed = _printed_times(old)
+    lines: dict[str, tuple[str, ...]] = {}
+    for (method, setting), words in README_METHODS.items():
+        if (method, setting) in condensed.index:
+            row: Any = condensed.loc[(method, setting)]
+            own = [ratios.get((role, method, setting), NONE) for role in ("seen", "unseen")]
             time = kept_time(printed.get(words, NONE), row["× time"])
-            lines.append((words, two_digits(row["MSE seen"]), *own, two_decimals(row["flicker"]), time))
+            lines[words] = (words, scientific(row["MSE seen"], 1), *own, two_decimals(row["flicker"]), time)
     held_out = errors[of_baseline(errors)]
     fabrics = " and ".join(f"{row.fabrics} {row.role}" for row in rows(held_out))
     provenance = next(record.provenance for record in records if record.provenance.recipe)
     several = any(over_unseen(row) for row in rows(errors))
     return "\n\n".join(
         [
-            markdown_table(_README_COLUMNS, lines),
+            markdown_table(_README_COLUMNS, lines.values()),
             *_woven(lines),
             f"Recipe `{provenance.recipe}`, benchmark version {provenance.version}, {machine.cores} cores of "
             f"{machine.cpu}; {held_out['queries'].sum():,} held-out queries of {fabrics} fabrics. "
@@ -108,13 +108,9 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
 
 def _ratio(row: Any) -> str:
     """Return × lower with its interval over several unseen fabrics, and its range over several trainings."""
-    name = "ratio_fabrics" if over_unseen(row) and (row.method, row.setting) != BASELINE else "ratio"
-    ends = [span(times, getattr(row, f"{name}{low}"), getattr(row, f"{name}{high}")) for low, high in _ENDS]
-    over = ends[0].replace("[", "(").replace("]", ")") if name == "ratio_fabrics" else ""
-    return " ".join(filter(None, (times(getattr(row, name)), over, ends[1])))
-
-
-_ENDS: Final = (("_low", "_high"), ("_least", "_most"))
+    if over_unseen(row) and (row.method, row.setting) != BASELINE:
+        return str(number("ratio_fabrics", "× lower", "times").cell(row))
+    return str(number("ratio", "× lower", "times", ends=("", "")).cell(row))
 
 
 def _trainings(errors: pd.DataFrame) -> str:
@@ -126,26 +122,16 @@ def _trainings(errors: pd.DataFrame) -> str:
     return f"Networks: means over {numbers} trainings, in brackets the least and the most of them."
 
 
-def _woven(lines: Sequence[Sequence[str]]) -> list[str]:
+def _woven(lines: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the comparison that the paper of `woven` makes, with our numbers and its own; none without `woven`."""
-    shown = {words: numbers for words, *numbers in lines}
-    names = {README_METHODS["woven", BOUNDED]: "`woven` under the energy bound", README_METHODS["woven", ""]: "`woven`"}
-    for words, name in names.items():
-        if words in shown:
-            _, seen, unseen, _, time = shown[words]
+    for setting, name in ((BOUNDED, "`woven` under the energy bound"), ("", "`woven`")):
+        if line := lines.get(README_METHODS["woven", setting]):
+            _, _, seen, unseen, _, time = line
             lower, faster = PAPER
             others = f", {unseen} on unseen ones," if unseen != NONE else ""
             ours = f"{name} has {seen} lower MSE than two points on seen fabrics{others} at {time}"
             return [f"{ours} their time; its paper reports {lower}× at {faster}× on its own scene and GPU."]
     return []
-
-
-def two_digits(value: float) -> str:
-    """Return ``2.6e-3``."""
-    if missing(value):
-        return NONE
-    mantissa, _, exponent = f"{value:.1e}".partition("e")
-    return f"{mantissa}e{int(exponent)}".replace("-", "−")
 
 
 def two_decimals(value: float) -> str:

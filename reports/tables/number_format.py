@@ -39,11 +39,11 @@ def display(method: str, setting: str = "") -> str:
     return f"{name}, {setting.replace(' ', NO_BREAK)}" if setting else name
 
 
-def scientific(value: float | None) -> str:
+def scientific(value: float | None, digits: int = 2) -> str:
     """Return ``2.62e-3``."""
     if missing(value):
         return NONE
-    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    mantissa, _, exponent = f"{value:.{digits}e}".partition("e")
     return f"{mantissa}e{int(exponent)}".replace("-", "−")
 
 

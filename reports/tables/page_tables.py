@@ -21,7 +21,7 @@ from reports.tables import summary
 from reports.tables.equal_time import equal_time_table, size_table
 from reports.tables.number_format import NONE, display, listed, missing, percent, plain, scientific, shown, span, times
 from reports.tables.sentences import facts, section_sentences
-from reports.tables.summary import BASELINE, ERRORS, fabric_table, over_unseen, rows, unranged
+from reports.tables.summary import BASELINE, ERRORS, fabric_table, over_unseen, parts_of, rows, unranged
 from reports.tables.table import (
     WORDS,
     Column,
@@ -157,7 +157,7 @@ def result_tables(
         "scenes": _scenes(frames["scenes"], values),
         "aliasing": [
             of_methods("aliasing", part, {**values, "role": role}, key=role)
-            for role, part in _by(frames["aliasing"], "role")
+            for role, part in parts_of(frames["aliasing"], "role")
         ],
         "energy": _energy(frames, values),
         "latents": _latents(records, frames, values),
@@ -183,11 +183,6 @@ def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
     return kept
 
 
-def _by(frame: pd.DataFrame, column: str) -> list[tuple[str, pd.DataFrame]]:
-    """Return the parts of a frame by the values of a column, in their order."""
-    return [(str(name), part) for name, part in frame.groupby(column, sort=False)] if len(frame) else []
-
-
 def _ratio(column: Column) -> Column:
     """Return the column of × lower; the baseline's is 1."""
     one = TableCell("1")
@@ -197,7 +192,7 @@ def _ratio(column: Column) -> Column:
 def _fronts(tradeoff: pd.DataFrame, values: Values) -> list[ResultTable]:
     """Return what is on the front by role, the fastest first."""
     columns, tables = columns_for("front", values).values(), []
-    for role, part in _by(tradeoff, "role"):
+    for role, part in parts_of(tradeoff, "role"):
         front = part[part["front"]].sort_values("ns", kind="stable")
         beaten = [display(name) for name in dict.fromkeys(part["method"]) if name not in set(front["method"])]
         known = {**values, "role": role} | ({"beaten": listed(beaten)} if beaten else {})
@@ -213,7 +208,7 @@ def _errors(
     errors, tables = frames["errors"], []
     columns = columns_for("errors", values, errors.columns)
     columns["ratio"] = _ratio(columns["ratio"])
-    for role, part in _by(errors, "role"):
+    for role, part in parts_of(errors, "role"):
         count, queries = part["fabrics"].max(), f"{part['queries'].max():,}"
         known = {**values, "role": role, "fabrics": "one fabric" if count == 1 else f"{count} fabrics"}
         stars = [name for name in per_material if role == "unseen" and name in set(part["method"])]
@@ -226,7 +221,7 @@ def _errors(
     columns |= {name: number(f"{name}_fabrics", metric=name) for name in ERRORS}
     tables.append(of_methods("over_fabrics", over, values, columns))
     least, most = (fabric_table(records, end) for end in (min, max))
-    for role, part in _by(frames["errors_by_fabric"], "role"):
+    for role, part in parts_of(frames["errors_by_fabric"], "role"):
         tables.append(_by_fabric(part, least.loc[part.index], most.loc[part.index], values, role))
     return tables
 
@@ -253,7 +248,7 @@ def _by_fabric(errors: pd.DataFrame, least: pd.DataFrame, most: pd.DataFrame, va
 def _equal_time(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
     """Return for each measure but the diffuse one the errors of methods, and those of rivals in the same time."""
     tables = []
-    for measure, part in _by(frame[frame["measure"] != "diffuse"], "measure"):
+    for measure, part in parts_of(frame[frame["measure"] != "diffuse"], "measure"):
         sizes, lines = list(dict.fromkeys(part["size"])), []
         for (method, setting, rival), group in part.groupby(["method", "setting", "rival"], sort=False):
             line = [TableCell(display(str(rival)))]
@@ -274,7 +269,7 @@ def _scenes(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
     time = columns["frame_time"]
     columns["frame_time"] = Column(time.title, lambda row: TableCell(str(time.cell(row)), strong=bool(row.front)))
     floors = {"mse": "truth_noise"} | {name: f"{name}_floor" for name in columns if f"{name}_floor" in METRICS}
-    for scene, part in _by(frame, "scene"):
+    for scene, part in parts_of(frame, "scene"):
         noise = [TableCell(shown(name, part[floors[name]].mean()) if name in floors else NONE) for name in columns]
         made = of_methods("scenes", part, {**values, "scene": plain(scene)}, columns, scene)
         tables.append(replace(made, rows=(*made.rows, TableRow("noise of the truth", tuple(noise), kind="noise"))))

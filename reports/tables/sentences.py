@@ -13,8 +13,8 @@ from reports.measure.by_size import SIZES, WHOLE
 from reports.over_seeds import LEAST, MOST, trainings
 from reports.record import TRUTH, Record
 from reports.tables.number_format import NO_BREAK, NONE, display, listed, percent, plain, shown, significant, times
-from reports.tables.summary import BASELINE, PAPER, of_baseline, over_unseen, rows, unranged
-from reports.tables.tradeoff import FLICKER_LIMITS, LIMITS, cheapest
+from reports.tables.summary import BASELINE, PAPER, of_baseline, over_unseen, parts_of, rows, unranged
+from reports.tables.tradeoff import FAULTS, LIMITS, Fault, cheapest
 
 BOUNDED: Final = "bounded"
 """Setting of a network under the energy bound (`pipeline.models.bounded`)."""
@@ -30,7 +30,7 @@ def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
     two points gets. Both are empty where two points were not measured.
     """
     part = tradeoff[tradeoff["role"] == tradeoff["role"].iloc[0]] if len(tradeoff) else tradeoff
-    base = next(iter(rows(part[of_baseline(part)])), None) if len(part) else None
+    base = next(rows(part[of_baseline(part)]), None)
     if base is None:
         return "", []
     figures: list[dict[str, str]] = []
@@ -41,9 +41,8 @@ def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
         ratio = times(best.ns / base.ns) if best else NONE
         note = f"{name}: {'the cheapest ' if best else ''}within {100 * limit:g} % error, in times of two points"
         figures.append({"value": ratio, "note": note})
-        reached.setdefault(f"{name} at {ratio} the time of two points" if best else name, []).append(
-            f"{100 * limit:g} %"
-        )
+        words = f"{name} at {ratio} the time of two points" if best else name
+        reached.setdefault(words, []).append(f"{100 * limit:g} %")
     worst = percent(base.error, 0)
     figures.append({"value": worst, "note": f"error of a pixel of two points, in {base.ns:,.0f} ns"})
     within = "; ".join(f"within {listed(limits)} error: {name}" for name, limits in reached.items())
@@ -78,37 +77,28 @@ def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) ->
     It is the form under the energy bound where that was measured: its error on validation cloths is lower. Otherwise
     it is the first. The truth, and methods that nothing is trained for, are left out.
     """
-    settings: dict[str, list[str]] = {}
-    for method, setting in zip(errors["method"], errors["setting"], strict=True):
-        settings.setdefault(method, []).append(setting)
-    return [
-        (method, BOUNDED if BOUNDED in known else known[0])
-        for method, known in settings.items()
-        if method not in untrained and method != TRUTH
-    ]
-
-
-def _comparison(ratio: float) -> str:
-    return f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+    if errors.empty:
+        return []
+    settings = errors.groupby("method", sort=False)["setting"].agg(list).drop([TRUTH, *untrained], errors="ignore")
+    return [(str(method), BOUNDED if BOUNDED in known else known[0]) for method, known in settings.items()]
 
 
 def _part(row: Any) -> tuple[str, str]:
-    """Return the comparison of a ratio, and the fabrics it is of."""
-    where = _fabrics(row.fabrics, row.role)
-    if not over_unseen(row):
-        return _comparison(row.ratio) + _range(row, "ratio"), where
-    low, high = _ends(row.ratio_fabrics, row.ratio_fabrics_low, row.ratio_fabrics_high)
-    where += f" (geometric mean, 95 % interval over fabrics {low}× to {high}×)"
-    return _comparison(row.ratio_fabrics) + _range(row, "ratio_fabrics"), where
+    """Return the comparison of a ratio, and the fabrics it is of.
 
-
-def _range(row: Any, column: str) -> str:
-    """Return the range of a ratio over trainings; empty where there are not several."""
-    least, most = getattr(row, column + LEAST), getattr(row, column + MOST)
-    if not math.isfinite(least):
-        return ""
-    low, high = _ends(getattr(row, column), least, most)
-    return f" ({low}× to {high}× over {row.seeds} trainings)"
+    A range over trainings follows, where there are several; of a ratio below 1 all numbers are of its inverse.
+    """
+    where, name = _fabrics(row.fabrics, row.role), "ratio"
+    if over_unseen(row):
+        name = "ratio_fabrics"
+        low, high = _ends(row.ratio_fabrics, row.ratio_fabrics_low, row.ratio_fabrics_high)
+        where += f" (geometric mean, 95 % interval over fabrics {low}× to {high}×)"
+    ratio = getattr(row, name)
+    words = f"{_number(ratio)}× lower MSE" if ratio >= 1 else f"{_number(1 / ratio)}× higher MSE"
+    if math.isfinite(least := getattr(row, name + LEAST)):
+        low, high = _ends(ratio, least, getattr(row, name + MOST))
+        words += f" ({low}× to {high}× over {row.seeds} trainings)"
+    return words, where
 
 
 def _ends(ratio: float, low: float, high: float) -> tuple[str, str]:
@@ -125,23 +115,15 @@ def _fabrics(count: int, role: str) -> str:
     return f"one {role} fabric" if count == 1 else f"the {count} {role} fabrics"
 
 
-def cheapest_sentences(table: pd.DataFrame, limits: Sequence[float] = LIMITS) -> list[str]:
-    """Return for each role the cheapest method within each error, from `tradeoff.tradeoff_table`.
+_SUBJECTS: Final = {"error": "error of the colour", "flicker": "flicker"}
 
-    Errors with the same cheapest method are named together.
-    """
+
+def cheapest_sentences(table: pd.DataFrame, fault: Fault = "error") -> list[str]:
+    """Return for each role the cheapest method within each limit of a fault, from `tradeoff.tradeoff_table`."""
     return [
-        f"{str(role).capitalize()} fabrics, error of the colour: {_for_errors(group, limits, 'ns')}."
-        for role, group in table.groupby("role", sort=False)
-    ]
-
-
-def least_flicker_sentences(table: pd.DataFrame) -> list[str]:
-    """Return for each role the cheapest method within each distance of the flicker from the truth's."""
-    return [
-        f"{str(role).capitalize()} fabrics, flicker: {_for_flicker(group, 'ns')}."
-        for role, group in table.groupby("role", sort=False)
-        if group["flicker"].notna().any()
+        f"{role.capitalize()} fabrics, {_SUBJECTS[fault]}: {_cheapest(group, fault, 'ns')}."
+        for role, group in parts_of(table, "role")
+        if group[fault].notna().any()
     ]
 
 
@@ -153,47 +135,35 @@ def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
     table : DataFrame
         From `summary.scene_table`.
     """
-    result = {}
+    result: dict[str, list[str]] = {}
     # An error in the noise may be as large as the upper end of its interval.
     lost = table["colour_rrmse"] == 0
     error = table["colour_rrmse"].where(~lost, table["colour_rrmse_high"])
     table = table.assign(flicker=table["flicker"].abs(), error=error, lost=lost)
-    for scene, group in table.groupby("scene", sort=False) if len(table) else ():
-        timed, sentences = group[group["frame_time"].notna()], []
-        if len(timed):
-            within = _for_errors(timed, LIMITS[:3], "frame_time")
-            sentences.append(f"Error of the colour: {within}.")
-        if timed["flicker"].notna().any():
-            sentences.append(f"Flicker: {_for_flicker(timed, 'frame_time')}.")
-        names = [display(row.method, row.setting) for row in rows(group[group["lost"]])]
-        if names:
-            sentences.append(f"In the noise of the truth: the error of {listed(names)}.")
-        result[str(scene)] = sentences
+    for scene, group in parts_of(table, "scene"):
+        timed, result[scene] = group[group["frame_time"].notna()], []
+        for fault in FAULTS if len(timed) else ():
+            if fault == "error" or timed[fault].notna().any():
+                within = _cheapest(timed, fault, "frame_time", most=3)
+                result[scene].append(f"{_SUBJECTS[fault].capitalize()}: {within}.")
+        if names := [display(row.method, row.setting) for row in rows(group[group["lost"]])]:
+            result[scene].append(f"In the noise of the truth: the error of {listed(names)}.")
     return result
 
 
-def _for_errors(table: pd.DataFrame, limits: Sequence[float], cost: str) -> str:
-    """Return the cheapest method within each `error`."""
-    return _cheapest(table, {limit: f"{100 * limit:g} %" for limit in limits}, cost, "error", "{}")
-
-
-def _for_flicker(table: pd.DataFrame, cost: str) -> str:
-    """Return the cheapest method within each distance of `flicker` from the truth's."""
-    named = {limit: f"{limit:g}".removeprefix("0") for limit in FLICKER_LIMITS}
-    return _cheapest(table, named, cost, "flicker", "{} of the truth")
-
-
-def _cheapest(table: pd.DataFrame, limits: Mapping[float, str], cost: str, fault: str, where: str) -> str:
-    """Return the cheapest method within each limit; limits with the same method are named together."""
+def _cheapest(table: pd.DataFrame, fault: Fault, cost: str, most: int | None = None) -> str:
+    """Return the cheapest method within each limit of a fault; limits with the same method are named together."""
     reached: dict[str, list[str]] = {}
-    for limit, name in limits.items():
+    for limit in FAULTS[fault][:most]:
         best = cheapest(table, limit, cost, fault)
         text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
+        name = f"{100 * limit:g} %" if fault == "error" else f"{limit:g}".removeprefix("0")
         reached.setdefault(text, []).append(name)
-    parts = [f"cheapest within {where.format(listed(names))}: {text}" for text, names in reached.items() if text]
+    of = " of the truth" if fault == "flicker" else ""
+    sentences = [f"cheapest within {listed(names)}{of}: {text}" for text, names in reached.items() if text]
     if missed := reached.get(""):
-        parts.append(f"no method reaches {where.format(' or '.join(missed))}")
-    return "; ".join(parts)
+        sentences.append(f"no method reaches {' or '.join(missed)}{of}")
+    return "; ".join(sentences)
 
 
 def _cost(value: float, cost: str) -> str:
@@ -201,18 +171,22 @@ def _cost(value: float, cost: str) -> str:
     return f"{value:,.0f}{NO_BREAK}ns" if cost == "ns" else f"{significant(value)}{NO_BREAK}ms"
 
 
-def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[str]:
-    """Return for each method the rivals with a lower error in the same time, and where, from `equal_time_table`."""
+def equal_time_sentences(table: pd.DataFrame) -> list[str]:
+    """Return for each method the rivals with a lower error of the colour in the same time, and where.
+
+    The table is from `equal_time_table`.
+    """
     result = []
-    compared = table[(table["measure"] == measure) & table["ratio"].notna()]
+    compared = table[(table["measure"] == "colour") & table["ratio"].notna()]
     for (method, setting), group in compared.groupby(["method", "setting"], sort=False):
         name, lost = display(str(method), str(setting)), group[group["ratio"] < 1.0]
         if len(lost):
-            parts = [_where(str(rival), part) for rival, part in lost.groupby("rival", sort=False)]
-            result.append(f"{name}: rivals with a lower error in the same time: {'; '.join(parts)}.")
+            rivals = "; ".join(_where(rival, part) for rival, part in parts_of(lost, "rival"))
+            result.append(f"{name}: rivals with a lower error in the same time: {rivals}.")
         else:
             (closest,) = rows(group.nsmallest(1, "ratio"))
-            near = f"{display(closest.rival)} with {closest.ratio:.2f}× its error {_size(closest.size)}"
+            where = "over all sizes" if closest.size == WHOLE else f"at footprints {closest.size}"
+            near = f"{display(closest.rival)} with {closest.ratio:.2f}× its error {where}"
             result.append(f"{name}: no rival has a lower error in the same time at any size; the closest is {near}.")
     return result
 
@@ -220,18 +194,9 @@ def equal_time_sentences(table: pd.DataFrame, measure: str = "colour") -> list[s
 def _where(rival: str, lost: pd.DataFrame) -> str:
     """Return the sizes at which a rival has a lower error, and its lowest ratio."""
     sizes = [size for size in lost["size"] if size != WHOLE]
-    places = (
-        "at every size"
-        if len(sizes) == len(SIZES)
-        else f"at footprints {listed(sizes)}"
-        if sizes
-        else "over all sizes together"
-    )
+    places = f"at footprints {listed(sizes)}" if sizes else "over all sizes together"
+    places = "at every size" if len(sizes) == len(SIZES) else places
     return f"{display(rival)} {places} (ratio down to {lost['ratio'].min():.2f}×)"
-
-
-def _size(name: str) -> str:
-    return "over all sizes" if name == WHOLE else f"at footprints {name}"
 
 
 def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]]:
@@ -240,7 +205,7 @@ def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]
     return {
         "trade": cheapest_sentences(frames["tradeoff"]),
         "equal-time": equal_time_sentences(frames["equal_time"]),
-        "aliasing": least_flicker_sentences(frames["tradeoff"]),
+        "aliasing": cheapest_sentences(frames["tradeoff"], "flicker"),
         "scenes": [f"{plain(scene).capitalize()}: {text}" for scene, texts in scenes.items() for text in texts],
     }
 

@@ -275,6 +275,11 @@ def rows(table: pd.DataFrame) -> Iterator[Any]:
     return iter(table.itertuples())
 
 
+def parts_of(frame: pd.DataFrame, column: str) -> list[tuple[str, pd.DataFrame]]:
+    """Return the parts of a frame by the values of a column, in their order."""
+    return [(str(name), part) for name, part in frame.groupby(column, sort=False)] if len(frame) else []
+
+
 def _wide(records: Sequence[Record], scene: str) -> pd.DataFrame:
     """Return one row a method and fabric with a column for each metric of a scene; the truth's own left out."""
     table = to_table(records)

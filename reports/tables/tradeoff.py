@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import pandas as pd
 
@@ -10,11 +10,12 @@ from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.summary import front, rows
 
-LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
-"""Errors that the page names the cheapest method for."""
+Fault = Literal["error", "flicker"]
+"""Relative RMSE of the colour, and distance of the flicker from the truth's."""
 
-FLICKER_LIMITS: Final = (0.1, 0.01, 0.001)
-"""Distances of the flicker from the truth's that the page names the cheapest method for."""
+LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
+FAULTS: Final[dict[Fault, tuple[float, ...]]] = {"error": LIMITS, "flicker": (0.1, 0.01, 0.001)}
+"""Limits that the page names the cheapest method for."""
 
 _KEYS: Final = ["role", "method", "setting", "fabrics"]
 _COSTS: Final = ["ns", "error", "error_least", "error_most", "bytes_stored", "flicker"]

@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from reports.over_seeds import by_seed, first_training, is_range, mean_over_seeds, over_seeds, trainings
+from reports.over_seeds import by_seed, first_training, mean_over_seeds, over_seeds, trainings
 from reports.record import Provenance, Record
 
 
@@ -76,7 +76,7 @@ def test_a_table_is_that_of_means_with_the_range_of_the_trainings():
     assert table["seeds"].to_dict() == {"a": 3, "b": 1, "points": 0}
     for method in ("b", "points"):
         assert math.isnan(table["ratio_least"][method]) and math.isnan(table["ratio_most"][method])
-    assert [name for name in table.columns if is_range(name)] == ["seeds", "ratio_least", "ratio_most"]
+    assert [*table.columns] == ["setting", "ratio", "seeds", "ratio_least", "ratio_most"]
 
 
 @over_seeds(["method", "setting"], ["worst"], {"worst": max})

@@ -1,7 +1,8 @@
 import pytest
 
-from reports.page.alt_texts import PLOT_TITLES, alt_texts
+from reports.page.alt_texts import alt_texts
 from reports.tables.page_tables import page_frames
+from reports.tables.table import WORDS
 
 
 @pytest.fixture(scope="module")
@@ -10,7 +11,7 @@ def texts(made_up):
 
 
 def test_every_plot_has_a_text_of_sentences(texts):
-    assert set(texts) == set(PLOT_TITLES)
+    assert set(texts) == set(WORDS["plots"])
     assert all(text.endswith(".") for text in texts.values())
 
 

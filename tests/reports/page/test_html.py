@@ -10,7 +10,6 @@ import pytest
 
 from reports.images.tiles import EXPOSURE, hex_colour
 from reports.options import BenchOptions
-from reports.page.alt_texts import PLOT_TITLES
 from reports.page.colours import DARK, LIGHT
 from reports.page.content import ModelNote, PageInput, PictureFile
 from reports.page.html import OPEN_ROWS, fabric_card, page_html, prose
@@ -96,7 +95,7 @@ def page_of(measured):
     fabrics = [(load_fabric(name), "seen") for name in ("denim", "basket")]
     page = PageInput("tiny", "", "0123", "tiny-0", fabrics, models, BenchOptions(), records, this_machine(1), pictures)
     page = replace(page, live={"denim": Path("denim.html")})
-    return page_html(page, page_frames(records), set(PLOT_TITLES))
+    return page_html(page, page_frames(records), set(WORDS["plots"]))
 
 
 def test_several_trainings_have_a_mean_and_a_range(text, three_trainings):

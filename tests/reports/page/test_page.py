@@ -180,7 +180,7 @@ def test_page_says_what_it_is_made_of(written, page_input):
 def test_page_keeps_its_records_and_the_machine_of_the_times(written, page_input, made_up):
     folder, _ = written
     assert read_records([folder / OF_A_PAGE]) == made_up
-    assert read_machine(folder / OF_A_PAGE) == page_input.machine
+    assert read_machine(folder / OF_A_PAGE).model_copy(update={"sha256": ""}) == page_input.machine
 
 
 def test_text_of_files_is_escaped(written):

@@ -13,7 +13,6 @@ from reports.tables.documents import (
     readme_block,
     results_page,
     two_decimals,
-    two_digits,
     with_block,
 )
 from weaves.errors import BadInput
@@ -108,7 +107,6 @@ def test_a_time_is_kept_within_a_quarter(printed, fresh, expected):
 
 def test_numbers_have_no_sign_at_zero():
     assert [two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
-    assert [two_digits(value) for value in (0.00123, 0.1)] == ["1.2e−3", "1.0e−1"]
 
 
 def test_records_without_the_baseline_are_refused(records):
