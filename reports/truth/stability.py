@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.compiled import float32
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.place import BOX, BOX_SIDE, place
+from pipeline.truth.footprint.place import BOX, BOX_SIDE, Axis, place
 from pipeline.truth.geometry import heightfield
 from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.kernels import Direction, FlakeLayer, Normals, Tangents
@@ -401,7 +401,7 @@ def places() -> list[Finding]:
         sigma, number = (10.0 ** random.uniform(-3, -0.6, count)).astype(np.float32), random.random(count)
         inputs: dict[str, Array] = {"centre": centre, "sigma": sigma, "repeat": repeats}
         wide = [column.astype(np.float64) for column in inputs.values()]
-        value = np.array([function(BOX, *row)[0] for row in zip(*wide, number, strict=True)])
+        value = np.array([function(Axis(BOX, *axis), n)[0] for *axis, n in zip(*wide, number, strict=True)])
         with mpmath.workdps(DIGITS):
             side = exact(number - 0.5) * exact(sigma) * mpmath.mpf(BOX_SIDE)
             truth = (exact(centre) + side) % exact(repeats)

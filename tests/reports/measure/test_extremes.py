@@ -13,6 +13,7 @@ from pipeline.models.runtimes import runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import faults
 from reports.measure.extremes import (
     FAR,
@@ -24,7 +25,7 @@ from reports.measure.extremes import (
     lustrous,
     measure_extremes,
 )
-from reports.options import EXTREME_PRECISIONS, EXTREME_TRUTH
+from reports.options import EXTREME_PRECISIONS
 from reports.record import Record
 from weaves.fabric import load_fabric
 
@@ -33,9 +34,9 @@ TWILL = load_fabric("denim")
 
 
 class Scaled:
-    """The truth times a factor, but for what `spoil` does to it."""
+    """A coarse truth times a factor, but for what `spoil` does to it."""
 
-    name = "scaled"
+    name, truth = "scaled", TruthOptions(estimator="quadrature", relative_error=0.1)
 
     def __init__(self, factor=1.0, setting="", spoil=lambda answers, queries: answers):
         self.factor, self.setting, self.spoil = factor, setting, spoil
@@ -47,17 +48,14 @@ class Scaled:
         pass
 
     def predict(self, fabric, queries, seed=0):
-        near = queries._replace(
-            **{
-                axis: np.mod(getattr(queries, axis), period)
-                for axis, period in zip("uv", fabric.weave.repeat, strict=True)
-            }
-        )
-        return self.spoil(self.factor * estimate(fabric, near, EXTREME_TRUTH, 0).mean, queries)
+        ends, picks = fabric.weave.repeat
+        near = queries._replace(u=np.mod(queries.u, ends), v=np.mod(queries.v, picks))
+        return self.spoil(self.factor * estimate(fabric, near, self.truth, 0).mean, queries)
 
 
 def measured(*family):
-    return {(r.setting, r.metric): r for r in measure_extremes([family], [(LINING, "seen"), (TWILL, "unseen")])}
+    records = measure_extremes([family], [(LINING, "seen"), (TWILL, "unseen")], Scaled.truth)
+    return {(r.setting, r.metric): r for r in records}
 
 
 @pytest.mark.parametrize("repeat", [(2, 2), (4, 4), (8, 5), (16, 16)])
@@ -86,15 +84,15 @@ def test_closed_forms():
     assert {record.fabric for record in found.values()} == {LINING.name}, "what is not covered is not asked"
 
 
-def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
-    def spoil(answers, queries):
-        tiny = queries.sigma < 1e-3
-        answers[tiny] = np.nan
-        answers[queries.sigma > 1e4, 2] = -1.0
-        answers[(queries.sigma > 100) & (queries.sigma < 1e3), 0] = np.inf
-        return answers
+def spoilt(answers, queries):
+    answers[queries.sigma < 1e-3] = np.nan
+    answers[queries.sigma > 1e4, 2] = -1.0
+    answers[(queries.sigma > 100) & (queries.sigma < 1e3), 0] = np.inf
+    return answers
 
-    found = measured(Scaled(spoil=spoil))
+
+def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
+    found = measured(Scaled(spoil=spoilt))
     # Near and far: 18 queries a footprint, each twice.
     assert found["", "extreme_not_finite"].value == 2 * 2 * 18
     assert found["", "extreme_negative"].value == 2 * 18
@@ -103,14 +101,10 @@ def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
 
 
 def test_places_and_sizes_that_change_the_answer_are_seen():
-    def drift(answers, queries):
-        return answers * (1.0 + 1e-7 * queries.u[:, None]).astype(np.float32)
-
-    def shrink(answers, queries):
-        return answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None].astype(np.float32)
-
-    assert measured(Scaled(spoil=drift))["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
-    found = measured(Scaled(spoil=shrink))
+    drift = Scaled(spoil=lambda answers, queries: answers * np.float32(1.0 + 1e-7 * queries.u[:, None]))
+    assert measured(drift)["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
+    shrink = Scaled(spoil=lambda answers, queries: answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None])
+    found = measured(shrink)
     assert found["", "extreme_far"].value == 0.0
     assert found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
 
@@ -131,22 +125,14 @@ def test_the_table_keeps_the_worst_and_lustrous_cloth_apart():
     assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
 
 
-def methods():
-    torch.manual_seed(0)
-    woven = Woven(WovenNetwork(WovenOptions(map_texels=16)))
-    return [
-        *load_model(pretrained_folder("selvage")),
-        woven,
-        *load_methods(SoftNodesOptions()),
-        *load_methods(PrefilteredOptions()),
-    ]
-
-
 @pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)
 def test_no_method_answers_what_cannot_be_in_any_precision(cloth):
     """Finite, never negative, a million yarns away exactly the same, and beyond a hundred repeats the average."""
-    records = measure_extremes([[one, *runs(one, EXTREME_PRECISIONS)] for one in methods()], [(cloth, "seen")])
-    table = extremes_table(records)
+    torch.manual_seed(0)
+    methods = [Woven(WovenNetwork(WovenOptions(map_texels=16))), *load_model(pretrained_folder("selvage"))]
+    methods += [*load_methods(SoftNodesOptions()), *load_methods(PrefilteredOptions())]
+    families = [[one, *runs(one, EXTREME_PRECISIONS)] for one in methods]
+    table = extremes_table(measure_extremes(families, [(cloth, "seen")]))
     assert len(table) == 11
     assert not table["not_finite"].any() and not table["negative"].any()
     assert not table["far"].any()

@@ -11,7 +11,7 @@ from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from reports.measure.latents import SHARES, Blends, Pair, between, measure_edits, measure_paths, pairs
+from reports.measure.latents import SHARES, Blends, between, measure_edits, measure_paths, pairs
 from weaves.fabric import Fabric, load_fabric
 
 TRUTH = TruthOptions(estimator="node_table")
@@ -52,6 +52,7 @@ def measured():
 
 def test_pairs_differ_in_one_thing_and_have_one_repeat():
     chosen = pairs()
+    assert {pair.about for pair in chosen} == {f"{pair.differs} of {pair.second.name}" for pair in chosen}
     assert {pair.differs for pair in chosen} == {"yarns", "draft"}
     for pair in chosen:
         assert pair.first.weave.repeat == pair.second.weave.repeat
@@ -73,23 +74,18 @@ def test_between_are_the_numbers_in_between():
 
 
 def test_the_truth_has_no_error_where_it_is_the_truth(measured):
-    """Encoded anew the truth is exact everywhere; blended at both ends of yarns, and everywhere between drafts."""
+    """Encoded anew the truth is exact everywhere; blended at both ends of yarns, and everywhere between drafts.
+
+    Answers are no linear function of roughness and bend: the blend of answers errs most in the middle.
+    """
     curves = {(record.metric, record.note): record for record in measured}
     assert len(curves) == len(measured) == 3
     assert ("reencode_error", "draft of denim") not in curves
-    anew, blended = (curves[metric, "yarns of satin_8"].curve for metric in ("reencode_error", "path_error"))
-    assert [t for t, _ in anew] == list(SHARES)
-    assert all(error == 0 for _, error in anew)
-    assert blended[0][1] == blended[-1][1] == 0
-    assert all(error == 0 for _, error in curves["path_error", "draft of denim"].curve)
-
-
-def test_a_straight_line_misses_what_bends(measured):
-    """Answers are no linear function of roughness and bend: the blend of answers errs most in the middle."""
-    blended = next(record for record in measured if record.metric == "path_error")
-    errors = dict(blended.curve)
-    assert blended.value == errors[0.5] > 0.02
-    assert errors[0.5] == max(errors.values())
+    anew, blended = (dict(curves[metric, "yarns of satin_8"].curve) for metric in ("reencode_error", "path_error"))
+    assert list(anew) == list(SHARES)
+    assert set(anew.values()) == {blended[0.0], blended[1.0]} == {0.0}
+    assert set(dict(curves["path_error", "draft of denim"].curve).values()) == {0.0}
+    assert curves["path_error", "yarns of satin_8"].value == blended[0.5] == max(blended.values()) > 0.02
 
 
 def test_edits_of_a_yarn_are_waited_for_and_edits_of_a_colour_are_not():
@@ -117,8 +113,3 @@ def test_a_network_is_measured():
         ("reencode_error", "yarns of satin_8"),
     ]
     assert [record.note for record in measure_edits(method, pair.first, repeats=3)] == ["a yarn", "a colour"]
-
-
-def test_pairs_say_what_differs():
-    denim = load_fabric("denim")
-    assert Pair(denim, load_fabric("basket"), "draft").about == "draft of basket"

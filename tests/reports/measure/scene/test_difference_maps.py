@@ -23,15 +23,11 @@ def written(tmp_path):
     return errors, read_exr(tmp_path / "differences.exr")
 
 
-def test_maps_come_back_from_the_file(written):
+def test_maps_come_back_from_the_file_and_average_to_the_errors(written):
     errors, exr = written
     assert (exr.channels["lit"] == MASK).all()
     for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
         assert exr.channels[name][MASK].mean() == pytest.approx(errors.perceived[name].value, rel=1e-5)
-
-
-def test_squares_of_the_relative_differences_average_to_the_relative_mse(written):
-    errors, exr = written
     squares = exr.stack("relative.R", "relative.G", "relative.B")[MASK].astype(float) ** 2
     assert squares.mean() == pytest.approx(errors.mse_relative.measured, rel=1e-5)
 
