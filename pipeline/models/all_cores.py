@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
-from pipeline.models.method import CHUNK_ROWS, Method
+from pipeline.models.method import CHUNK_ROWS, Around, Method
 from pipeline.models.network import one_thread
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 
-class AllCores:
+class AllCores(Around):
     """A method on several threads.
 
     Parameters
@@ -32,16 +32,8 @@ class AllCores:
     """
 
     def __init__(self, method: Method, threads: int = 0) -> None:
-        self.method, self.name, self.setting = method, method.name, method.setting
+        super().__init__(method)
         self._threads = threads or cores()
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return whether the method covers a fabric."""
-        return self.method.covers(fabric)
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Prepare the method."""
-        self.method.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own."""
@@ -58,7 +50,3 @@ class AllCores:
                 return first
             with ThreadPoolExecutor(self._threads) as pool:
                 return np.concatenate([first, *pool.map(answer, starts)])
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the method's bytes: threads share its tables."""
-        return self.method.bytes_stored(fabric)

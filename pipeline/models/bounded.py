@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.method import Method, in_chunks, refuse_other
+from pipeline.models.method import Around, Method, in_chunks, refuse_other
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
@@ -31,7 +31,7 @@ from weaves.fabric import Fabric
 _OTHER_YARN = [1, 0, 3, 2]  # of each component, the same one of the other yarn
 
 
-class Bounded:
+class Bounded(Around):
     """A method's answers, each component at most that of the soft nodes without shadows (`limited`).
 
     Parameters
@@ -41,28 +41,23 @@ class Bounded:
     """
 
     def __init__(self, method: Method) -> None:
-        self._method = method
-        self.name, self.setting = method.name, " ".join(filter(None, (method.setting, "bounded")))
+        super().__init__(method, "bounded")
         self._tables = PerFabric(tabulate)
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return whether the method covers the fabric."""
-        return self._method.covers(fabric)
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""
-        self._method.prepare(fabric)
+        self.method.prepare(fabric)
         self._tables.of(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
         refuse_other(queries, f"the method {self.name} answers", ("stretch",))
-        result, table = self._method.predict(fabric, queries, seed), self._tables.of(fabric)
+        result, table = self.method.predict(fabric, queries, seed), self._tables.of(fabric)
         return limited(result, in_chunks(queries, lambda part: read_queries(table, part).bounds))
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes and those of the table."""
-        return self._method.bytes_stored(fabric) + self._tables.of(fabric).nbytes
+        return self.method.bytes_stored(fabric) + self._tables.of(fabric).nbytes
 
 
 def limited(components: npt.NDArray[np.float32], bounds: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

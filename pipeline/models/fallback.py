@@ -22,7 +22,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.models.domain import Domain
-from pipeline.models.method import Method
+from pipeline.models.method import Around, Method, row_by_row
 from pipeline.models.options import RoundFootprint
 from pipeline.scenes.shade import colours_of
 from pipeline.truth.cloth import cloth_side, columns_of
@@ -76,7 +76,7 @@ def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     return result
 
 
-class Fallback:
+class Fallback(Around):
     """A method that answers any query.
 
     Parameters
@@ -90,8 +90,8 @@ class Fallback:
     """
 
     def __init__(self, method: Method, kinds: Collection[str], footprint: RoundFootprint = "geometric_mean") -> None:
-        self.name, self.setting = method.name, method.setting
-        self._method, self._footprint = method, footprint
+        super().__init__(method)
+        self._footprint = footprint
         self._domain: Domain | None = getattr(method, "domain", None)
         # Some methods answer outside their domain themselves, in another way than within it.
         self._outside: Callable[[Fabric, Queries], Float32] | None = getattr(method, "outside_domain", None)
@@ -101,14 +101,6 @@ class Fallback:
         self._turns = bool(getattr(method, "turns", False))
         if self._domain:
             self._kinds &= self._domain.kinds | getattr(method, "without_training", frozenset())
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return whether the method covers the fabric."""
-        return self._method.covers(fabric)
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Prepare the method."""
-        self._method.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries of any kind, float32 (N, 4)."""
@@ -123,23 +115,19 @@ class Fallback:
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, (N,), by the method or the fallback; no light changes it."""
-        own = getattr(self._method, "transparency", None)
+        own = getattr(self.method, "transparency", None)
         if own is None:
             return fallback_rows(fabric, looks, seed)[:, 4]
-        result, behind = np.empty(len(looks.u), np.float32), looks.wo[:, 2] < 0.0
-        if behind.any():
-            result[behind] = own(fabric.back(), self._nearest(looks.take(behind)).turned(), seed)
-        if not behind.all():
-            result[~behind] = own(fabric, self._nearest(looks.take(~behind)), seed)
-        return result
+        return row_by_row(
+            looks,
+            looks.wo[:, 2] < 0.0,
+            lambda part: own(fabric.back(), self._nearest(part).turned(), seed),
+            lambda part: own(fabric, self._nearest(part), seed),
+        )
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the colours of the components of N queries, (N, 4, 3): the mean colours of their footprints."""
         return colours_of(fabric, queries).astype(np.float32)
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the method's bytes; all methods share the tables of the fallback."""
-        return self._method.bytes_stored(fabric)
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which queries about a fabric are left to the fallback, (N,)."""
@@ -162,27 +150,27 @@ class Fallback:
 
     def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries by the method, in the nearest form that it knows."""
-        behind = queries.wo[:, 2] < 0.0
-        if behind.any():
-            result = np.empty((len(behind), 4), np.float32)
-            result[behind] = self._answers(fabric.back(), queries.take(behind).turned(), seed)
-            if not behind.all():
-                result[~behind] = self._answers(fabric, queries.take(~behind), seed)
-            return result
-        nearest = self._nearest(queries)
-        if self._domain is None:
-            return self._method.predict(fabric, nearest, seed)
-        alone = self._domain.out_of_domain(fabric, nearest) if self._outside else np.zeros(len(nearest.u), np.bool_)
-        if not alone.any():
-            # Footprints that see the average are no larger than trained on.
-            return self._method.predict(fabric, self._domain.within(fabric, nearest), seed)
-        result = np.empty((len(alone), 4), np.float32)
-        assert self._outside is not None
-        result[alone] = self._outside(fabric, nearest.take(alone))
-        if not alone.all():
-            inside = self._domain.within(fabric, nearest.take(~alone))
-            result[~alone] = self._method.predict(fabric, inside, seed)
-        return result
+        return row_by_row(
+            queries,
+            queries.wo[:, 2] < 0.0,
+            lambda part: self._in_front(fabric.back(), part.turned(), seed),
+            lambda part: self._in_front(fabric, part, seed),
+        )
+
+    def _in_front(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
+        """Answer queries of viewers in front of the cloth."""
+        domain, outside, nearest = self._domain, self._outside, self._nearest(queries)
+        if domain is None:
+            return self.method.predict(fabric, nearest, seed)
+
+        def within(part: Queries) -> Float32:
+            """Answer by the method; footprints that see the average are no larger than trained on."""
+            return self.method.predict(fabric, domain.within(fabric, part), seed)
+
+        if outside is None:
+            return within(nearest)
+        alone = domain.out_of_domain(fabric, nearest)
+        return row_by_row(nearest, alone, lambda part: outside(fabric, part), within)
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

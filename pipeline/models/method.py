@@ -6,14 +6,17 @@ from collections.abc import Callable, Collection
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Mask
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 CHUNK_ROWS = 4096
 """Rows of one inference on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
+
+Read = Callable[[Queries], Float32]
+"""Answers queries, in rows."""
 
 _ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ
 
@@ -36,19 +39,31 @@ class Method(Protocol):
     def prepare(self, fabric: Fabric) -> None:
         """Precompute tables or latents of a fabric, as a renderer does when it is loaded; not part of query times."""
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the components of N queries, float32 (N, 4), finite and >= 0; only random methods use `seed`."""
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes that a renderer stores for this fabric."""
 
 
-@runtime_checkable
-class EstimatesErrors(Method, Protocol):
-    """A method that estimates the errors of its answers."""
+class Around:
+    """A method around another one, which answers where a subclass does not; `words` join its setting."""
 
-    def within(self, error: float) -> Method:
-        """Return the method at a wished relative error, above 0 and below 1: other answers where it is exceeded."""
+    def __init__(self, method: Method, *words: str) -> None:
+        self.method, self.name = method, method.name
+        self.setting = " ".join(filter(None, (method.setting, *words)))
+
+    def covers(self, fabric: Fabric) -> bool:
+        """Return whether the method covers a fabric."""
+        return self.method.covers(fabric)
+
+    def prepare(self, fabric: Fabric) -> None:
+        """Prepare the method."""
+        self.method.prepare(fabric)
+
+    def bytes_stored(self, fabric: Fabric) -> int:
+        """Return the method's bytes."""
+        return self.method.bytes_stored(fabric)
 
 
 def faults(queries: Queries, who: str, kinds: Collection[str] = ()) -> dict[int, tuple[str, object, str]]:
@@ -80,14 +95,24 @@ def refuse_other(queries: Queries, who: str, kinds: Collection[str] = ()) -> Non
         raise BadInput("queries", f"{len(found)} rows; first row {row}: {column}", value, allowed)
 
 
-def in_chunks(
-    queries: Queries, read: Callable[[Queries], npt.NDArray[np.float32]], width: int = 4
-) -> npt.NDArray[np.float32]:
+def in_chunks(queries: Queries, read: Read, width: int = 4) -> Float32:
     """Return what is read for N queries, (N, width), `CHUNK_ROWS` rows at a time."""
     result = np.empty((len(queries.u), width), np.float32)
     for start in range(0, len(result), CHUNK_ROWS):
         rows = slice(start, start + CHUNK_ROWS)
         result[rows] = read(queries.take(rows))
+    return result
+
+
+def row_by_row(queries: Queries, chosen: Mask, one: Read, other: Read) -> Float32:
+    """Answer the chosen queries in one way, the rest in another; no way is asked about no queries."""
+    if not chosen.any():
+        return other(queries)
+    answers = one(queries.take(chosen))
+    if chosen.all():
+        return answers
+    result = np.empty((len(chosen), *answers.shape[1:]), np.float32)
+    result[chosen], result[~chosen] = answers, other(queries.take(~chosen))
     return result
 
 

@@ -11,9 +11,10 @@ import math
 
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
-from pipeline.models.method import EstimatesErrors, Method
+from pipeline.models.method import Method
 from pipeline.models.options import Options
 from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
+from pipeline.models.selvage.model import Selvage
 from pipeline.storage import place
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
@@ -59,7 +60,7 @@ def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
         return load_methods(options)[-1], options.kinds
     if model in pretrained_names() and setting:
         (trained,) = load_model(model_folder(model, where, key))
-        if not isinstance(trained, EstimatesErrors):
+        if not isinstance(trained, Selvage):
             raise BadInput(where, key, name, f"{model} has no settings")
         chosen = trained.within(_wished_error(setting, where, key, name))
         return chosen, _kinds(chosen)

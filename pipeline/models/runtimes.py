@@ -19,7 +19,7 @@ import logging
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -29,7 +29,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from pipeline.models.method import Method
+from pipeline.models.method import Around, Method
 from pipeline.models.network import PerQuery, Portable
 from pipeline.models.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -63,24 +63,18 @@ class Runtime(NamedTuple):
     """Takes a module, its inputs, and the number of inputs (the first ones) that have a row per query."""
 
 
-def _eager(dtype: torch.dtype) -> Runtime:
-    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
-        return _Program(_rounding(module, dtype))
-
-    return Runtime(lambda: "", load)
+def _eager(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch.dtype) -> _Program:
+    return _Program(_rounding(module, dtype))
 
 
-def _compiled(dtype: torch.dtype | None = None) -> Runtime:
-    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
-        torch._dynamo.config.recompile_limit = _MODULES
-        for column in example[:rows]:
-            torch._dynamo.mark_dynamic(column, 0)
-        run = _rounding(torch.compile(module, fullgraph=True), dtype)
-        with _quiet(), torch.inference_mode():
-            run(*example)
-        return _Program(run)
-
-    return Runtime(_no_compiler, load)
+def _compiled(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch.dtype | None) -> _Program:
+    torch._dynamo.config.recompile_limit = _MODULES
+    for column in example[:rows]:
+        torch._dynamo.mark_dynamic(column, 0)
+    run = _rounding(torch.compile(module, fullgraph=True), dtype)
+    with _quiet(), torch.inference_mode():
+        run(*example)
+    return _Program(run)
 
 
 def _rounding(module: Callable[..., Tensor], dtype: torch.dtype | None) -> Callable[..., Tensor]:
@@ -105,26 +99,23 @@ def _no_compiler() -> str:
     return ""
 
 
-def _onnx(quantised: bool) -> Runtime:
-    def load(module: nn.Module, example: Sequence[Tensor], rows: int) -> _Program:
-        import onnxruntime
+def _onnx(module: nn.Module, example: Sequence[Tensor], rows: int, quantised: bool) -> _Program:
+    import onnxruntime
 
-        plain = exported(module, example, rows)
-        model = _quantised(plain) if quantised else plain
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
-        # An input that the answers do not depend on is no input of the graph.
-        places = [(int(entry.name.removeprefix("x")), entry.name) for entry in session.get_inputs()]
+    plain = exported(module, example, rows)
+    model = _quantised(plain) if quantised else plain
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    # An input that the answers do not depend on is no input of the graph.
+    places = [(int(entry.name.removeprefix("x")), entry.name) for entry in session.get_inputs()]
 
-        def run(*given: Tensor) -> Tensor:
-            (answer,) = session.run(None, {name: given[place].numpy() for place, name in places})
-            return torch.from_numpy(answer)
+    def run(*given: Tensor) -> Tensor:
+        (answer,) = session.run(None, {name: given[place].numpy() for place, name in places})
+        return torch.from_numpy(answer)
 
-        return _Program(run, len(plain) - len(model))
-
-    return Runtime(no_onnx, load)
+    return _Program(run, len(plain) - len(model))
 
 
 def no_onnx() -> str:
@@ -212,12 +203,12 @@ def _quiet() -> Iterator[None]:
 
 
 RUNTIMES: Final[dict[str, Runtime]] = {
-    "eager-bf16": _eager(torch.bfloat16),
-    "eager-fp16": _eager(torch.float16),
-    "compile": _compiled(),
-    "compile-bf16": _compiled(torch.bfloat16),
-    "onnx": _onnx(quantised=False),
-    "onnx-int8": _onnx(quantised=True),
+    "eager-bf16": Runtime(lambda: "", partial(_eager, dtype=torch.bfloat16)),
+    "eager-fp16": Runtime(lambda: "", partial(_eager, dtype=torch.float16)),
+    "compile": Runtime(_no_compiler, partial(_compiled, dtype=None)),
+    "compile-bf16": Runtime(_no_compiler, partial(_compiled, dtype=torch.bfloat16)),
+    "onnx": Runtime(no_onnx, partial(_onnx, quantised=False)),
+    "onnx-int8": Runtime(no_onnx, partial(_onnx, quantised=True)),
 }
 """Runtimes by name (`reports.options.RuntimeName`)."""
 
@@ -225,7 +216,7 @@ EXACT: Final = frozenset({"compile", "onnx"})
 """Runtimes in single precision."""
 
 
-class RunBy:
+class RunBy(Around):
     """A method run in another way; its setting says which.
 
     Parameters
@@ -237,14 +228,10 @@ class RunBy:
     """
 
     def __init__(self, method: Portable, runtime: str) -> None:
-        self.name, self.setting = method.name, " ".join(filter(None, (method.setting, runtime)))
-        self._method, self._runtime = method, runtime
+        super().__init__(method, runtime)
+        self._portable, self._runtime = method, runtime
         self._programs: dict[tuple[Any, ...], tuple[nn.Module, _Program]] = {}
         self._ready = PerFabric(self._prepared)
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return whether the method covers the fabric."""
-        return self._method.covers(fabric)
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method; compile or export its module, unless an earlier fabric's serves this one too.
@@ -263,11 +250,11 @@ class RunBy:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes, less what smaller weights save."""
-        return self._method.bytes_stored(fabric) - self._ready.of(fabric)[1].saved
+        return self.method.bytes_stored(fabric) - self._ready.of(fabric)[1].saved
 
     def _prepared(self, fabric: Fabric) -> tuple[PerQuery, _Program]:
-        self._method.prepare(fabric)
-        part = self._method.per_query(fabric)
+        self.method.prepare(fabric)
+        part = self._portable.per_query(fabric)
         key = (id(part.module), *(tuple(constant.shape) for constant in part.constants))
         if key in self._programs:
             return part, self._programs[key][1]
@@ -282,7 +269,7 @@ class RunBy:
 
     def _compare(self, fabric: Fabric, part: PerQuery, program: _Program, queries: Queries) -> None:
         """Compare values with the method's own."""
-        own = self._method.predict(fabric, queries)
+        own = self.method.predict(fabric, queries)
         difference = np.linalg.norm(part.answered(queries, program.run) - own)
         error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
         if not error <= RUNTIME_TOLERANCE:

@@ -12,13 +12,14 @@ from functools import partial
 from typing import Final
 
 import numpy as np
+from torch import Tensor
 
 from pipeline.analytic.soft_nodes import features
 from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
-from pipeline.models.networks.layers import SLOPE, LinearLayer
+from pipeline.models.networks.layers import SLOPE, LinearLayer, layers_of
 from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST
-from pipeline.models.neumip.model import LAYERS, Neumip, Parts
+from pipeline.models.neumip.model import LAYERS, Neumip, NeumipNetwork
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.model import LARGEST_FACTOR, Selvage
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
@@ -247,11 +248,12 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         raise BadInput("export", "kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only")
     if level is not None:
         raise BadInput("export", "level", level, f"leave it out: {method.name} has no soft nodes")
-    parts, weights = method.parts(fabric), Weights()
+    network, weights = method.network_of(fabric), Weights()
+    options = network.options
     yarns = colours(fabric)
     weights.add("colours", np.array([*yarns.model_dump().values()], np.float32)[:4], "k_s and k_d of warp and weft")
-    constants, layers = _pack(parts, fabric.weave.repeat, weights)
-    channels = [f"feature {n}" for n in range(parts.options.channels)]
+    constants, layers = _pack(network, weights)
+    channels = [f"feature {n}" for n in range(options.channels)]
     channels += ["0"] * (-len(channels) % 4)
     described = Descriptor(
         model=NEUMIP,
@@ -276,7 +278,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
             },
             outputs={
                 "offset": "depth d; the place moves by 0.1 d wo.xy / max(wo.z, 0.6) mean sides of the repeat",
-                "decoder": f"(exp(x) - 1) / {parts.options.log_k:g} of the specular ones, x of the diffuse; at least 0",
+                "decoder": f"(exp(x) - 1) / {options.log_k:g} of the specular ones, x of the diffuse; at least 0",
             },
             layers=layers,
             onnx=_NEUMIP_ONNX,
@@ -300,23 +302,22 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
     )
 
 
-def _pack(
-    parts: Parts, repeat: tuple[int, int], weights: Weights
-) -> tuple[dict[str, bool | int | float], list[PlacedLayer]]:
+def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | int | float], list[PlacedLayer]]:
     """Fill the buffer; return the constants of the source, and what the descriptor says of the layers."""
-    options, (ends, picks) = parts.options, repeat
+    options, (ends, picks) = network.options, network.repeat
     places, described = {}, []
-    for network, layers in (("offset", parts.offset), ("decoder", parts.decoder)):
-        places[network] = weights.count
-        if layers:
+    for name, perceptron in (("offset", network.offset), ("decoder", network.decoder)):
+        places[name] = weights.count
+        if perceptron is not None:
+            layers = layers_of(perceptron)
             first = LinearLayer(_after_elements(layers[0].weights, options.channels), layers[0].biases)
-            described += weights.add_perceptron(network, [first, *layers[1:]], "ReLU", "none")
+            described += weights.add_perceptron(name, [first, *layers[1:]], "ReLU", "none")
     places["pyramid"] = weights.count
-    for index, texture in enumerate(parts.levels):
-        weights.add(f"level {index}", texture, "texels (rows, columns, channels); row 0 at the smallest v")
+    for index, texture in enumerate(network.levels):
+        weights.add(f"level {index}", _texels(texture), "texels (rows, columns, channels); row 0 at the smallest v")
     places["depth"] = weights.count
-    if parts.depth is not None:
-        weights.add("depth", parts.depth, "texels of the depth that shifts a place, at the finest level")
+    if network.depth is not None:
+        weights.add("depth", _texels(network.depth), "texels of the depth that shifts a place, at the finest level")
     constants: dict[str, bool | int | float] = {
         "COLOURS": weights.places["colours"].offset,
         "ENDS": ends,
@@ -325,7 +326,7 @@ def _pack(
         "HIDDEN_QUADS": quads(options.hidden),
         "HIDDEN_LAYERS": LAYERS,
         "TEXELS_PER_YARN": options.texels_per_yarn,
-        "LEVEL_COUNT": len(parts.levels),
+        "LEVEL_COUNT": len(network.levels),
         "OFFSET": options.offset,
         "OFFSET_LAYERS": places["offset"],
         "DECODER_LAYERS": places["decoder"],
@@ -336,6 +337,11 @@ def _pack(
         "LOG_K": float(options.log_k),
     }
     return constants, described
+
+
+def _texels(texture: Tensor) -> Float32:
+    """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
+    return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
 
 
 def _after_elements(rows: Float32, channels: int) -> Float32:

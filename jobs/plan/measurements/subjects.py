@@ -102,12 +102,12 @@ class Trained(TaskPart):
         if not self.networks:
             return []
         from pipeline.models.bounded import counterpart
-        from pipeline.models.method import EstimatesErrors
         from pipeline.models.runtimes import runs
+        from pipeline.models.selvage.model import Selvage
 
         others = [counterpart(one) for one in methods if ways.bounds]
         others += [run for one in methods for run in runs(one, ways.runtimes)]
-        estimating = [one for one in methods if isinstance(one, EstimatesErrors)]
+        estimating = [one for one in methods if isinstance(one, Selvage)]
         return others + [one.within(error) for one in estimating for error in ways.wished_errors]
 
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
-from pipeline.models.method import in_chunks
+from pipeline.models.method import in_chunks, row_by_row
 from pipeline.models.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -95,10 +94,9 @@ class SoftNodes(Analytic["SoftNodeTable"]):
 
     def _answer(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries lit from either side."""
-        behind = queries.wi[:, 2] < 0.0
-        if not behind.any():
-            return self._read(self.table_for(fabric, queries), queries, seed)
-        result = np.empty((len(behind), 4), np.float32)
-        result[behind] = self.behind(fabric, queries.take(behind))[:, :4]
-        result[~behind] = self._answer(fabric, queries.take(~behind), seed)
-        return result
+        return row_by_row(
+            queries,
+            queries.wi[:, 2] < 0.0,
+            lambda part: self.behind(fabric, part)[:, :4],
+            lambda part: self._read(self.table_for(fabric, part), part, seed),
+        )

@@ -74,36 +74,33 @@ class SilhouetteData(nn.Module):
 
     Parameters
     ----------
-    view : View
-        The queries.
+    columns : mapping
+        Rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`).
+    repeat : tuple of int
+        Extent of the fabric's repeat in x and y, in yarn spacings.
+
+    Attributes
+    ----------
     target : Tensor (n, 2)
         Opacity and 0; or mean and variance of the grazing cosine, in units of sqrt(kappa) and kappa.
     """
 
-    def __init__(self, view: View, target: Tensor) -> None:
+    def __init__(self, columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> None:
         super().__init__()
-        for name, column in zip(View._fields, view, strict=True):
-            self.register_buffer(name, column, persistent=False)
-        self.register_buffer("target", target, persistent=False)
+        ends, picks = repeat
+        wo = np.stack([columns["wo_x"], columns["wo_y"], columns["wo_z"]], axis=-1)
+        if "opacity" in columns:
+            target = [columns["opacity"], np.zeros_like(columns["opacity"])]
+        else:
+            target = [columns["grazing_mean"], columns["grazing_variance"]]
+        view = (columns["u"] / ends, columns["v"] / picks, columns["sigma"], wo, columns["curvature"])
+        for name, column in zip((*View._fields, "target"), (*view, np.stack(target, axis=-1)), strict=True):
+            self.register_buffer(name, torch.from_numpy(np.array(column, np.float32)), persistent=False)
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[View, Tensor]:
         """Return `count` random queries and their answers."""
         rows = torch.from_numpy(random.integers(0, len(self.get_buffer("u")), count)).to(self.get_buffer("u").device)
         return View(*(self.get_buffer(name)[rows] for name in View._fields)), self.get_buffer("target")[rows]
-
-
-def silhouettes_of(columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> SilhouetteData:
-    """Return rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`) for a training."""
-    ends, picks = repeat
-    wo = np.stack([columns["wo_x"], columns["wo_y"], columns["wo_z"]], axis=-1)
-    view = (columns["u"] / ends, columns["v"] / picks, columns["sigma"], wo, columns["curvature"])
-    if "opacity" in columns:
-        target = [columns["opacity"], np.zeros_like(columns["opacity"])]
-    else:
-        target = [columns["grazing_mean"], columns["grazing_variance"]]
-    tensors = (torch.from_numpy(np.array(column, np.float32)) for column in (*view, np.stack(target, axis=-1)))
-    *read, answers = tensors
-    return SilhouetteData(View(*read), answers)
 
 
 class CurvedNetwork(TextureNetwork):
@@ -260,7 +257,7 @@ def build(
     (fabric,), (columns,) = fabrics, silhouettes
     front = cloth_side(fabric, TruthOptions()).front
     fall = _NO_FALL if has_gaps(front) else float(front.highest - front.lowest)
-    return CurvedNetwork(options, fabric.weave.repeat, silhouettes_of(columns, fabric.weave.repeat), fall)
+    return CurvedNetwork(options, fabric.weave.repeat, SilhouetteData(columns, fabric.weave.repeat), fall)
 
 
 def restore(options: CurvedOptions, trained: Trained) -> list[Curved]:

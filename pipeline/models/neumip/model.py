@@ -17,18 +17,15 @@ a mask. So are the counts of texels, queries and steps; the published training t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Final, NamedTuple
+from typing import ClassVar, Final
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pipeline.compiled.arrays import Float32
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
-    LinearLayer,
     component_error,
-    layers_of,
     perceptron,
     to_components,
     to_network,
@@ -84,48 +81,8 @@ class NeumipNetwork(TextureNetwork):
         return component_error(self(*flat), target, options)
 
 
-class Parts(NamedTuple):
-    """A network for programs without torch.
-
-    Attributes
-    ----------
-    options : NeumipOptions
-        The design.
-    levels : list of float32 (rows, columns, channels)
-        Textures of the pyramid, finest first; texel (0, 0) is at the smallest v and u.
-    depth : float32 (rows, columns, channels) or None
-        Offset texture, if the design has one.
-    offset : list of LinearLayer
-        From texture and wo.xy to the depth; none without it.
-    decoder : list of LinearLayer
-        From features, wi.xy and wo.xy to the components in network space.
-    """
-
-    options: NeumipOptions
-    levels: list[Float32]
-    depth: Float32 | None
-    offset: list[LinearLayer]
-    decoder: list[LinearLayer]
-
-
 class Neumip(NetworkMethod[NeumipNetwork]):
-    """Trained textures, one network for each fabric."""
-
-    def parts(self, fabric: Fabric) -> Parts:
-        """Return the fabric's textures and layers."""
-        network = self.network_of(fabric)
-        return Parts(
-            network.options,
-            [_texels(texture) for texture in network.levels],
-            None if network.depth is None else _texels(network.depth),
-            [] if network.offset is None else layers_of(network.offset),
-            layers_of(network.decoder),
-        )
-
-
-def _texels(texture: Tensor) -> Float32:
-    """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
-    return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
+    """Trained textures, one network for each fabric; the class tells them from other methods."""
 
 
 def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:

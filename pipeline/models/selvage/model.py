@@ -48,7 +48,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.soft_nodes import Level, SoftNodes
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.fallback import fallback_answers
-from pipeline.models.method import CHUNK_ROWS, refuse_other
+from pipeline.models.method import CHUNK_ROWS, refuse_other, row_by_row
 from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, loaded
 from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.per_fabric import PerFabric
@@ -248,14 +248,13 @@ class Selvage:
 
         Light from behind is answered by the soft nodes alone.
         """
-        behind = queries.wi[:, 2] < 0.0
         self._refuse(queries, *SelvageOptions.without_training)
-        if not behind.any():
-            return self._corrected(fabric, queries)
-        result = np.empty((len(behind), 4), np.float32)
-        result[behind] = self._nodes.predict(fabric, queries.take(behind))
-        result[~behind] = self._corrected(fabric, queries.take(~behind))
-        return result
+        return row_by_row(
+            queries,
+            queries.wi[:, 2] < 0.0,
+            lambda part: self._nodes.predict(fabric, part),
+            lambda part: self._corrected(fabric, part),
+        )
 
     def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
@@ -384,13 +383,12 @@ class Adaptive:
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4). BadInput for kinds of queries that the soft nodes do not know."""
-        behind = queries.wi[:, 2] < 0.0
-        if not behind.any():
-            return self._answers(fabric, queries, seed)
-        result = np.empty((len(behind), 4), np.float32)
-        result[behind] = self._finest.predict(fabric, queries.take(behind))
-        result[~behind] = self._answers(fabric, queries.take(~behind), seed)
-        return result
+        return row_by_row(
+            queries,
+            queries.wi[:, 2] < 0.0,
+            lambda part: self._finest.predict(fabric, part),
+            lambda part: self._answers(fabric, part, seed),
+        )
 
     def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries that the network is not trained for, float32 (N, 4), by the finest soft nodes."""

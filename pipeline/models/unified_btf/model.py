@@ -44,11 +44,9 @@ from pipeline.models.unified_btf.set_encoder import (
     DIRECTION_NUMBERS,
     SetEncoder,
     Texels,
-    TexelSamples,
     angles_of,
-    angular_samples,
-    read_samples,
     read_texels,
+    texels_of,
 )
 from pipeline.shards.queries import QueryOptions
 from weaves.errors import BadInput
@@ -69,7 +67,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
     ----------
     options : BtfOptions
         The design.
-    samples : sequence of TexelSamples
+    texels : sequence of Texels
         Samples of the training fabrics, addressed by index in batches; none for inference.
     """
 
@@ -77,12 +75,12 @@ class UnifiedBtfNetwork(EncoderDecoder):
     encoder: SetEncoder
     decoder: nn.Sequential
 
-    def __init__(self, options: BtfOptions, samples: Sequence[TexelSamples] = ()) -> None:
+    def __init__(self, options: BtfOptions, texels: Sequence[Texels] = ()) -> None:
         super().__init__()
         self.options = options
         self.encoder, self.decoder = SetEncoder(options), decoder(options.latent, options.hidden)
-        self._samples = list(samples)  # kept in use, so that validation finds them
-        self._texels = [read_texels(one, options) for one in self._samples]
+        self._held = tuple(texels)  # kept in use, so that validation finds them
+        self._texels = list(texels)
 
     def encode(self, texels: Texels, chosen: npt.NDArray[np.int64] | None = None) -> Tensor:
         """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
@@ -106,7 +104,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
 
     def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
         """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
-        texels = read_texels(angular_samples(fabric, self.options), self.options)
+        texels = texels_of(fabric, self.options)
         return tuple(level.contiguous() for level in averaged(self.encode(texels)))
 
     def components(self, *inputs: Tensor) -> Tensor:
@@ -162,7 +160,7 @@ def build(
 ) -> UnifiedBtfNetwork:
     """Return an untrained network for these fabrics, with their angular samples by column."""
     pairs = zip(fabrics, samples, strict=True)
-    return UnifiedBtfNetwork(options, [read_samples(fabric, options, columns) for fabric, columns in pairs])
+    return UnifiedBtfNetwork(options, [read_texels(fabric, options, columns) for fabric, columns in pairs])
 
 
 def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[UnifiedBtfNetwork]]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -36,51 +36,53 @@ _COMPONENTS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class TexelSamples:
-    """T texels of one repeat, each seen under the same n pairs of directions.
+class Texels:
+    """T texels of one repeat, each seen under the same n pairs of directions: inputs of the encoder.
 
     Attributes
     ----------
     shape : tuple of int
         Rows and columns of texels; texel t lies in row t // columns, column t % columns.
-    wi, wo : float32 (n, 3)
-        Directions.
-    values : float16 (n, T, 4)
+    angles : float32 Tensor (n, 4)
+        Directions (`angles_of`).
+    values : float16 Tensor (n, T, 4)
         Components; their own noise is far above the rounding.
     """
 
     shape: tuple[int, int]
-    wi: npt.NDArray[np.float32]
-    wo: npt.NDArray[np.float32]
-    values: npt.NDArray[np.float16]
+    angles: Tensor
+    values: Tensor
+
+    def to(self, device: torch.device) -> Texels:
+        """Return the same on a device."""
+        return Texels(self.shape, self.angles.to(device), self.values.to(device))
 
 
-_held: Final[WeakValueDictionary[str, TexelSamples]] = WeakValueDictionary()
+_held: Final[WeakValueDictionary[str, Texels]] = WeakValueDictionary()
 
 
-def read_samples(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> TexelSamples:
-    """Return a fabric's samples from their columns; as long as they are in use, `angular_samples` finds them."""
+def read_texels(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.NDArray[Any]]) -> Texels:
+    """Return a fabric's texels from the columns of their samples; while they are in use, `texels_of` finds them."""
     shape = options.angular_samples.grid(fabric)
     texels = shape[0] * shape[1]
     wi, wo = (np.stack([columns[f"{name}_{axis}"][::texels] for axis in "xyz"], axis=-1) for name in ("wi", "wo"))
-    values = np.empty((len(wi), texels, 4), np.float16)
-    for index, name in enumerate(COMPONENTS):
-        values[..., index] = columns[name].reshape(len(wi), texels)
-    samples = _held[_key(fabric, options)] = TexelSamples(shape, wi, wo, values)
-    return samples
+    values = np.stack([columns[name].reshape(len(wi), texels).astype(np.float16) for name in COMPONENTS], axis=-1)
+    angles = angles_of(torch.from_numpy(wi), torch.from_numpy(wo), options.angles)
+    result = _held[_key(fabric, options)] = Texels(shape, angles, torch.from_numpy(values))
+    return result
 
 
-def angular_samples(fabric: Fabric, options: BtfOptions) -> TexelSamples:
-    """Return a fabric's samples: those in use in this process, such as a training's, else computed now."""
-    samples = _held.get(_key(fabric, options))
-    if samples is not None:
-        return samples
+def texels_of(fabric: Fabric, options: BtfOptions) -> Texels:
+    """Return a fabric's texels: those in use in this process, such as a training's, else computed now."""
+    texels = _held.get(_key(fabric, options))
+    if texels is not None:
+        return texels
     wanted = options.angular_samples
-    return read_samples(fabric, options, columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))))
+    return read_texels(fabric, options, columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))))
 
 
 def _key(fabric: Fabric, options: BtfOptions) -> str:
-    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json")])
+    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json"), options.angles])
 
 
 def angles_of(wi: Tensor, wo: Tensor, kind: str) -> Tensor:
@@ -122,31 +124,3 @@ class SetEncoder(nn.Module):
         mean = (values.flatten(1).t() @ weights).reshape(texels, -1)  # component by component, m numbers each
         scale = self.scale.repeat_interleave(weights.shape[1])
         return functional.relu(functional.linear(mean, self.join.weight * scale, self.join.bias))
-
-
-class Texels(NamedTuple):
-    """Inputs of the encoder from a fabric.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns.
-    angles : float32 Tensor (n, 4)
-        Directions.
-    values : float16 Tensor (n, rows x columns, 4)
-        Samples.
-    """
-
-    shape: tuple[int, int]
-    angles: Tensor
-    values: Tensor
-
-    def to(self, device: torch.device) -> Texels:
-        """Return the same on a device."""
-        return Texels(self.shape, self.angles.to(device), self.values.to(device))
-
-
-def read_texels(samples: TexelSamples, options: BtfOptions) -> Texels:
-    """Return the inputs of the encoder from samples."""
-    wi, wo, values = (torch.from_numpy(part) for part in (samples.wi, samples.wo, samples.values))
-    return Texels(samples.shape, angles_of(wi, wo, options.angles), values)

@@ -22,8 +22,7 @@ from torch.nn import functional
 
 from pipeline.models.networks.layers import SLOPE, Residual, activate
 from pipeline.models.woven import WovenOptions
-from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved, placement, standard
-from weaves.draft import Matrix
+from pipeline.models.woven.standard_position import SYMMETRIES, Placement, begun_at, moved, placement, standard
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
@@ -92,7 +91,7 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | 
         seen, symmetry, start = fabric, SYMMETRIES[0], (0, 0)
         if options.standard:
             seen, symmetry, start = standard(like or fabric)
-            seen = seen if like is None else _begun_at(moved(fabric, symmetry), start)
+            seen = seen if like is None else begun_at(moved(fabric, symmetry), start)
         ends, picks = seen.weave.repeat
         surface = surface_at(seen, centre[None, :] * ends, centre[:, None] * picks)
         maps.append(np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1))
@@ -102,12 +101,6 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | 
         placements.append(placement(fabric, symmetry, start))
     together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
     return WovenInputs(torch.from_numpy(np.array(maps, np.float32)), torch.tensor(parameters), together)
-
-
-def _begun_at(fabric: Fabric, start: tuple[int, int]) -> Fabric:
-    """Return a fabric whose repeat begins at the end and pick of `start`."""
-    end, pick = start
-    return fabric.model_copy(update={"draft": Matrix(rows=tuple(fabric.weave.rolled(-end, -pick).rows()))})
 
 
 class _MapBlock(nn.Module):

@@ -102,8 +102,13 @@ def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
     """
     best = min((*_smallest(moved(fabric, symmetry)), symmetry) for symmetry in SYMMETRIES)
     *_, (pick, end), symmetry = best
-    image = moved(fabric, symmetry)
-    return _with_draft(image, np.roll(image.weave.warp_over, (-pick, -end), axis=(0, 1))), symmetry, (end, pick)
+    return begun_at(moved(fabric, symmetry), (end, pick)), symmetry, (end, pick)
+
+
+def begun_at(fabric: Fabric, start: tuple[int, int]) -> Fabric:
+    """Return a fabric whose repeat begins at the end and pick of `start`."""
+    end, pick = start
+    return _with_draft(fabric, fabric.weave.rolled(-end, -pick).warp_over)
 
 
 def moved(fabric: Fabric, symmetry: Symmetry) -> Fabric:

@@ -8,7 +8,7 @@ import torch
 
 from pipeline.fingerprint import IDENTITY, fingerprint
 from pipeline.models.curved import CurvedOptions
-from pipeline.models.curved.model import Curved, CurvedNetwork, View, build, silhouettes_of
+from pipeline.models.curved.model import Curved, CurvedNetwork, SilhouetteData, View, build
 from pipeline.models.domain import Domain
 from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions
@@ -149,7 +149,7 @@ def test_silhouettes_are_learnt(options):
         loss.backward()
         optimiser.step()
     other = SMALL.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
-    others = silhouettes_of(other.silhouettes.answer(DENIM, 0, 512), DENIM.weave.repeat)
+    others = SilhouetteData(other.silhouettes.answer(DENIM, 0, 512), DENIM.weave.repeat)
     view = View(*(others.get_buffer(name) for name in View._fields))
     target = others.get_buffer("target")[:, 0]
     with torch.no_grad():

@@ -7,11 +7,10 @@ import torch
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.unified_btf.set_encoder import (
     SetEncoder,
-    TexelSamples,
+    Texels,
     angles_of,
-    angular_samples,
-    read_samples,
     read_texels,
+    texels_of,
 )
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import columns_of
@@ -20,13 +19,14 @@ from weaves.fabric import load_fabric
 OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
 
 
-def made_up(count: int, texels: int = 6, seed: int = 0) -> TexelSamples:
+def made_up(count: int, texels: int = 6, seed: int = 0) -> Texels:
     """Return smooth, positive samples of texels that differ, without asking the truth."""
     drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
     phase = np.arange(4 * texels).reshape(texels, 4)
     wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
+    angles = angles_of(torch.from_numpy(drawn.wi), torch.from_numpy(drawn.wo), OPTIONS.angles)
     values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
-    return TexelSamples((1, texels), drawn.wi, drawn.wo, values.astype(np.float16))
+    return Texels((1, texels), angles, torch.from_numpy(values.astype(np.float16)))
 
 
 def encoder() -> SetEncoder:
@@ -36,9 +36,8 @@ def encoder() -> SetEncoder:
     return built
 
 
-def encoded(model: SetEncoder, samples: TexelSamples, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
-    _, angles, values = read_texels(samples, OPTIONS)
-    latents: torch.Tensor = model(angles[chosen], values[chosen].to(torch.float32))
+def encoded(model: SetEncoder, samples: Texels, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
+    latents: torch.Tensor = model(samples.angles[chosen], samples.values[chosen].to(torch.float32))
     return latents
 
 
@@ -84,8 +83,8 @@ def test_latents_converge_as_the_samples_grow():
 def test_averaged_latents_are_the_latent_of_the_averaged_texel():
     """Exactly so where no ReLU of the latent is on its other side: all of the encoder behind it is linear in values."""
     samples, model = made_up(200), encoder()
-    values = samples.values.astype(np.float32).mean(axis=1, keepdims=True)  # not rounded to half precision
-    together = TexelSamples((1, 1), samples.wi, samples.wo, values)
+    values = samples.values.to(torch.float32).mean(dim=1, keepdim=True)  # not rounded to half precision
+    together = Texels((1, 1), samples.angles, values)
     for offset, tolerance in ((10.0, 1e-5), (-10.0, 1e-5)):
         model.join.bias.fill_(offset)
         expected = encoded(model, together)[0]
@@ -100,24 +99,21 @@ SHANTUNG, LINING = load_fabric("silk_shantung"), load_fabric("polyester_lining")
 def test_rows_become_samples_by_texels():
     """A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11."""
     queries, answers = SMALL.angular_samples.answer(SHANTUNG, 0, SMALL.angular_samples.count(SHANTUNG))
-    samples = read_samples(SHANTUNG, SMALL, columns_of(queries, answers))
+    samples = read_texels(SHANTUNG, SMALL, columns_of(queries, answers))
     assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
     sample, row, column = 2, 3, 9
-    (found,) = np.flatnonzero(
-        (queries.u == column / 2 + 0.25)
-        & (queries.v == row / 2 + 0.25)
-        & (queries.wi == samples.wi[sample]).all(axis=1)
-    )
-    assert (queries.wo[found] == samples.wo[sample]).all()
+    angles = angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), SMALL.angles)
+    alike = (angles == samples.angles[sample]).all(dim=1).numpy()
+    (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
     read = samples.values[sample, row * samples.shape[1] + column]
     np.testing.assert_allclose(read, answers.mean[found], rtol=2**-11, atol=2**-24)
 
 
 def test_samples_in_use_are_not_computed_again():
-    held = angular_samples(LINING, SMALL)
-    assert angular_samples(LINING.model_copy(update={"name": "other"}), SMALL) is held
-    assert angular_samples(LINING, SMALL.model_copy(update={"latent": 4})) is held
-    assert angular_samples(LINING, SMALL.model_copy(update={"max_angle": 60.0})) is not held
+    held = texels_of(LINING, SMALL)
+    assert texels_of(LINING.model_copy(update={"name": "other"}), SMALL) is held
+    assert texels_of(LINING, SMALL.model_copy(update={"latent": 4})) is held
+    assert texels_of(LINING, SMALL.model_copy(update={"max_angle": 60.0})) is not held
 
 
 @pytest.mark.parametrize("change", [{"samples": 3, "fewest_samples": 4}, {"texel_sigma": 0.0}, {"samples": 0}])
