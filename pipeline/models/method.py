@@ -105,7 +105,7 @@ def in_chunks(queries: Queries, read: Read, width: int = 4) -> Float32:
 
 
 def row_by_row(queries: Queries, chosen: Mask, one: Read, other: Read) -> Float32:
-    """Answer the chosen queries in one way, the rest in another; no way is asked about no queries."""
+    """Answer the chosen queries in one way, the rest in another; neither is called without queries."""
     if not chosen.any():
         return other(queries)
     answers = one(queries.take(chosen))

@@ -12,13 +12,12 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-from torch import Tensor
 
 from pipeline.analytic.soft_nodes import features
 from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
 from pipeline.models.networks.layers import SLOPE, LinearLayer, layers_of
-from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST
+from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST, texels_of
 from pipeline.models.neumip.model import LAYERS, Neumip, NeumipNetwork
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.model import LARGEST_FACTOR, Selvage
@@ -314,10 +313,10 @@ def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | in
             described += weights.add_perceptron(name, [first, *layers[1:]], "ReLU", "none")
     places["pyramid"] = weights.count
     for index, texture in enumerate(network.levels):
-        weights.add(f"level {index}", _texels(texture), "texels (rows, columns, channels); row 0 at the smallest v")
+        weights.add(f"level {index}", texels_of(texture), "texels (rows, columns, channels); row 0 at the smallest v")
     places["depth"] = weights.count
     if network.depth is not None:
-        weights.add("depth", _texels(network.depth), "texels of the depth that shifts a place, at the finest level")
+        weights.add("depth", texels_of(network.depth), "texels of the depth that shifts a place, at the finest level")
     constants: dict[str, bool | int | float] = {
         "COLOURS": weights.places["colours"].offset,
         "ENDS": ends,
@@ -337,11 +336,6 @@ def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | in
         "LOG_K": float(options.log_k),
     }
     return constants, described
-
-
-def _texels(texture: Tensor) -> Float32:
-    """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
-    return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
 
 
 def _after_elements(rows: Float32, channels: int) -> Float32:

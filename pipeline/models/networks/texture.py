@@ -12,10 +12,12 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar, Final, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.network import QueryNetwork
 from pipeline.models.networks.layers import start_at_mean
 from pipeline.models.options import TextureOptions
@@ -143,6 +145,11 @@ def read_texture(
     if torch.compiler.is_exporting():  # other runtimes would loop over the bags
         return (table[texels] * share.unsqueeze(-1)).sum(dim=-2)
     return functional.embedding_bag(texels, table, per_sample_weights=share, mode="sum")
+
+
+def texels_of(texture: Tensor) -> Float32:
+    """Return a texture (channels, rows, columns) texel by texel, (rows, columns, channels)."""
+    return np.ascontiguousarray(texture.numpy(force=True).transpose(1, 2, 0))
 
 
 class TextureNetwork(QueryNetwork):
