@@ -1,5 +1,6 @@
 import json
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -109,11 +110,23 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.fixture(scope="module")
+def whole(folder, tmp_path_factory):
+    """Return the folder of a short training of a model, made once; no test changes it."""
+
+    @cache
+    def of(model):
+        out = tmp_path_factory.mktemp(model)
+        train(OPTIONS[model], SHORT, folder, FABRICS[model], out)
+        return out
+
+    return of
+
+
 @pytest.mark.parametrize("model", ["woven", slow("neumip"), slow("selvage")])
-def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path):
+def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole):
     """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike."""
-    whole, resumed = tmp_path / "whole", tmp_path / "resumed"
-    train(OPTIONS[model], SHORT, folder, FABRICS[model], whole)
+    whole, resumed = whole(model), tmp_path / "resumed"
     with pytest.raises(Killed):
         train(OPTIONS[model], SHORT, folder, FABRICS[model], resumed, killed_at(20 / 30))
     assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
@@ -177,9 +190,8 @@ def test_a_fault_of_a_loss_from_outside_is_a_sentence(folder, tmp_path, theirs, 
     assert not (tmp_path / "out" / "card.json").exists()
 
 
-def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path):
-    whole, other = tmp_path / "whole", tmp_path / "other"
-    train(NEUMIP, SHORT, folder, FABRICS["neumip"], whole)
+def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path, whole):
+    whole, other = whole("neumip"), tmp_path / "other"
     with pytest.raises(Killed):
         train(NEUMIP, SHORT.model_copy(update={"seed": 1}), folder, FABRICS["neumip"], other, killed_at(0.9))
     train(NEUMIP, SHORT, folder, FABRICS["neumip"], other)
@@ -191,9 +203,8 @@ def test_a_damaged_or_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path):
     assert contents(half) == contents(whole)
 
 
-def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tmp_path):
-    whole, damaged = tmp_path / "whole", tmp_path / "damaged"
-    train(NEUMIP, SHORT, folder, FABRICS["neumip"], whole)
+def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tmp_path, whole):
+    whole, damaged = whole("neumip"), tmp_path / "damaged"
     for place in (300, -1000):  # in what a checkpoint says of itself, in a tensor
         with pytest.raises(Killed):
             train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, killed_at(0.9))
@@ -226,14 +237,14 @@ def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
     assert curve[-1] < 0.1 * curve[0]
 
 
-def test_the_card_tells_what_was_trained_and_how_well(folder, tmp_path):
-    train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
-    card = json.loads((tmp_path / "card.json").read_text())
+def test_the_card_tells_what_was_trained_and_how_well(whole):
+    folder = whole("woven")
+    card = json.loads((folder / "card.json").read_text())
     assert card["model"] == "woven"
     assert WovenOptions.model_validate(card["options"]) == WOVEN
     assert card["dataset"] == {"name": "tiny", "fingerprint": "f" * 16}
     assert [fabric["name"] for fabric in card["fabrics"]] == FABRICS["woven"]
-    weights = safetensors.torch.load_file(tmp_path / "model.safetensors")
+    weights = safetensors.torch.load_file(folder / "model.safetensors")
     assert card["architecture"]["parameters"]["total"] == sum(tensor.numel() for tensor in weights.values())
     assert card["architecture"]["layers"] == {name: list(tensor.shape) for name, tensor in weights.items()}
     assert [point["step"] for point in card["curve"]] == [6, 12, 18, 24, 30]
@@ -315,13 +326,12 @@ def test_the_best_state_survives_a_checkpoint(tmp_path):
     assert states[1].weights()["weight"].item() == 3.0
 
 
-def test_weights_survive_the_file(folder, tmp_path):
-    train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
+def test_weights_survive_the_file(folder, whole):
     manifest = Manifest.load(folder)
     queries, _ = manifest.read(folder, "cotton_twill", "validation")
-    (method,) = load_model(tmp_path)
+    (method,) = load_model(whole("woven"))
     assert isinstance(method, Method)
-    weights = safetensors.torch.load_file(tmp_path / "model.safetensors")
+    weights = safetensors.torch.load_file(whole("woven") / "model.safetensors")
     (direct,) = module_of("woven").restore(WOVEN, [({}, weights)])
     fabric = manifest.fabrics["cotton_twill"]
     np.testing.assert_array_equal(method.predict(fabric, queries), direct.predict(fabric, queries))

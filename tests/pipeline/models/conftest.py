@@ -1,0 +1,13 @@
+"""Methods whose tables take long to make, once for all tests."""
+
+import pytest
+
+from pipeline.models.analytic.summed_area import SummedAreaOptions
+from pipeline.models.registry import load_methods
+
+
+@pytest.fixture(scope="session")
+def clusters():
+    """Return `summed_area` with 64 clusters."""
+    (method,) = load_methods(SummedAreaOptions(clusters=[64]))
+    return method
