@@ -97,18 +97,11 @@ class Watch:
         """Write to these bytes from now on."""
         self._shared = shared
 
-    def begin(self, name: bytes, function: bytes, limit: float) -> None:
-        """Note the begin of a call."""
+    def mark(self, change: int, name: bytes, function: bytes, limit: float) -> None:
+        """Note the begin of a call (`change` = 1) or its end (-1)."""
         if self._shared is not None:
             with self._lock:
-                self._running += 1
-                _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
-
-    def end(self, name: bytes, function: bytes, limit: float) -> None:
-        """Note the end of a call."""
-        if self._shared is not None:
-            with self._lock:
-                self._running -= 1
+                self._running += change
                 _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
 
 
@@ -130,7 +123,7 @@ def faults_of(name: str, function: str, limit: float, root: Path) -> Iterator[No
         The method's file, or the folder of its package.
     """
     call = name.encode()[:64], function.encode()[:16], limit
-    WATCH.begin(*call)
+    WATCH.mark(1, *call)
     try:
         yield
     except MethodFailed:
@@ -138,7 +131,7 @@ def faults_of(name: str, function: str, limit: float, root: Path) -> Iterator[No
     except BaseException as error:  # SystemExit too: the method must not end the work of others
         raise MethodFailed(name, f"{function}: {described(error, root)}") from error
     finally:
-        WATCH.end(*call)
+        WATCH.mark(-1, *call)
 
 
 def described(error: BaseException, root: Path) -> str:
@@ -175,29 +168,25 @@ class Guarded:
         self, method: Method, options: AddedMethod, root: Path, values: bool = True, domain: Domain | None = None
     ) -> None:
         self.name, self.setting = options.name, options.setting
-        self._method, self._options, self._root, self._values = method, options, root, values
+        self.method, self.options, self.root, self._values = method, options, root, values
         self._first = True
         self.domain = domain
-
-    def unchecked(self) -> Guarded:
-        """Return the method with answers of any value, for measurements that count wrong ones."""
-        return Guarded(self._method, self._options, self._root, values=False, domain=self.domain)
 
     def covers(self, fabric: Fabric) -> bool:
         """Return whether the method covers a fabric."""
         with self._call("covers"):
-            return bool(self._method.covers(fabric))
+            return bool(self.method.covers(fabric))
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare a fabric."""
         with self._call("prepare"):
-            self._method.prepare(fabric)
+            self.method.prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the components of N queries, float32 (N, 4), finite and >= 0; MethodFailed if they are not."""
         before = [column.copy() for column in queries] if self._first else None
         with self._call("predict"):
-            answers = self._method.predict(fabric, queries, seed)
+            answers = self.method.predict(fabric, queries, seed)
         if fault := self._fault(answers, len(queries.u)):
             raise MethodFailed(self.name, f"predict returned {fault}, for the fabric {fabric.name}")
         if before is not None:
@@ -209,13 +198,13 @@ class Guarded:
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes that a renderer stores for a fabric; MethodFailed unless it is an integer >= 0."""
         with self._call("bytes_stored"):
-            found: object = self._method.bytes_stored(fabric)
+            found: object = self.method.bytes_stored(fabric)
         if isinstance(found, bool) or not isinstance(found, int | np.integer) or found < 0:
             raise MethodFailed(self.name, f"bytes_stored returned {found!r}; an integer from 0 on is needed")
         return int(found)
 
     def _call(self, function: str) -> Any:
-        return faults_of(self.name, function, self._options.limit, self._root)
+        return faults_of(self.name, function, self.options.limit, self.root)
 
     def _fault(self, answers: object, rows: int) -> str:
         """Return what is wrong with answers; empty if nothing is."""
@@ -235,7 +224,9 @@ class Guarded:
 
 def unchecked(method: Method) -> Method:
     """Return a method whose answers may have any value: one from outside without that check, others as they are."""
-    return method.unchecked() if isinstance(method, Guarded) else method
+    if not isinstance(method, Guarded):
+        return method
+    return Guarded(method.method, method.options, method.root, values=False, domain=method.domain)
 
 
 def load_function(options: AddedFunction) -> Callable[..., float]:
@@ -248,7 +239,7 @@ def load_function(options: AddedFunction) -> Callable[..., float]:
     MethodFailed
         If it cannot be imported.
     """
-    function, root = _found(options)
+    function, root = imported(options)
 
     def measured(*arguments: Any) -> float:
         with faults_of(options.name, "the metric", options.limit, root):
@@ -261,28 +252,19 @@ def load_function(options: AddedFunction) -> Callable[..., float]:
 
 
 def load_added(options: AddedMethod) -> Guarded:
-    """Import the code of a method from outside that is not trained, and make it.
-
-    Raises
-    ------
-    WorkFailed
-        If the code is not the planned one.
-    MethodFailed
-        If it cannot be imported, or the method cannot be made.
-    """
+    """Import and make a method from outside that is not trained; errors as `imported`, MethodFailed if making fails."""
     make, root = imported(options)
-    return Guarded(make(), options, root)
+    return Guarded(new(make, options, root), options, root)
 
 
-def imported(options: AddedMethod) -> tuple[Callable[[], Method], Path]:
-    """Import the code of a method from outside.
+def new(make: Callable[..., Method], options: AddedMethod, root: Path) -> Method:
+    """Make a method with its own options; MethodFailed if that fails."""
+    with faults_of(options.name, "__init__", options.limit, root):
+        return make(**options.own)
 
-    Returns
-    -------
-    callable
-        Makes the method; raises MethodFailed if that fails.
-    Path
-        Its file, or the folder of its package.
+
+def imported(options: AddedMethod | AddedFunction) -> tuple[Any, Path]:
+    """Import code from outside; return the class or function, and its file or the folder of its package.
 
     Raises
     ------
@@ -291,18 +273,6 @@ def imported(options: AddedMethod) -> tuple[Callable[[], Method], Path]:
     MethodFailed
         If it cannot be imported.
     """
-    found, root = _found(options)
-
-    def make() -> Method:
-        with faults_of(options.name, "__init__", options.limit, root):
-            method: Method = found(**options.own)
-        return method
-
-    return make, root
-
-
-def _found(options: AddedMethod | AddedFunction) -> tuple[Any, Path]:
-    """Import code from outside; return the class or function, and its file or the folder of its package."""
     source = locate(options.source, options.folder)
     source.verify(options.sha256)
     with faults_of(options.name, "import", options.limit, source.root):

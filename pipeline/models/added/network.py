@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.added_code import AddedMethod
-from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported
+from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported, new
 from pipeline.models.domain import domain_of
 from pipeline.models.method import Method
 from pipeline.models.network import Batch, Trainable, Trained
@@ -145,7 +145,9 @@ def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwo
         If it fails, or its function `network` returns none that can be trained.
     """
     make, root = imported(options)
-    return _built(make(), options, root, [_uncoloured(fabric.name, fabric.optics()) for fabric in fabrics])
+    return _built(
+        new(make, options, root), options, root, [_uncoloured(fabric.name, fabric.optics()) for fabric in fabrics]
+    )
 
 
 def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
@@ -161,7 +163,7 @@ def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
     make, root = imported(options)
     methods = {}
     for card, weights in trained:
-        method: Any = make()
+        method: Any = new(make, options, root)
         fabrics = [
             _uncoloured(about["name"], {key: value for key, value in about.items() if key != "name"})
             for about in card["architecture"]["fabrics"]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import sys
-from collections.abc import Iterator
 from importlib.machinery import PathFinder
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from importlib.util import find_spec
@@ -63,7 +62,9 @@ class CodeSource(NamedTuple):
         if self.root.is_file():
             return file_sha256(self.root)
         found, total = hashlib.sha256(), 0
-        for path in _files(self.root):
+        for path in sorted(self.root.rglob("*")):
+            if not path.is_file() or "__pycache__" in path.parts:
+                continue
             total += path.stat().st_size
             if total > MOST_BYTES:
                 raise BadInput(ADD, "", self.text, f"the package {self.root.name} has more than {MOST_BYTES:,} bytes")
@@ -148,10 +149,3 @@ def locate(text: str, folder: str = "") -> CodeSource:
     if not root.is_file():
         raise BadInput(ADD, "", text, f"{parts[0]} is part of Python")
     return CodeSource(str(root), name, "", root) if here else CodeSource(place, name, "", root)
-
-
-def _files(root: Path) -> Iterator[Path]:
-    """Yield the files of a package in the order of their names, without compiled ones."""
-    for path in sorted(root.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            yield path

@@ -3,9 +3,7 @@ import safetensors.torch
 import torch
 
 from pipeline.fingerprint import IDENTITY
-from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.card import write_model
-from pipeline.models.catalogue import CLASSES
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.models.woven import WovenOptions
@@ -16,22 +14,9 @@ def card_of(options, version=1):
     return {"options": options.model_dump(mode="json", context=IDENTITY), "version": {"model": version}}
 
 
-def test_every_model_that_learns_is_the_folder_of_its_name():
-    for model in (model for model, options in CLASSES.items() if options.learns):
-        assert module_of(model).__name__ == f"pipeline.models.{model}.model"
-
-
 def test_an_unknown_model_names_the_nearest():
     with pytest.raises(BadInput, match="did you mean 'neumip'"):
         module_of("neumipp")
-
-
-def test_point_sampled_gives_one_method_for_each_count():
-    methods = load_methods(PointSampledOptions(counts=[1, 4]))
-    assert [(method.name, method.setting) for method in methods] == [
-        ("point_sampled", "k = 1"),
-        ("point_sampled", "k = 4"),
-    ]
 
 
 def test_a_folder_without_a_model_is_bad_input(tmp_path):

@@ -7,8 +7,8 @@ from pipeline.models.added.guarded import MethodFailed
 from weaves.errors import WorkFailed
 
 GUARDED = "__import__('pipeline.models.added.guarded', fromlist=['WATCH'])"
-BEGIN = f"{GUARDED}.WATCH.begin(b'theirs', b'predict', 0.5)"
-END = f"{GUARDED}.WATCH.end(b'theirs', b'predict', 0.5)"
+BEGIN = f"{GUARDED}.WATCH.mark(1, b'theirs', b'predict', 0.5)"
+END = f"{GUARDED}.WATCH.mark(-1, b'theirs', b'predict', 0.5)"
 
 
 class Code:

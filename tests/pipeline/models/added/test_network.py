@@ -197,7 +197,7 @@ def test_fabrics_come_back_from_the_card_without_their_colours(theirs):
     assert [cloth.optics() for cloth in network.network.seen] == [cloth.optics() for cloth in CLOTHS]
     assert network.network.seen[0].warp.diffuse != CLOTHS[0].warp.diffuse
     method = restore_added(options, [trained(network, CLOTHS, 3)])
-    assert method._method.trained.seen == network.network.seen
+    assert method.method.trained.seen == network.network.seen
 
 
 def test_networks_of_one_fabric_answer_for_theirs(theirs):

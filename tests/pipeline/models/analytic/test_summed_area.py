@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.summed_area import SummedAreaOptions
@@ -47,9 +46,3 @@ def test_other_queries_are_refused(kinds, says):
     queries = draw_queries(kinds, fabric.weave.repeat, 1, 0, 16)
     with pytest.raises(BadInput, match=says):
         method.predict(fabric, queries)
-
-
-@pytest.mark.parametrize("clusters", [[], [8], [20], [1024], [64.5]])
-def test_numbers_of_clusters_are_checked(clusters):
-    with pytest.raises(ValidationError):
-        SummedAreaOptions(clusters=clusters)

@@ -46,8 +46,3 @@ def test_each_fabric_is_answered_by_its_own_network():
         (alone,) = restore(SMALL, [trained])
         np.testing.assert_array_equal(both.predict(fabric, queries), alone.predict(fabric, queries))
         assert both.bytes_stored(fabric) == alone.bytes_stored(fabric)
-
-
-def test_eight_numbers_are_enough_for_a_texel():
-    assert BtfAutoencoderOptions().latent == 8
-    assert BtfAutoencoderOptions.of_one_material

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-import torch
 
 from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved
+from pipeline.models.woven.standard_position import SYMMETRIES, moved
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.query import Queries
+from tests.pipeline.models.images import image_of
 from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
@@ -26,22 +25,6 @@ def lopsided():
     return fabric.model_copy(update={"draft": draft, "warp": warp})
 
 
-def image_of(symmetry, cloth, asked):
-    """Return the image of a cloth and of queries about it."""
-    one = Placement(
-        torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
-        torch.tensor([[symmetry.exchange]]),
-        torch.zeros(1, 2),
-        torch.ones(1, 2),
-    )
-    ends, picks = cloth.weave.repeat
-    u, v, wi, wo = one.move(*(torch.from_numpy(c)[None] for c in (asked.u / ends, asked.v / picks, asked.wi, asked.wo)))
-    image = moved(cloth, symmetry)
-    ends, picks = image.weave.repeat
-    there = Queries.round(u[0].numpy() * ends, v[0].numpy() * picks, asked.sigma, wi[0].numpy(), wo[0].numpy())
-    return image, there
-
-
 @pytest.fixture(scope="module")
 def table(lopsided):
     return tabulate(lopsided)
@@ -53,7 +36,7 @@ def test_mirror_images_have_the_same_features_and_exchanges_permute_them(symmetr
     image_table = tabulate(moved(lopsided, symmetry))
     for size in SIZES.values():
         asked = draw_queries(QueryOptions(sigma=size), lopsided.weave.repeat, 1, 0, 100)
-        _, there = image_of(symmetry, lopsided, asked)
+        _, there, _ = image_of(symmetry, lopsided, asked)
         here, (found, components, _) = read_queries(table, asked), read_queries(image_table, there)
         expected = here[0][:, EXCHANGED] * EXCHANGED_SIGN if symmetry.exchange else here[0]
         error = np.abs(found - expected).max(axis=1)

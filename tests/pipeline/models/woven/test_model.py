@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.method import Method
 from pipeline.models.network import Batch
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved
+from pipeline.models.woven.standard_position import SYMMETRIES
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
+from tests.pipeline.models.images import image_of
 from weaves.draft import Matrix
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -76,17 +76,7 @@ def test_mirror_images_are_answered_alike(symmetry, twill):
     method = Woven(WovenNetwork(SMALL))
     cloth = twill.model_copy(update={"draft": Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))})
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
-    one = Placement(
-        torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
-        torch.tensor([[symmetry.exchange]]),
-        torch.zeros(1, 2),
-        torch.ones(1, 2),
-    )
-    ends, picks = cloth.weave.repeat
-    u, v, wi, wo = one.move(*(torch.from_numpy(c)[None] for c in (asked.u / ends, asked.v / picks, asked.wi, asked.wo)))
-    image = moved(cloth, symmetry)
-    ends, picks = image.weave.repeat
-    there = Queries.round(u[0].numpy() * ends, v[0].numpy() * picks, asked.sigma, wi[0].numpy(), wo[0].numpy())
+    image, there, one = image_of(symmetry, cloth, asked)
     expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
     np.testing.assert_allclose(method.predict(image, there), expected, rtol=2e-3, atol=2e-5)
 
@@ -157,19 +147,6 @@ def test_predictions_are_finite_and_not_negative_at_extremes(twill):
         assert prediction.dtype == np.float32
         assert np.isfinite(prediction).all()
         assert (prediction >= 0).all()
-
-
-def test_chunks_do_not_show(twill, monkeypatch):
-    method = Woven(WovenNetwork(SMALL))
-    assert isinstance(method, Method)
-    asked = queries(np.linspace(0, 4, 37), np.linspace(0, 4, 37), 0.2)
-    whole = method.predict(twill, asked)
-    monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", 10)
-    np.testing.assert_allclose(method.predict(twill, asked), whole, rtol=1e-5, atol=1e-6)
-
-
-def test_no_queries_give_no_answers(twill):
-    assert Woven(WovenNetwork(SMALL)).predict(twill, queries([], [], [])).shape == (0, 4)
 
 
 def test_start_at_sets_the_bias_to_the_mean_in_network_space():
