@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from scipy import stats
+from scipy.special import stdtrit
 
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
@@ -347,7 +348,7 @@ def over_fabrics(values: npt.ArrayLike) -> tuple[float, float, float]:
     centre = float(np.exp(logarithms.mean()))
     if len(figures) < 2:
         return centre, math.nan, math.nan
-    reach = float(stats.t.ppf(0.975, len(figures) - 1) * stats.sem(logarithms))
+    reach = float(stdtrit(len(figures) - 1, 0.975) * stats.sem(logarithms))  # its quantile by degrees of freedom
     return centre, float(centre * np.exp(-reach)), float(centre * np.exp(reach))
 
 

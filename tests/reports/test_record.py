@@ -52,19 +52,27 @@ def test_bytes_do_not_depend_on_the_machine_or_the_date(tmp_path):
     assert machine_path(tmp_path / "a.json").read_bytes() != machine_path(tmp_path / "b.json").read_bytes()
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A file of Records, and the bytes of it and of the machine beside it."""
+    path = tmp_path_factory.mktemp("flips") / "a.json"
+    write_records(path, RECORDS, this_machine(1))
+    return path, {file: file.read_bytes() for file in (path, machine_path(path))}
+
+
 @settings(deadline=None)
 @given(st.data())
-def test_every_flip_of_records_or_of_their_machine_is_refused(tmp_path_factory, data):
-    path = tmp_path_factory.getbasetemp() / "flips" / "a.json"
-    write_records(path, RECORDS, this_machine(1))
-    struck = data.draw(st.sampled_from([path, machine_path(path)]))
-    content = bytearray(struck.read_bytes())
+def test_every_flip_of_records_or_of_their_machine_is_refused(written, data):
+    path, files = written
+    struck = data.draw(st.sampled_from(list(files)))
+    content = bytearray(files[struck])
     content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
     struck.write_bytes(content)
     with pytest.raises(BadInput):
         read_records([path])
     with pytest.raises(BadInput):
         read_machine(path)
+    struck.write_bytes(files[struck])
 
 
 def test_records_of_before_hashes_are_read(tmp_path):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from reports.record import Machine, Provenance, Record
+from reports.record import Machine, Record
 from reports.tables.documents import (
     README_METHODS,
     block,
@@ -22,10 +22,15 @@ MACHINE = Machine(
 )
 
 
+def named(records, **about):
+    """Return Records that name their recipe."""
+    about = {"recipe": "quick", **about}
+    return [r.model_copy(update={"provenance": r.provenance.model_copy(update=about)}) for r in records]
+
+
 @pytest.fixture
 def records(made_up):
-    named = Provenance(recipe="quick")
-    return [record.model_copy(update={"provenance": named}) for record in made_up]
+    return named(made_up)
 
 
 def slower(records, method, factor):
@@ -48,7 +53,7 @@ def test_rows_hold_the_numbers_of_the_records(records):
     assert (
         "`woven` has 4.5× lower MSE than two points on seen fabrics, 4.5× on unseen ones, at 4.3× their time" in block
     )
-    bounded = [one.model_copy(update={"setting": "bounded"}) for one in records if one.method == "woven"]
+    bounded = [record.model_copy(update={"setting": "bounded"}) for record in records if record.method == "woven"]
     both = readme_block([*records, *bounded], MACHINE, "", "file")
     assert f"| {README_METHODS['woven', '']} |" in both and f"| {README_METHODS['woven', 'bounded']} |" in both
     assert "\n`woven` under the energy bound has 4.5× lower MSE" in both and "\n`woven` has" not in both
@@ -61,8 +66,7 @@ def test_several_unseen_fabrics_have_an_interval(two_unseen):
     The geometric mean is 2.25, the interval exp(t_{.975, 1} ln(4) / 2) times less and more, t = 12.7062.
     """
     high = 2.25 * math.exp(12.7062 * math.log(4) / 2)
-    named = Provenance(recipe="quick")
-    block = readme_block([r.model_copy(update={"provenance": named}) for r in two_unseen], MACHINE, "", "file")
+    block = readme_block(named(two_unseen), MACHINE, "", "file")
     assert f"| {README_METHODS['woven', '']} | 1.7e−4 | 4.5× | 2.2× (0.00034 … {high:,.0f}×) | 0.00 | 4.3× |" in block
     assert "| two random points, exact shadows | 7.5e−4 | 1× | 1× | 0.15 | 1× |" in block
     assert f"| {README_METHODS['neumip', '']} | 1.7e−4 | 4.5× | 4.5× |" in block
@@ -70,11 +74,7 @@ def test_several_unseen_fabrics_have_an_interval(two_unseen):
 
 
 def test_several_trainings_have_their_mean_and_range(three_trainings):
-    named = [
-        one.model_copy(update={"provenance": one.provenance.model_copy(update={"recipe": "quick"})})
-        for one in three_trainings
-    ]
-    block = readme_block(named, MACHINE, "", "file")
+    block = readme_block(named(three_trainings), MACHINE, "", "file")
     assert f"| {README_METHODS['woven', '']} | 3.3e−4 | 2.2× [1.5 … 4.5×] | 2.2× [1.5 … 4.5×] | 0.00 | 4.3× |" in block
     # Trained once, on a single unseen fabric: no range, so no number.
     assert f"| {README_METHODS['neumip', '']} | 1.7e−4 | 4.5× | – | 0.03 |" in block
@@ -116,53 +116,25 @@ def test_records_without_the_baseline_are_refused(records):
 
 
 def test_the_file_says_where_its_numbers_come_from(made_up):
-    named = Provenance(recipe="standard", recipe_fingerprint="0123456789abcdef" * 4)
-    rate = Record(method="truth").of("rate", 4.5e8, 1).model_copy(update={"setting": "everything", "unit": "points/s"})
-    page = results_page([r.model_copy(update={"provenance": named}) for r in [*made_up, rate]], MACHINE, "file")
+    rate = Record(method="truth", setting="everything").of("rate", 4.5e8, 1).model_copy(update={"unit": "points/s"})
+    about = {"recipe": "standard", "recipe_fingerprint": "0123456789abcdef" * 4}
+    page = results_page(named([*made_up, rate], **about), MACHINE, "file")
     head = page.partition("## ")[0]
     for words in ("`standard`", "`0123456789abcdef`", "Test CPU, 2 cores", "numpy 2.0", "Measured on 2026-01-01"):
         assert words in head
     assert "| points, k = 16 | 9.38e−5 (0.87 … 1.01)e−4 |" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "| everything | – | 4.5e+08 points/s |  |" in page
     assert "## Scenes" not in page, "what was not measured has no section"
-
-
-def test_numbers_of_several_trainings_have_their_range(three_trainings):
-    about = {"recipe": "standard"}
-    named = [r.model_copy(update={"provenance": r.provenance.model_copy(update=about)}) for r in three_trainings]
-    page = results_page(named, MACHINE, "file")
-    assert "| woven | 3.33e−4 (3.09 … 3.58)e−4 [1.67 … 5.00]e−4 | 0.3 % | 2.2× (2 … 2.5×) [1.5 … 4.5×] |" in page
-    assert "Not shown on the unseen fabric: NeuMIP." in page
-    assert "Networks were trained up to 3 times with other seeds." in page
-    assert "| woven | −2.00e−3 [−3.00 … −1.00]e−3 |" in page
-
-
-def test_several_unseen_fabrics_have_a_table_of_means(two_unseen):
-    named = [r.model_copy(update={"provenance": Provenance(recipe="standard")}) for r in two_unseen]
-    page = results_page(named, MACHINE, "file")
-    section = page.partition("### Means over unseen fabrics")[2].partition("##")[0]
-    table = "".join(line for line in section.splitlines() if line.startswith("|"))
-    assert "| woven | 2.2× (0.00034 … 15," in table and "NeuMIP" not in table
-
-
-def test_without_two_random_points_there_are_no_ratios(made_up):
-    named = Provenance(recipe="standard")
-    others = [r.model_copy(update={"provenance": named}) for r in made_up if r.method != "point_sampled"]
-    page = results_page(others, MACHINE, "file")
-    (line,) = (
-        line
-        for line in page.partition("### Errors, unseen")[2].partition("##")[0].splitlines()
-        if line.startswith("| woven")
-    )
-    assert [cell.strip() for cell in line.split("|")][4] == "–"
-    assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
-
-
-def test_every_line_of_a_table_has_as_many_cells(made_up):
-    named = Provenance(recipe="standard")
-    page = results_page([r.model_copy(update={"provenance": named}) for r in made_up], MACHINE, "file")
     for table in page.split("\n\n"):
         assert len({line.count("|") for line in table.splitlines() if line.startswith("|")}) <= 1, table
+
+
+def test_without_two_random_points_there_are_no_ratios(records):
+    page = results_page([record for record in records if record.method != "point_sampled"], MACHINE, "file")
+    unseen = page.partition("### Errors, unseen")[2].partition("##")[0]
+    (line,) = (line for line in unseen.splitlines() if line.startswith("| woven"))
+    assert [cell.strip() for cell in line.split("|")][4] == "–"
+    assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
 
 
 def test_records_of_no_recipe_are_refused(made_up):

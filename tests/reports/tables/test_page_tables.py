@@ -4,12 +4,11 @@ import math
 
 import pytest
 
-from reports.measure.latents import SHARES
 from reports.record import Provenance, Record
 from reports.tables.page_tables import page_frames, ranged_frames, result_tables
 from reports.tables.sentences import facts
 from reports.tables.summary import scene_table
-from reports.tables.table import WORDS, ResultTable, TableCell, TableRow, markdown_table, paragraphs
+from reports.tables.table import ResultTable, TableCell, TableRow, markdown_table, paragraphs
 from reports.truth.calibration import RECORDS as CALIBRATIONS
 from reports.truth.calibration import Calibration
 
@@ -45,12 +44,6 @@ def test_a_paragraph_without_its_value_is_left_out():
     assert paragraphs(["a {b}", "c"], {}) == ["c"]
 
 
-def test_every_table_has_words_and_every_word_a_table():
-    """Titles are made of values that the tables give; a table without words raises KeyError where it is made."""
-    assert all(words["title"] for words in WORDS["tables"].values())
-    assert {"in the noise", "noise of the truth", "front", "× lower"} <= set(WORDS["definitions"])
-
-
 def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
     """Neumip was trained once: its errors on the unseen fabric have no range; woven's have."""
     assert [table.title.partition(",")[0] for table in tables_of(made_up, "aliasing")]
@@ -83,24 +76,6 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
     assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
     assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
     assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
-
-
-def test_a_path_has_a_row_for_each_way_to_encode_and_edits_have_a_row_each():
-    subject = Record(method="woven", fabric="denim", note="yarns of satin_8")
-    curves = [tuple((share, factor * (0.1 + share)) for share in SHARES) for factor in (2.0, 1.0)]
-    names = ("path_error", "reencode_error")
-    records = [subject.of(name, curve[1][1], 64, curve=curve) for name, curve in zip(names, curves, strict=True)]
-    records += [
-        subject.of("encode_time", ms, 3, low=ms, high=ms).model_copy(update={"note": note})
-        for note, ms in (("a yarn", 3.0), ("a colour", 0.1))
-    ]
-    paths, edits = tables_of(records, "latents")
-    assert [[cell.text for cell in row.cells[:2]] for row in paths.rows] == [
-        ["denim → yarns of satin 8", "latents blended"],
-        ["denim → yarns of satin 8", "encoded anew"],
-    ]
-    assert [cell.text for cell in paths.rows[1].cells[2:]] == [f"{100 * error:.1f} %" for _, error in curves[1]]
-    assert [row.cells[0].text for row in edits.rows] == ["a yarn", "a colour"]
 
 
 def test_answers_that_are_not_finite_are_counted():

@@ -96,23 +96,11 @@ def test_a_ratio_compares_the_fabrics_that_both_cover():
     assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
 
 
-def test_without_the_baseline_there_is_no_ratio():
+def test_without_the_baseline_or_below_the_noise_there_is_no_ratio():
     alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
     assert math.isnan(row(error_table(alone), method="woven", role="seen").ratio)
-
-
-def test_an_error_below_the_noise_has_no_ratio():
     table = error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
     assert math.isnan(row(table, method="m").ratio)
-
-
-def test_order_is_that_of_the_records():
-    assert [(r.method, r.setting) for r in rows(error_table(RECORDS)) if r.role == "seen"] == [
-        ("woven", ""),
-        ("neumip", ""),
-        ("point_sampled", "k = 1"),
-        ("point_sampled", "k = 2"),
-    ]
 
 
 def test_fabrics_and_pictures():
@@ -135,19 +123,6 @@ def test_aliasing_and_timing():
     # 400 ns a query are .83 s a frame of 1920 by 1080.
     assert woven.frame_ms == pytest.approx(829.44)
     assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
-
-
-def test_times_on_one_thread_and_on_most_stand_in_one_row():
-    subject = Record(method="woven")
-    records = [
-        subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
-        for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
-    ]
-    records += [subject.of("prepare_time", 12.5, 9), subject.of("peak_memory", 3e7, 3)]
-    table = timing_table(records)
-    (found,) = rows(table)
-    assert (found.threads, found.median_ns, found.most_threads, found.most_threads_ns) == (1, 400, 4, 120)
-    assert found.most_threads_frame_ms == pytest.approx(0.3 * found.frame_ms)
 
 
 def test_spectra_are_averaged():
@@ -232,16 +207,11 @@ def test_means_over_fabrics_and_albedos_lie_within_the_range_of_the_trainings():
     assert [getattr(albedo, f"furnace_diffuse{end}") for end in ("", "_least", "_most")] == [32.0] * 3
 
 
-def test_pictures_are_of_the_first_training():
-    records = seeded(RECORDS, "woven", (0, 1), (1.0, 2.0))
-    assert picture_table(records).equals(picture_table(RECORDS))
-
-
-def test_one_training_changes_no_number_of_the_tables():
-    table = error_table(seeded(RECORDS, "woven", (3,), (1.0,)))
-    before = error_table(RECORDS)
-    assert table.drop(columns="seeds").equals(before.drop(columns="seeds"))
-    assert row(table, method="woven", role="seen").seeds == 1
+def test_one_training_changes_no_number_of_the_tables_and_pictures_are_of_the_first():
+    once, before = error_table(seeded(RECORDS, "woven", (3,), (1.0,))), error_table(RECORDS)
+    assert once.drop(columns="seeds").equals(before.drop(columns="seeds"))
+    assert row(once, method="woven", role="seen").seeds == 1
+    assert picture_table(seeded(RECORDS, "woven", (0, 1), (1.0, 2.0))).equals(picture_table(RECORDS))
 
 
 def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
@@ -253,25 +223,18 @@ def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
     )
 
 
-def test_interval_of_three_fabrics():
+def test_intervals_over_fabrics():
     """Logarithms -1, 0 and 1: s = 1, and t_{.975, 2} = 4.302653 (tables of Student's distribution)."""
-    found = over_fabrics([math.exp(-1), 1.0, math.e])
     reach = 4.302653 / math.sqrt(3)
-    assert found == pytest.approx((1.0, math.exp(-reach), math.exp(reach)), rel=1e-6)
-
-
-def test_alike_fabrics_leave_no_doubt():
+    expected = (1.0, math.exp(-reach), math.exp(reach))
+    assert over_fabrics([math.exp(-1), 1.0, math.e]) == pytest.approx(expected, rel=1e-6)
     assert over_fabrics([0.25] * 4) == pytest.approx((0.25, 0.25, 0.25))
+    assert over_fabrics([0.3]) == pytest.approx((0.3, math.nan, math.nan), nan_ok=True)
 
 
 @pytest.mark.parametrize("values", [[], [0.1, 0.0], [0.1, -0.2], [0.1, math.nan], [0.1, math.inf]])
 def test_errors_lost_in_the_noise_have_no_mean(values):
     assert all(math.isnan(number) for number in over_fabrics(values))
-
-
-def test_a_single_fabric_has_no_interval():
-    mean, low, high = over_fabrics([0.3])
-    assert mean == pytest.approx(0.3) and math.isnan(low) and math.isnan(high)
 
 
 def test_intervals_hold_the_true_mean_in_95_of_100_draws():
@@ -294,12 +257,8 @@ def test_ratios_are_those_of_the_same_fabric():
     # On fabric b the component is nowhere seen, another one was not measured.
     assert found["rrmse_specular_warp_fabrics"] == pytest.approx(0.3)
     assert math.isnan(found["rrmse_specular_warp_fabrics_low"]) and math.isnan(found["rrmse_diffuse_warp_fabrics"])
-
-
-def test_without_the_baseline_there_is_no_ratio_over_fabrics():
-    errors = pd.DataFrame({"fabric": ["a", "b"], "mse": [0.1, 0.1]})
-    found = columns_over_fabrics(errors, errors.iloc[:0])
-    assert math.isnan(found["ratio_fabrics"]) and found["mse_fabrics"] == pytest.approx(0.1)
+    alone = columns_over_fabrics(errors, base.iloc[:0])
+    assert math.isnan(alone["ratio_fabrics"]) and alone["mse_fabrics"] == pytest.approx(0.1)
 
 
 # Few values, so that ties are frequent; and some that were not measured.
