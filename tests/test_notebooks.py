@@ -12,7 +12,7 @@ from nbclient import NotebookClient
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
@@ -34,7 +34,7 @@ def write_dataset(folder, rows=200):
             queries = draw_queries(QueryOptions(sigma=(0.3, 8.0)), fabric.weave.repeat, len(split), 0, rows)
             answers = estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)
             file = f"{name}-{split}.parquet"
-            write_shard(folder / file, name, queries, answers, {})
+            write_columns(folder / file, "components", name, columns_of(queries, answers), {})
             sha256 = file_sha256(folder / file)
             shards.append(ShardEntry(file=file, fabric=name, split=split, start=0, rows=rows, sha256=sha256))
     Manifest(name="smoke", fingerprint="0", roles=roles, fabrics=fabrics, about={}, shards=shards).save(folder)

@@ -18,7 +18,7 @@ import twillight
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from twillight import BadInput, Dataset, Fabric, Queries, evaluate, load_fabric, load_model, open_dataset, to_rgb
 
@@ -39,7 +39,8 @@ def dataset(tmp_path, monkeypatch):
             queries = draw_queries(QueryOptions(), fabrics[name].weave.repeat, len(name), start, rows)
             mean = np.repeat(np.arange(start, start + rows, dtype=np.float32)[:, None] + 1, 4, axis=1)
             file = f"{name}-{split}-{start}.parquet"
-            write_shard(folder / file, name, queries, Answers.opaque(mean, mean, np.ones(rows, np.int32)), {})
+            answers = Answers.opaque(mean, mean, np.ones(rows, np.int32))
+            write_columns(folder / file, "components", name, columns_of(queries, answers), {})
             sha256 = file_sha256(folder / file)
             shards.append(ShardEntry(file=file, fabric=name, split=split, start=start, rows=rows, sha256=sha256))
             start += rows

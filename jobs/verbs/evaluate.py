@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
@@ -13,16 +13,14 @@ from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import number, print_lines, print_table, progress
 from jobs.verbs.parameters import FabricName, Place
 from pipeline.cores import cores
-from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file
+from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file, truth_answerer
 from pipeline.truth.estimator import ESTIMATORS
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Answers, Queries, faults
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric
 from weaves.reading import MIB, read_text
 from weaves.validation import validated
-
-if TYPE_CHECKING:
-    from pipeline.truth.query import Queries
 
 WHERE = "evaluate"
 
@@ -75,7 +73,8 @@ def evaluate(
     cannot be used.
     """
     chosen = asdict(truth)
-    options, cloth, other = truth_options(**chosen), load_fabric(fabric), None
+    options, cloth = truth_options(**chosen), load_fabric(fabric)
+    answerer = truth_answerer(cloth, options, seed)
     threads: AbstractContextManager[None] = nullcontext()
     if model is not None:
         from pipeline.models.network import one_thread
@@ -85,7 +84,7 @@ def evaluate(
             if value is not None:
                 allowed = "leave it out with --model: it is an option of the ground truth"
                 raise BadInput(WHERE, _flag(name), value, allowed)
-        other = _answerer(model, cloth, extrapolate)
+        answerer = _model_answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
     if not 0 <= seed < 2**64:
@@ -96,12 +95,10 @@ def evaluate(
                 cloth,
                 queries,
                 out,
-                options,
-                seed,
+                answerer,
                 skip_bad,
                 threads=workers or cores(),
                 progress=advance,
-                other=other,
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None
@@ -120,7 +117,7 @@ def evaluate(
         print_lines(f"{rows} no answer; see {bad_list(out)}")
 
 
-def _answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
+def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     """Return a trained model, by name or by its folder, prepared for a fabric.
 
     BadInput if there is no such model, its files are damaged, or it does not cover the fabric; `extrapolate` accepts
@@ -135,13 +132,16 @@ def _answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     method.prepare(fabric)
     through: Any = getattr(method, "transparency", None)
 
-    def answer(queries: Queries) -> tuple[np.typing.NDArray[np.float32], np.typing.NDArray[np.float32]]:
-        values = method.predict(fabric, queries)
-        return values, through(fabric, queries) if through else np.zeros(len(queries.u), np.float32)
+    def answer(queries: Queries, first: int) -> Answers:
+        mean = method.predict(fabric, queries)
+        answers = Answers.opaque(mean, np.zeros_like(mean), np.zeros(len(mean), np.int32))
+        return answers._replace(transparency=through(fabric, queries)) if through else answers
 
     card = read_text(model_folder(model, WHERE, "--model") / "card.json", 8 * MIB, "a model card")
-    faults = (lambda queries: {}) if domain is None else lambda queries: domain.faults(queries, method.name)
-    return Answerer(answer, {"model": method.name, "card": card}, faults)
+    about = {"model": method.name, "card": card}
+    if domain is None:
+        return Answerer(answer, about)
+    return Answerer(answer, about, lambda queries: domain.faults(queries, method.name) | faults(queries))
 
 
 def _flag(name: str) -> str:

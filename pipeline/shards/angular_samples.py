@@ -12,20 +12,18 @@ A row is a query with its answer, so the columns are those of the data set's own
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from pipeline.fingerprint import stream_seed
-from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.shards.queries import QueryOptions, answered, draw_queries
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
-
-if TYPE_CHECKING:
-    from pipeline.truth.query import Answers
 
 
 class AngularSamples(Frozen):
@@ -64,13 +62,12 @@ class AngularSamples(Frozen):
 
     def answer(
         self, fabric: Fabric, start: int, count: int, progress: Callable[[int], None] = lambda done: None
-    ) -> tuple[Queries, Answers]:
-        """Return rows `start` to `start + count`; a row depends on the fabric's optics, the grid and its index alone.
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return rows `start` to `start + count` by column; a row depends on optics, grid and its index alone.
 
         `progress` receives the number of finished rows.
         """
-        from pipeline.truth.estimator import estimate
-        from pipeline.truth.query import Answers
+        from pipeline.shards.store import columns_of
 
         fine = self.texels_per_yarn
         rows, columns = self.grid(fabric)
@@ -89,12 +86,4 @@ class AngularSamples(Frozen):
             drawn.wi[sample - first],
             drawn.wo[sample - first],
         )
-        parts = []
-        for done in range(0, count, _CHUNK):
-            chunk = queries.take(slice(done, done + _CHUNK))
-            parts.append(estimate(fabric, chunk, self.truth, seed, start + done))
-            progress(min(done + _CHUNK, count))
-        return queries, Answers(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-
-_CHUNK = 16_384  # rows between two signs of progress; no row depends on it
+        return columns_of(queries, answered(fabric, queries, self.truth, seed, start, progress))

@@ -5,16 +5,13 @@ A set of extra rows is a kind and its parameters. Models whose options declare e
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.silhouettes import SilhouetteRows
-
-Kind = Literal["components", "angular_samples", "opacity", "grazing_cosine"]
-"""Kinds of rows, each with its columns (`pipeline.shards.schema`): a data set's own, and those of extra rows."""
 
 ExtraRows = Annotated[AngularSamples | SilhouetteRows, Field(discriminator="kind")]
 """Any set of extra rows, distinguished by its kind."""

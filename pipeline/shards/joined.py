@@ -7,7 +7,7 @@ dictionary. Its metadata say what it was made of: the same shards give the same 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,22 +16,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
-from pipeline.shards.query_file import ROW_GROUP
 from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION
-from pipeline.shards.store import read_table
+from pipeline.shards.store import FACTS, ROW_GROUP, numbers_of, parquet_writer, read_table, readable, regrouped
 from pipeline.storage import local_copy
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
 
-JOINED: Final = SCHEMA.set(0, SCHEMA.field(0).with_type(pa.string()))
-"""Arrow schema of a joined file of kind `components`."""
-
-_KEY: Final = b"twillight"
+_JOINED: Final = SCHEMA.set(0, SCHEMA.field(0).with_type(pa.string()))
 
 
 def columns_joined() -> list[tuple[str, str, str]]:
     """Return the name, the Arrow type and the meaning of every column."""
-    return [(field.name, str(field.type), field.metadata[b"meaning"].decode()) for field in JOINED]
+    return [(field.name, str(field.type), field.metadata[b"meaning"].decode()) for field in _JOINED]
 
 
 def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> None:
@@ -54,9 +50,9 @@ def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> No
     facts = json.dumps(about, sort_keys=True).encode()
     if _is_whole(path, facts):
         return
-    schema = JOINED.with_metadata({_KEY: facts})
-    with atomic_path(path) as temporary, _writer(temporary, schema) as writer:
-        for table in _row_groups(shards):
+    schema = _JOINED.with_metadata({FACTS: facts})
+    with atomic_path(path) as temporary, parquet_writer(temporary, schema, ["fabric"]) as writer:
+        for table in regrouped(map(read_table, shards), ROW_GROUP):
             writer.write_table(table.cast(schema))
 
 
@@ -69,49 +65,20 @@ def read_fabric(path: Path, fabric: str) -> dict[str, npt.NDArray[Any]]:
         If the file is missing or damaged, or has other columns.
     """
     refuse_irregular(path, "a file of rows")
-    try:
-        with local_copy(path) as file:
-            table = pq.read_table(file, filters=[("fabric", "==", fabric)], page_checksum_verification=True)
-    except FileNotFoundError as error:
-        raise BadInput(str(path), "", "does not exist", "get the whole data set") from error
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0].rstrip(".")
-        raise BadInput(str(path), "", f"not a whole Parquet file ({reason})", "get the data set again") from error
-    if table.schema.names != JOINED.names:
-        odd = ", ".join(sorted(set(table.schema.names) ^ set(JOINED.names)))
+    missing = "does not exist", "get the whole data set"
+    with readable(path, missing, "get the data set again"), local_copy(path) as file:
+        table = pq.read_table(file, filters=[("fabric", "==", fabric)], page_checksum_verification=True)
+    if table.schema.names != _JOINED.names:
+        odd = ", ".join(sorted(set(table.schema.names) ^ set(_JOINED.names)))
         raise BadInput(str(path), "schema", f"columns {odd} differ", f"must be schema version {SCHEMA_VERSION}")
-    return {name: table.column(name).to_numpy() for name in JOINED.names[1:]}
-
-
-def _row_groups(shards: Sequence[Path]) -> Iterator[pa.Table]:
-    """Yield the rows of shards, as many at a time as a row group has."""
-    held = read_table(shards[0]).slice(0, 0)
-    for shard in shards:
-        held = pa.concat_tables([held, read_table(shard)])
-        whole = held.num_rows - held.num_rows % ROW_GROUP
-        for start in range(0, whole, ROW_GROUP):
-            yield held.slice(start, ROW_GROUP)
-        held = held.slice(whole)
-    if held.num_rows:
-        yield held
-
-
-def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
-    return pq.ParquetWriter(
-        path,
-        schema,
-        compression="zstd",
-        use_dictionary=["fabric"],
-        use_byte_stream_split=[field.name for field in schema if field.type == pa.float32()],
-        write_page_checksum=True,
-    )
+    return numbers_of(table)
 
 
 def _is_whole(path: Path, facts: bytes) -> bool:
     """Return whether a file has these facts and its pages have their checksums."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            if (file.schema_arrow.metadata or {}).get(_KEY) != facts:
+            if (file.schema_arrow.metadata or {}).get(FACTS) != facts:
                 return False
             return bool(sum(len(batch) for batch in file.iter_batches(ROW_GROUP)) == file.metadata.num_rows)
     except (pa.ArrowException, OSError):

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, FailFast, Field, ValidationError
 
 from pipeline.atomic import atomic_write
-from pipeline.shards.extra_rows import ExtraRows, Kind, set_name
+from pipeline.shards.queries import Kind
 from pipeline.shards.schema import SCHEMA_VERSION
 from pipeline.shards.store import read_columns, rows_of
 from pipeline.truth.query import Answers, Queries
@@ -105,10 +105,6 @@ class Manifest(Frozen):
     def read(self, folder: Path, fabric: str, split: Split) -> tuple[Queries, Answers]:
         """Return all rows of a fabric's split in stream order, checksums verified; BadInput if there are none."""
         return rows_of(self.columns(folder, fabric, split))
-
-    def read_extra(self, folder: Path, fabric: str, extra: ExtraRows) -> dict[str, npt.NDArray[Any]]:
-        """Return all extra rows of a fabric by column, in stream order, checksums verified; BadInput if none."""
-        return self.columns(folder, fabric, set_name(extra))
 
     def parts(self, folder: Path, fabric: str, split: str) -> list[ShardEntry]:
         """Return a fabric's shards of a split or set, in stream order; BadInput if there are none."""

@@ -7,15 +7,22 @@ counter based [Salmon2011Philox]) is advanced to the row, never run up to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from pipeline.truth.query import STEEPEST_CURVATURE, Queries
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import STEEPEST_CURVATURE, Answers, Queries
+from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
+Kind = Literal["components", "angular_samples", "opacity", "grazing_cosine"]
+"""Kinds of rows, each with its columns (`pipeline.shards.schema`): a data set's own, and those of extra rows."""
+
+_CHUNK = 2048  # rows between two signs of progress; no row depends on it
 _DRAWS = 8  # numbers reserved for each row; Philox yields four a step
 _SHAPES = 1 << 64  # added to the key: the stream of what makes a query other than round, flat, and lit from the front
 
@@ -69,8 +76,7 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
     start, count : int
         Rows wanted.
     """
-    generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
-    draws = generator.random((count, _DRAWS))
+    draws = uniform_draws(seed, start, count)
     low, high = (math.log(bound) for bound in options.sigma)
     queries = Queries.round(
         u=(draws[:, 0] * repeat[0]).astype(np.float32),
@@ -80,6 +86,25 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
         wo=_directions(options, draws[:, 5], draws[:, 6]),
     )
     return queries if options.plain else _shaped(options, queries, seed, start)
+
+
+def uniform_draws(seed: int, start: int, count: int) -> npt.NDArray[np.float64]:
+    """Return the numbers in [0, 1) of rows `start` to `start + count` of a stream, (count, 8)."""
+    generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
+    return generator.random((count, _DRAWS))
+
+
+def answered(
+    fabric: Fabric, queries: Queries, truth: TruthOptions, seed: int, start: int, progress: Callable[[int], None]
+) -> Answers:
+    """Return the answers of the truth to rows from `start` on; `progress` receives the number of finished rows."""
+    from pipeline.truth.estimator import estimate  # here, so that a plan loads no compiler
+
+    parts, count = [], len(queries.u)
+    for first in range(0, count, _CHUNK):
+        parts.append(estimate(fabric, queries.take(slice(first, first + _CHUNK)), truth, seed, start + first))
+        progress(min(first + _CHUNK, count))
+    return Answers(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def _shaped(options: QueryOptions, queries: Queries, seed: int, start: int) -> Queries:

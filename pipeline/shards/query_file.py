@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -14,14 +14,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
-from pipeline.shards.store import queries_of
+from pipeline.shards.store import ROW_GROUP, queries_of, readable, regrouped
 from pipeline.storage import local_copy
 from pipeline.truth.query import Queries, faults
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
 
-ROW_GROUP: Final = 16_384
-"""Rows read, held and written at a time."""
 OPTIONAL: Final = {"sigma_minor": "sigma", "angle": 0.0, "curvature": 0.0}
 """Columns that may be left out, and what is taken then: another column, or a number."""
 ANSWERS: Final = [field for field in SCHEMA if field.name not in ("fabric", *QUERY_COLUMNS)]
@@ -39,18 +37,9 @@ class BadRow(NamedTuple):
     reason: str
 
 
-@contextmanager
-def _whole(path: Path) -> Iterator[None]:
-    """Turn what pyarrow says of a file that cannot be read into one sentence."""
-    try:
-        yield
-    except FileNotFoundError as error:
-        raise BadInput(str(path), "", "no such file", "the path of a Parquet file is needed") from error
-    except (pa.ArrowException, OSError) as error:
-        reason = " ".join(str(error).split(". ")[0].split()).rstrip(".")
-        raise BadInput(
-            str(path), "", f"not a whole Parquet file ({reason})", "one that can be read is needed"
-        ) from error
+def _readable(path: Path) -> AbstractContextManager[None]:
+    missing = "no such file", "the path of a Parquet file is needed"
+    return readable(path, missing, "one that can be read is needed")
 
 
 @contextmanager
@@ -64,7 +53,7 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
     """
     refuse_irregular(path, "a Parquet file")
     with ExitStack() as stack:
-        with _whole(path):
+        with _readable(path):
             here = stack.enter_context(local_copy(path))
             file = pq.ParquetFile(here, page_checksum_verification=True, buffer_size=_BUFFER)
         yield stack.enter_context(file)
@@ -72,21 +61,17 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
 
 def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """Yield the rows in blocks of `ROW_GROUP`, however the file is cut."""
-    batches = file.iter_batches(ROW_GROUP, columns=columns)
-    held: list[pa.RecordBatch] = []
-    while True:
-        with _whole(path):
-            batch = next(batches, None)
-        if batch is not None:
-            held.append(batch)
-        rows = sum(len(part) for part in held)
-        while rows >= ROW_GROUP or (batch is None and rows):
-            table = pa.Table.from_batches(held)
-            yield table.slice(0, ROW_GROUP).combine_chunks()
-            held = table.slice(ROW_GROUP).to_batches()
-            rows = sum(len(part) for part in held)
-        if batch is None:
-            return
+
+    def batches() -> Iterator[pa.Table]:
+        rows = file.iter_batches(ROW_GROUP, columns=columns)
+        while True:
+            with _readable(path):
+                batch = next(rows, None)
+            if batch is None:
+                return
+            yield pa.Table.from_batches([batch])
+
+    return (block.combine_chunks() for block in regrouped(batches(), ROW_GROUP))
 
 
 def check_columns(path: Path, schema: pa.Schema) -> None:

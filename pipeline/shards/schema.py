@@ -11,7 +11,7 @@ from typing import Final
 
 import pyarrow as pa
 
-from pipeline.shards.extra_rows import Kind
+from pipeline.shards.queries import Kind
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 
 SCHEMA_VERSION: Final = 3

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from pipeline.fingerprint import stream_seed
+from pipeline.shards.queries import uniform_draws
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -25,7 +26,6 @@ from weaves.validation import Frozen
 RAYS_A_COSINE: Final = 16
 """A grazing cosine takes some fifty rays to find, so each row has so many times fewer of them than `points`."""
 
-_DRAWS = 8  # numbers reserved for each row; Philox yields four a step
 _SPREADS = 1 << 64  # added to the key: the stream of points within the footprints of grazing cosines
 _TRIED = 1024  # first rows, whose steepest grazing cosine bounds the views of all
 _BEYOND = 1.2  # how far beyond it the views reach, in tangents
@@ -82,7 +82,7 @@ class SilhouetteRows(Frozen):
         """Return the largest tangent, over the root of the curvature, at which one of the first rows touches."""
         from pipeline.truth.geometry.opacity import grazing_cosine
 
-        draws = _uniform(seed, 0, _TRIED)
+        draws = uniform_draws(seed, 0, _TRIED)
         ends, picks = fabric.weave.repeat
         curvature = self.largest_curvature * np.square(1.0 - draws[:, 3])
         square = np.square(
@@ -94,7 +94,7 @@ class SilhouetteRows(Frozen):
         self, fabric: Fabric, seed: int, start: int, count: int, steepest: float
     ) -> dict[str, npt.NDArray[np.float32]]:
         """Return the columns of queries."""
-        draws = _uniform(seed, start, count)
+        draws = uniform_draws(seed, start, count)
         ends, picks = fabric.weave.repeat
         low, high = (math.log(bound) for bound in self.sigma)
         curvature = self.largest_curvature * np.square(1.0 - draws[:, 3])  # 1 - a draw is never 0
@@ -145,9 +145,3 @@ class SilhouetteRows(Frozen):
             return math.sqrt(12.0) * (first - 0.5), math.sqrt(12.0) * (second - 0.5)
         radius = np.sqrt(-2.0 * np.log(1.0 - first))  # Box and Muller
         return radius * np.cos(2.0 * np.pi * second), radius * np.sin(2.0 * np.pi * second)
-
-
-def _uniform(seed: int, start: int, count: int) -> Double:
-    """Return the numbers in [0, 1) of rows `start` to `start + count`, (count, 8)."""
-    generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
-    return generator.random((count, _DRAWS))

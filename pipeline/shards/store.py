@@ -1,11 +1,15 @@
-"""One shard on disk: Parquet with page checksums, written whole or not at all, the same bytes for the same rows."""
+"""One shard on disk: Parquet with page checksums, written whole or not at all, the same bytes for the same rows.
+
+Also what all files of rows share: how they are written, and that one which cannot be read is one sentence.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,35 +17,40 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.atomic import atomic_path
-from pipeline.shards.extra_rows import Kind
+from pipeline.shards.queries import Kind
 from pipeline.shards.schema import BOUNDS, SCHEMA_VERSION, SCHEMAS, STANDARD_ERRORS
 from pipeline.storage import local_copy
-from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
+from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
 
-_KEY = b"twillight"
-_ROW_GROUP = 16_384
+FACTS: Final = b"twillight"
+"""Key of a file's metadata: its facts, as JSON."""
+
+ROW_GROUP: Final = 16_384
+"""Rows written at a time."""
+
+_STACKED: Final = {
+    "wi": ("wi_x", "wi_y", "wi_z"),
+    "wo": ("wo_x", "wo_y", "wo_z"),
+    "mean": COMPONENTS,
+    "standard_error": STANDARD_ERRORS,
+    "bound": BOUNDS,
+}
+"""Columns of the fields of queries and answers that have several; the others are named as their columns."""
 
 Columns = Mapping[str, npt.NDArray[Any]]
 """Columns of rows by name, all of one length; the fabric's name is none of them."""
 
 
-def write_shard(path: Path, fabric: str, queries: Queries, answers: Answers, about: dict[str, Any]) -> None:
-    """Write N queries with their answers as a shard of kind `components`; parameters as for `write_columns`."""
-    write_columns(path, "components", fabric, columns_of(queries, answers), about)
-
-
 def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: dict[str, Any]) -> None:
-    """Write one shard.
+    """Write one shard, whole.
 
     Parameters
     ----------
-    path : Path
-        The file; it appears whole.
-    kind : Kind
-        Kind of the rows, a key of `SCHEMAS`.
+    path, kind : Path, Kind
+        The file, and the kind of its rows.
     fabric : str
         Name of the fabric of every row.
     columns : mapping
@@ -54,17 +63,49 @@ def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: 
     names = pa.DictionaryArray.from_arrays(np.zeros(rows, np.int32), pa.array([fabric]))
     arrays = [names, *(pa.array(np.ascontiguousarray(columns[name])) for name in schema.names[1:])]
     facts = json.dumps({"schema_version": SCHEMA_VERSION, **about}, sort_keys=True).encode()
-    table = pa.Table.from_arrays(arrays, schema=schema.with_metadata({_KEY: facts}))
-    with atomic_path(path) as temporary:
-        pq.write_table(
-            table,
-            temporary,
-            row_group_size=_ROW_GROUP,
-            compression="zstd",
-            use_dictionary=["fabric"],
-            use_byte_stream_split=[field.name for field in schema if field.type == pa.float32()],
-            write_page_checksum=True,
-        )
+    table = pa.Table.from_arrays(arrays, schema=schema.with_metadata({FACTS: facts}))
+    with atomic_path(path) as temporary, parquet_writer(temporary, table.schema, ["fabric"]) as writer:
+        writer.write_table(table, ROW_GROUP)
+
+
+def parquet_writer(path: Path, schema: pa.Schema, dictionaries: Sequence[str]) -> pq.ParquetWriter:
+    """Return a writer with page checksums; columns of few different values are written as `dictionaries`."""
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        use_dictionary=list(dictionaries),
+        use_byte_stream_split=[field.name for field in schema if field.type in (pa.float32(), pa.float64())],
+        write_page_checksum=True,
+    )
+
+
+def regrouped(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
+    """Yield the rows of tables, so many at a time, the last of them fewer."""
+    rest: pa.Table | None = None
+    for table in tables:
+        joined = table if rest is None else pa.concat_tables([rest, table])
+        whole = joined.num_rows - joined.num_rows % rows
+        for start in range(0, whole, rows):
+            yield joined.slice(start, rows)
+        rest = joined.slice(whole)
+    if rest is not None and rest.num_rows:
+        yield rest
+
+
+@contextmanager
+def readable(path: Path, missing: tuple[str, str], broken: str) -> Iterator[None]:
+    """Turn what pyarrow says of a Parquet file that cannot be read into a BadInput.
+
+    `missing` is what is said of a file that is not there, and what to do; `broken` what to do with a damaged one.
+    """
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise BadInput(str(path), "", *missing) from error
+    except (pa.ArrowException, OSError) as error:
+        reason = " ".join(str(error).split(". ")[0].split()).rstrip(".")
+        raise BadInput(str(path), "", f"not a whole Parquet file ({reason})", broken) from error
 
 
 def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ()) -> pa.Table:
@@ -77,19 +118,10 @@ def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ())
     """
     schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
-    try:
-        with local_copy(path) as file:
-            # Shards are small: threads within one cost more than they save.
-            table = pq.read_table(
-                file, columns=list(names) or None, page_checksum_verification=True, memory_map=False, use_threads=False
-            )
-    except FileNotFoundError as error:
-        raise BadInput(str(path), "", "does not exist", "generate it again with `twillight generate`") from error
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0].rstrip(".")
-        raise BadInput(
-            str(path), "", f"not a whole Parquet file ({reason})", "delete it and run `twillight generate`"
-        ) from error
+    again = "generate it again with `twillight generate`", "delete it and run `twillight generate`"
+    with readable(path, ("does not exist", again[0]), again[1]), local_copy(path) as file:
+        # Shards are small: threads within one cost more than they save.
+        table = pq.read_table(file, columns=list(names) or None, page_checksum_verification=True, use_threads=False)
     if not table.schema.equals(schema, check_metadata=False):
         odd = sorted(set(table.schema.names) ^ set(schema.names))
         detail = f"columns {', '.join(odd)} differ" if odd else "column types differ"
@@ -100,52 +132,40 @@ def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ())
 def read_about(path: Path) -> dict[str, Any]:
     """Return the facts that a shard's metadata hold."""
     metadata = pq.read_schema(path).metadata or {}
-    facts: dict[str, Any] = json.loads(metadata.get(_KEY, b"{}"))
+    facts: dict[str, Any] = json.loads(metadata.get(FACTS, b"{}"))
     return facts
+
+
+def numbers_of(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
+    """Return the columns of rows of one fabric, without its name."""
+    return {name: table.column(name).to_numpy() for name in table.column_names if name != "fabric"}
 
 
 def read_columns(path: Path, kind: Kind) -> dict[str, npt.NDArray[Any]]:
     """Read a shard's columns but the fabric with their checksums verified; errors as `read_table`."""
-    table = read_table(path, kind)
-    return {name: table.column(name).to_numpy() for name in SCHEMAS[kind].names[1:]}
-
-
-def read_shard(path: Path) -> tuple[Queries, Answers]:
-    """Read a shard of kind `components`; errors as `read_table`."""
-    return rows_of(read_columns(path, "components"))
+    return numbers_of(read_table(path, kind))
 
 
 def columns_of(queries: Queries, answers: Answers) -> dict[str, npt.NDArray[Any]]:
     """Return queries and answers by column."""
-    axes = [("wi_x", "wi_y", "wi_z"), ("wo_x", "wo_y", "wo_z"), COMPONENTS, STANDARD_ERRORS, BOUNDS]
-    stacked = queries.wi, queries.wo, answers.mean, answers.standard_error, answers.bound
-    columns: dict[str, npt.NDArray[Any]] = {"u": queries.u, "v": queries.v, "sigma": queries.sigma}
-    for names, values in zip(axes, stacked, strict=True):
-        columns |= dict(zip(names, values.T, strict=True))
-    columns |= {"sigma_minor": queries.sigma_minor, "angle": queries.angle, "curvature": queries.curvature}
-    columns |= {TRANSPARENCY: answers.transparency, "count": answers.count}
-    columns |= {f"{TRANSPARENCY}_standard_error": answers.transparency_standard_error}
-    return columns | {f"{TRANSPARENCY}_bound": answers.transparency_bound}
+    columns: dict[str, npt.NDArray[Any]] = {}
+    for field, values in (queries._asdict() | answers._asdict()).items():
+        names = _STACKED.get(field)
+        columns |= dict(zip(names, values.T, strict=True)) if names else {field: values}
+    return columns
 
 
 def rows_of(column: Columns) -> tuple[Queries, Answers]:
     """Return the queries and answers that columns hold: the inverse of `columns_of`."""
-    mean, error, bound = (
-        np.stack([column[name] for name in names], axis=-1) for names in (COMPONENTS, STANDARD_ERRORS, BOUNDS)
-    )
-    through = (column[TRANSPARENCY + suffix] for suffix in ("", "_standard_error", "_bound"))
-    return queries_of(column), Answers(mean, error, bound, column["count"], *through)
+    return queries_of(column), Answers(*_fields(column, Answers._fields))
 
 
-def queries_of(column: Mapping[str, npt.NDArray[np.float32]]) -> Queries:
+def queries_of(column: Columns) -> Queries:
     """Return the queries that columns hold."""
-    return Queries(
-        column["u"],
-        column["v"],
-        column["sigma"],
-        np.stack([column["wi_x"], column["wi_y"], column["wi_z"]], axis=-1),
-        np.stack([column["wo_x"], column["wo_y"], column["wo_z"]], axis=-1),
-        column["sigma_minor"],
-        column["angle"],
-        column["curvature"],
-    )
+    return Queries(*_fields(column, Queries._fields))
+
+
+def _fields(column: Columns, fields: Sequence[str]) -> Iterator[npt.NDArray[Any]]:
+    for field in fields:
+        names = _STACKED.get(field)
+        yield np.stack([column[name] for name in names], axis=-1) if names else column[field]

@@ -26,6 +26,7 @@ from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
 from pipeline.models.registry import build_network
+from pipeline.shards.extra_rows import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows
@@ -85,7 +86,8 @@ def train(
 
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
-        extra = [[manifest.read_extra(manifest_folder, name, one) for name in fabrics] for one in options.extra_rows]
+        sets = [set_name(rows) for rows in options.extra_rows]
+        extra = [[manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets]
         network = build_network(options, members, extra)
         del extra
         stride = max(len(rows.table) // _START_ROWS, 1)

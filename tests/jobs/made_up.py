@@ -20,7 +20,7 @@ from pipeline.atomic import link
 from pipeline.models.card import write_model
 from pipeline.shards.generate import ShardTask
 from pipeline.shards.queries import draw_queries
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from reports.page.files import write_files
 
@@ -36,7 +36,7 @@ def make(task, out):
         queries = draw_queries(shard.queries, shard.fabric.weave.repeat, int(task.id, 16), shard.start, shard.rows)
         mean = np.full((shard.rows, 4), 0.1, np.float32)
         answers = Answers.opaque(mean, mean, np.full(shard.rows, 8, np.int32))
-        write_shard(paths[0], shard.fabric.name, queries, answers, {})
+        write_columns(paths[0], "components", shard.fabric.name, columns_of(queries, answers), {})
         for path in paths[1:]:
             link(paths[0], path)
     elif isinstance(task, Training):

@@ -8,7 +8,7 @@ from jobs.cli import main
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.checks import invariants
 from pipeline.truth.checks.invariants import exact, worst
 from pipeline.truth.query import Answers
@@ -164,7 +164,7 @@ def dataset(tmp_path):
     answers = Answers.opaque(
         np.ones((100, 4), np.float32), np.ones((100, 4), np.float32) / 100, np.full(100, 64, np.int32)
     )
-    write_shard(folder / "part-a.parquet", "denim", queries, answers, {})
+    write_columns(folder / "part-a.parquet", "components", "denim", columns_of(queries, answers), {})
     entry = ShardEntry(
         file="part-a.parquet",
         fabric="denim",

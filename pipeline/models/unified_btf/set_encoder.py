@@ -24,7 +24,6 @@ from torch.nn import functional
 from pipeline.fingerprint import fingerprint
 from pipeline.models.networks.layers import perceptron
 from pipeline.models.unified_btf import BtfOptions
-from pipeline.shards.store import columns_of
 from pipeline.truth.conventions import COMPONENTS
 from weaves.fabric import Fabric
 
@@ -78,7 +77,7 @@ def texels_of(fabric: Fabric, options: BtfOptions) -> Texels:
     if texels is not None:
         return texels
     wanted = options.angular_samples
-    return read_texels(fabric, options, columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))))
+    return read_texels(fabric, options, wanted.answer(fabric, 0, wanted.count(fabric)))
 
 
 def _key(fabric: Fabric, options: BtfOptions) -> str:

@@ -129,7 +129,9 @@ def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(twillight, tmp_pa
         "from pathlib import Path; from weaves.fabric import load_fabric\n"
         "from pipeline.truth.options import TruthOptions\n"
         "q.ROW_GROUP = 8\n"
-        "e.evaluate_file(load_fabric('denim'), Path('queries.parquet'), Path('result.parquet'), TruthOptions(), 0,\n"
+        "denim = load_fabric('denim')\n"
+        "truth = e.truth_answerer(denim, TruthOptions(), 0)\n"
+        "e.evaluate_file(denim, Path('queries.parquet'), Path('result.parquet'), truth,\n"
         "    skip_bad=True, progress=lambda share: share < 0.5 or os.kill(os.getpid(), signal.SIGKILL))\n"
     )
     root = Path(__file__).parents[3]

@@ -12,7 +12,7 @@ import pytest
 
 import pipeline.shards.evaluate as evaluate_module
 from pipeline.shards import query_file
-from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file
+from pipeline.shards.evaluate import Answerer, Summary, bad_list, evaluate_file, truth_answerer
 from pipeline.shards.schema import QUERY_COLUMNS, STANDARD_ERRORS
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
@@ -58,8 +58,9 @@ class Case:
         pq.write_table(table, self.queries, row_group_size=row_group_size)
         return self
 
-    def run(self, **choices):
-        return evaluate_file(FABRIC, self.queries, self.out, self.options, SEED, **choices)
+    def run(self, answerer=None, **choices):
+        answerer = answerer or truth_answerer(FABRIC, self.options, SEED)
+        return evaluate_file(FABRIC, self.queries, self.out, answerer, **choices)
 
     def result(self):
         return pq.read_table(self.out)
@@ -111,55 +112,41 @@ def test_a_result_read_alone_is_understood(case):
 
 
 @pytest.mark.parametrize("estimator", ["owen", "auto"])
-def test_no_byte_depends_on_the_chunks_and_no_number_on_the_row_groups(case, monkeypatch, estimator):
+def test_no_byte_depends_on_the_cut_nor_on_the_number_of_threads(case, monkeypatch, estimator):
+    """Queries from both sides, lit from both, some bad; chunks of any size, blocks that end inside row groups."""
     case.options = OPTIONS.model_copy(update={"estimator": estimator})
-    columns = query_columns()
+    columns = query_columns(100)
     columns["wi_z"][::5] *= -1.0
     columns["wo_z"][::7] *= -1.0
-    case.write(columns).run()
-    whole, table = case.out.read_bytes(), case.result()
-    for chunk in (1, 7, 100, 10_000):
-        case.run(chunk=chunk)
-        assert case.out.read_bytes() == whole
-    case.write(columns, row_group_size=17).run()
-    assert case.result().equals(table)
-    # Blocks that end inside row groups.
-    monkeypatch.setattr(query_file, "ROW_GROUP", 64)
-    case.run(chunk=10)
-    assert case.result().equals(table)
-
-
-@pytest.mark.parametrize("estimator", ["owen", "auto"])
-def test_no_byte_depends_on_the_number_of_threads(case, monkeypatch, estimator):
-    """Blocks of 64 rows in chunks of 5 from both sides, lit from both, some rows bad."""
-    case.options = OPTIONS.model_copy(update={"estimator": estimator})
-    monkeypatch.setattr(query_file, "ROW_GROUP", 64)
-    columns = query_columns()
-    columns["wi_z"][::5] *= -1.0
-    columns["wo_z"][::7] *= -1.0
-    columns["sigma"][[9, 10, 200]] = 0.0
-    shares = []
-    summary = case.write(columns).run(skip_bad=True, chunk=5)
-    whole, listed = case.out.read_bytes(), bad_list(case.out).read_bytes()
-    for threads in (2, 3, 8):
-        again = case.run(skip_bad=True, chunk=5, threads=threads, progress=shares.append)
+    columns["sigma"][[9, 10, 80]] = 0.0
+    summary = case.write(columns).run(skip_bad=True)
+    whole, listed, table = case.out.read_bytes(), bad_list(case.out).read_bytes(), case.result()
+    for chunk, threads in ((1, 2), (7, 1), (40, 8), (10_000, 3)):
+        shares = []
+        again = case.run(skip_bad=True, chunk=chunk, threads=threads, progress=shares.append)
         assert (case.out.read_bytes(), bad_list(case.out).read_bytes()) == (whole, listed)
         assert (again.rows, again.bad, again.points) == (summary.rows, summary.bad, summary.points)
         assert shares == sorted(shares) and shares[-1] == 1.0
-        shares.clear()
+    case.write(columns, row_group_size=17).run(skip_bad=True)
+    assert case.result().equals(table)
+    monkeypatch.setattr(query_file, "ROW_GROUP", 40)
+    case.run(skip_bad=True, chunk=5, threads=3)
+    assert case.result().equals(table)
 
 
 def test_a_method_in_place_of_the_truth_answers_on_all_threads(case):
     """Two chunks wait for one another, so that a single thread would wait for ever; rows stay in their order."""
     together = Barrier(2)
 
-    def answer(queries):
+    def answer(queries, first):
         together.wait(timeout=300.0)
-        return np.tile(queries.sigma[:, None], (1, 4)), queries.sigma
+        mean = np.tile(queries.sigma[:, None], (1, 4))
+        return Answers.opaque(mean, np.zeros_like(mean), np.zeros(len(mean), np.int32))
 
     columns = query_columns(40)
-    case.write(columns).run(chunk=10, threads=2, other=Answerer(answer, {"model": "sigma"}))
+    case.write(columns).run(Answerer(answer, {"model": "sigma"}), chunk=10, threads=2)
     np.testing.assert_array_equal(case.result()["diffuse_weft"].to_numpy(), columns["sigma"].astype(np.float32))
+    assert all(case.result()[name].null_count == 40 for name in STANDARD_ERRORS)
 
 
 def test_what_stops_a_thread_stops_everything(case):
@@ -321,7 +308,7 @@ def test_outputs_that_cannot_be_written_are_refused_before_any_work(case, monkey
     (tmp_path / "link.parquet").symlink_to(case.queries)
     for out in (case.queries, tmp_path / "link.parquet", tmp_path, case.queries / "result.parquet"):
         with pytest.raises(BadInput):
-            evaluate_file(FABRIC, case.queries, out, OPTIONS, SEED)
+            evaluate_file(FABRIC, case.queries, out, truth_answerer(FABRIC, OPTIONS, SEED))
     assert case.queries.read_bytes() == before
 
 

@@ -9,7 +9,7 @@ from pipeline.shards.joined import columns_joined, join_shards
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.query_file import ROW_GROUP
 from pipeline.shards.schema import SCHEMA
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from weaves.errors import BadInput
 
@@ -25,7 +25,7 @@ def shards(tmp_path):
         mean = np.ones((rows, 4), np.float32)
         answers = Answers.opaque(mean, mean, np.arange(start, start + rows, dtype=np.int32))
         paths.append(tmp_path / f"{number}.parquet")
-        write_shard(paths[-1], f"fabric_{number % 2}", queries, answers, {})
+        write_columns(paths[-1], "components", f"fabric_{number % 2}", columns_of(queries, answers), {})
         start += rows
     return paths
 

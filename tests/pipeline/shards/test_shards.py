@@ -5,15 +5,17 @@ import json
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from pydantic import TypeAdapter
 
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.check import check_shard
-from pipeline.shards.generate import SHARD_TASK, ExtraShardTask, ShardTask, generate_shard
+from pipeline.shards.extra_rows import set_name
+from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask, generate_shard
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions
 from pipeline.shards.silhouettes import SilhouetteRows
-from pipeline.shards.store import read_about, read_columns, read_shard, write_columns
+from pipeline.shards.store import read_about, read_columns, rows_of, write_columns
 from pipeline.truth.options import TruthOptions
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -43,6 +45,11 @@ OPACITY = SilhouetteRows(
     seed=0,
 )
 EXTRA = [SAMPLES, OPACITY, OPACITY.model_copy(update={"kind": "grazing_cosine"})]
+
+
+def read_shard(path):
+    """Return the queries and answers of a shard."""
+    return rows_of(read_columns(path, "components"))
 
 
 @pytest.fixture
@@ -170,7 +177,7 @@ def _extra(folder, extra):
     for start, rows in ((0, 40), (40, 24)):
         task = ExtraShardTask(fabric=TASK.fabric, extra=extra, start=start, rows=rows)
         path = folder / f"part-{start}.parquet"
-        generate_shard(SHARD_TASK.validate_json(task.model_dump_json()), path)
+        generate_shard(TypeAdapter(AnyShardTask).validate_json(task.model_dump_json()), path)
         facts = {"file": path.name, "fabric": "denim", "kind": task.kind, "split": task.split}
         entries.append(ShardEntry(**facts, start=start, rows=rows, sha256=file_sha256(path)))
     return _manifest(folder).model_copy(update={"shards": entries})
@@ -182,14 +189,14 @@ def test_extra_rows_are_shards_like_all_others(folder, extra):
     manifest = _extra(folder, extra)
     assert [fault for entry in manifest.shards for fault in check_shard(folder, entry, manifest)] == []
     manifest.save(folder)
-    read = Manifest.load(folder).read_extra(folder, "denim", extra)
+    read = Manifest.load(folder).columns(folder, "denim", set_name(extra))
     generate_shard(ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=64), folder / "whole.parquet")
     whole = read_columns(folder / "whole.parquet", extra.kind)
     assert read.keys() == whole.keys()
     for name, column in whole.items():
         np.testing.assert_array_equal(read[name], column)
     with pytest.raises(BadInput, match="no rows"):
-        manifest.read_extra(folder, "denim", SAMPLES.model_copy(update={"samples": 5}))
+        manifest.columns(folder, "denim", set_name(SAMPLES.model_copy(update={"samples": 5})))
 
 
 def test_damaged_extra_rows_are_named(folder):

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from weaves.fabric import load_fabric
 
@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
         for split, rows, seed in (("train", 4096, 1), ("validation", 512, 2)):
             queries = draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
             file = f"part-{name}-{split}.parquet"
-            write_shard(folder / file, name, queries, answered(fabric, queries), {})
+            write_columns(folder / file, "components", name, columns_of(queries, answered(fabric, queries)), {})
             shards.append(ShardEntry(file=file, fabric=name, split=split, start=0, rows=rows, sha256="0" * 64))
     roles = {"seen": list(NAMES), "population": [], "unseen": []}
     Manifest(name="tiny", fingerprint="f" * 16, roles=roles, fabrics=fabrics, about={}, shards=shards).save(folder)

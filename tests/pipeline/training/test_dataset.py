@@ -5,7 +5,7 @@ from torch.utils.data import DataLoader
 
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import DatasetRows
-from pipeline.shards.store import write_shard
+from pipeline.shards.store import columns_of, write_columns
 from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows, load_rows
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
@@ -79,7 +79,13 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
     scalar = lambda: column(1)[0]  # noqa: E731
     queries = Queries(scalar(), scalar(), scalar(), column(3), column(3), scalar(), scalar(), scalar())
     answers = Answers.opaque(column(4), np.zeros((1, 4), np.float32), np.ones(1, np.int32))
-    write_shard(tmp_path / "one.parquet", "denim", queries, answers._replace(transparency=scalar()), {})
+    write_columns(
+        tmp_path / "one.parquet",
+        "components",
+        "denim",
+        columns_of(queries, answers._replace(transparency=scalar())),
+        {},
+    )
     shard = ShardEntry(file="one.parquet", fabric="denim", split="train", start=0, rows=1, sha256="0" * 64)
     manifest = Manifest(name="one", fingerprint="0", roles={}, fabrics={}, about={}, shards=[shard])
     rows = load_rows(manifest, tmp_path, ["denim"], tmp_path / "rows.npy")

@@ -6,7 +6,6 @@ from pipeline.models.btf_autoencoder import BtfAutoencoderOptions
 from pipeline.models.btf_autoencoder.model import build, restore
 from pipeline.models.network import NetworkMethod
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of
 from weaves.fabric import load_fabric
 
 SMALL = BtfAutoencoderOptions(texels_per_yarn=2, samples=4, fewest_samples=2, encoder_hidden=8, weights=4, hidden=8)
@@ -15,7 +14,7 @@ LINING, BASKET = load_fabric("polyester_lining"), load_fabric("basket")
 
 def untrained(*fabrics):
     wanted = SMALL.angular_samples
-    samples = [columns_of(*wanted.answer(fabric, 0, wanted.count(fabric))) for fabric in fabrics]
+    samples = [wanted.answer(fabric, 0, wanted.count(fabric)) for fabric in fabrics]
     return build(SMALL, fabrics, samples)
 
 

@@ -10,7 +10,6 @@ from pipeline.models.network import Batch, NetworkMethod
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, build, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -30,7 +29,7 @@ def trainable(**changes: object) -> UnifiedBtfNetwork:
     """Return an untrained network with the samples of the lining."""
     options = SMALL.model_copy(update=changes)
     wanted = options.angular_samples
-    return build(options, [LINING], [columns_of(*wanted.answer(LINING, 0, wanted.count(LINING)))])
+    return build(options, [LINING], [wanted.answer(LINING, 0, wanted.count(LINING))])
 
 
 def batch_of(queries: Queries, target: torch.Tensor) -> Batch:

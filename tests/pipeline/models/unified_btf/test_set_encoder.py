@@ -13,7 +13,7 @@ from pipeline.models.unified_btf.set_encoder import (
     texels_of,
 )
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of
+from pipeline.shards.store import rows_of
 from weaves.fabric import load_fabric
 
 OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
@@ -98,8 +98,9 @@ SHANTUNG, LINING = load_fabric("silk_shantung"), load_fabric("polyester_lining")
 
 def test_rows_become_samples_by_texels():
     """A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11."""
-    queries, answers = SMALL.angular_samples.answer(SHANTUNG, 0, SMALL.angular_samples.count(SHANTUNG))
-    samples = read_texels(SHANTUNG, SMALL, columns_of(queries, answers))
+    columns = SMALL.angular_samples.answer(SHANTUNG, 0, SMALL.angular_samples.count(SHANTUNG))
+    queries, answers = rows_of(columns)
+    samples = read_texels(SHANTUNG, SMALL, columns)
     assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
     sample, row, column = 2, 3, 9
     angles = angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), SMALL.angles)
