@@ -78,7 +78,7 @@ def of_methods():
         names = ("size_time", "size_colour", "size_specular", "size_diffuse")
         records += [subject.of(name, 0.5, 9, curve=sizes) for name in names]
     records.append(Record(method="woven", setting="compile", metric="not_run", value=1.0, note="no <compiler>"))
-    return [*records, Record(method="woven").of("largest_error", 0.25, 2)]
+    return [*records, Record(method="woven").of("added_largest_error", 0.25, 2)]
 
 
 def of_truth():
@@ -144,7 +144,9 @@ def page_input(made_up, tmp_path_factory):
     live = folder / "live-denim-01234567.html"
     live.write_bytes(b"<title>denim</title>")
     danger = load_fabric("denim").model_copy(update={"source": "<script>alert('cloth')</script> & more"})
-    row = MetricRow("largest_error", "largest error", "Largest error of all queries.", unit="1/sr", format="percent")
+    row = MetricRow(
+        "added_largest_error", "largest error", "Largest error of all queries.", unit="1/sr", format="percent"
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(catalogue.METRICS, row.name, row)
         yield PageInput(

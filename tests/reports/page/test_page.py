@@ -127,7 +127,7 @@ def test_every_section_shows_its_numbers(folder, page):
     between, stability = (pd.read_csv(folder / "tables" / f"{name}.csv") for name in ("between", "stability"))
     assert between["share"].tolist() == [*SHARES, *SHARES[::-1]] and len(stability) == 2
     other = pd.read_csv(folder / "tables" / "other_metrics.csv").set_index("method")
-    assert other.loc["woven", "largest_error"] == 0.25
+    assert other.loc["woven", "added_largest_error"] == 0.25
 
 
 def test_scenes_show_intervals_noise_frames_and_maps(folder, page):
