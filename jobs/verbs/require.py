@@ -73,11 +73,11 @@ def require(
     if method and method not in names:
         allowed = f"{general.name} has no such method; {nearest_name(method, names)}"
         raise BadInput("require", "--method", method, allowed)
+    described = load_scene(scene)
     records = read_records([records_file(out, general.name)])
     sizes = size_table(records)
     if sizes.empty:
         raise BadInput(str(out), "recipe", recipe, "its page has no errors by size of footprint; run the recipe again")
-    described = load_scene(scene)
     queries_by_fabric, worn = _queries_of(described, frames, general.bench.scenes)
     requirement = Requirement.of(described.name, frames, queries_by_fabric, EDGES[:-1], SIZES, margin)
     by_fabric = [(worn[name][1], queries) for name, queries in queries_by_fabric.items()]

@@ -1,5 +1,7 @@
 import pytest
 
+from jobs.cli import main
+
 RECIPE = """
 name = "tiny"
 
@@ -87,3 +89,18 @@ class Files:
 @pytest.fixture
 def files(tmp_path):
     return Files(tmp_path)
+
+
+@pytest.fixture
+def twillight(capsys, monkeypatch, tmp_path):
+    """Run the command line in a folder of its own; return exit code, output and complaint."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*tokens):
+        capsys.readouterr()
+        code = main([*map(str, tokens)])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shlex
 import shutil
 import signal
 import subprocess
@@ -23,6 +24,7 @@ from jobs.cli import main
 from jobs.recipe.load import load_recipe
 from pipeline.scenes.catalogue import load_scene
 from reports.record import Record, this_machine, write_records
+from tests.weaves.draft_files.drafts import wif
 from weaves.draft_files.write import wif_text
 from weaves.errors import MOST_LETTERS, BadInput
 from weaves.fabric import load_fabric
@@ -128,6 +130,7 @@ FABRIC = {
     "weft.bend": "20.0",
     "weft.roughness": "0.3",
 }
+SATIN = {"draft.family": '"satin"', "draft.ends": "6", "draft.move": "3"}
 SCENE = {"name": '"x"', "source": '"good.xml"', "frames": "3", "step": "[0.0, 0.0, 0.0]"}
 
 VALUES = [
@@ -169,146 +172,10 @@ SINGLE = [
     ({"draft.over": "[128]", "draft.under": "[128]"}, "fabric"),
 ]
 
-COMMANDS = f"""
-plna smoke
-plan
-plan smoke smoke
-plan {"a" * 300}
-plan {"a" * 300}.toml
-plan {"a/" * 3000}b.toml
-plan {"/".join(["a" * 200] * 10)}.toml
-show {"a" * 100_000}
-show \x1b[31m
-show \x1b[31m.toml
-show \udcff.toml
-check \x1b]0;title\x07
-check nothing
-generate smoke --workers -3
-generate smoke --workers 1000000
-generate smoke --workers {2**63}
-generate smoke --workers {"9" * 5000}
-generate smoke --workers two
-generate smoke --workrs 2
-generate smoke --out {"o" * 300}
-generate smoke --out {"/".join(["o" * 200] * 30)}
-generate smoke --out good.json
-generate smoke --out good.json/below
-generate smoke --out /dev/null
-generate smoke --out pipe.xml
-generate smoke --out /proc/nothing
-generate smoke --scheduler tcp//nowhere
-generate smoke --scheduler tcp://127.0.0.1:1
-generate smoke --scheduler tcp://127.0.0.1:99999999
-generate smoke --scheduler {"a" * 5000}
-generate smoke --scheduler \x1b[2J
-generate smoke --scheduler good.json
-generate smoke --scheduler tls://127.0.0.1:1 --tls-ca nothing.pem
-generate smoke --scheduler tls://127.0.0.1:1 --tls-ca good.json
-generate smoke --scheduler tls://127.0.0.1:1 --tls-ca good.json --tls-key good.json --tls-certificate good.json
-train smoke
-bench smoke
-report smoke
-bench stability
-status smoke --nothing
-results smoke
-results smoke --out good.json
-results smoke --readme nothing.md
-compare nothing nothing
-plan smoke --add nothing
-plan smoke --add nothing.py:Nothing
-plan smoke --add nothing:Nothing
-plan smoke --add weaves.fabric:Fabric
-plan smoke --add {"a" * 5000}:b
-status smoke --add :
-check smoke --add good.json:a
-bench truth --add a:b
-records merge good.json --out a.json
-records merge good.json good.json --out good.json
-records merge good.json nothing --out nowhere/a.json
-compare . .
-compare good.json good.json
-require nothing
-require sphere --recipe nothing
-require sphere --error nan
-require sphere --error -1
-require sphere --time 0
-require sphere --frames 0
-require sphere --frames -{2**63}
-require sphere --margin 0.5
-require sphere --margin nan
-require sphere --effort 0
-require sphere --effort nan
-require sphere --method nothing
-require sphere --set hidden
-require sphere --set =
-require sphere --set {"a." * 1000}b=1
-require sphere --set a=0x{"f" * 5000}
-require sphere --set a={"[" * 5000}
-require sphere --recipe smoke
-require {"s" * 300}.xml
-savings smoke nothing
-savings smoke
-savings smoke sphere
-export denim
-export denim --mesh a.txt
-export denim --mesh a.ply --vertices 1
-export denim --mesh a.ply --vertices -5
-export denim --mesh a.ply --vertices 1000000
-export denim --mesh a.ply --vertices {10**30}
-export denim --mesh a.ply --repeats 0
-export denim --mesh a.ply --repeats {10**30}
-export denim --mesh {"m" * 300}.ply --vertices 2
-export denim --mesh good.json/a.ply --vertices 2
-export denim --mesh folder.ply --vertices 2
-export denim --wif a.txt
-export denim --wif a.wif --mesh a.ply
-export denim --maps a --size 0
-export denim --maps a --size -2048
-export denim --maps a --size 1000000
-export denim --maps a --size {10**30}
-export denim --maps a --size 1000
-export denim --maps a --vertices 8
-export denim --maps good.json
-export denim --maps good.json/a
-export denim --wif a.wif --size 64
-export denim --wif a.wif --repeats 2
-export denim --wif good.json/a.wif
-import nothing.wif --out a.toml
-import good.json --out a.toml
-import good.wif --out a.txt
-import good.wif --out good.json/a.toml
-import good.wif --out a.toml --like nothing
-import good.wif --out a.toml --name {"n" * 61}
-import good.wif --out a.toml --name a/b
-import good.wif --out a.toml --warp.bend 95
-import good.wif --out a.toml --weft.roughness nan
-import good.wif --out a.toml --warp.colour red
-evaluate denim
-evaluate denim nothing.parquet --out a.parquet
-evaluate denim good.parquet --out a.parquet --estimator nothing
-evaluate denim good.parquet --out a.parquet --max-count {2**63}
-evaluate denim good.parquet --out a.parquet --max-count 100
-evaluate denim good.parquet --out a.parquet --relative-error nan
-evaluate denim good.parquet --out a.parquet --relative-error 2
-evaluate denim good.parquet --out a.parquet --absolute-error -1
-evaluate denim good.parquet --out a.parquet --footprint round
-evaluate denim good.parquet --out a.parquet --frame upright
-evaluate denim good.parquet --out a.parquet --seed -1
-evaluate denim good.parquet --out a.parquet --seed {2**64}
-evaluate denim good.parquet --out a.parquet --workers -1
-evaluate denim good.parquet --out a.parquet --workers 1000000
-evaluate denim good.parquet --out {"a" * 300}.parquet
-evaluate denim good.parquet --out good.json/a.parquet
-evaluate denim good.parquet --out folder.ply
-evaluate denim good.parquet --out good.parquet
-evaluate denim good.parquet --out a.parquet --model nothing
-evaluate denim good.parquet --out a.parquet --model {"a" * 5000}
-evaluate denim good.parquet --out a.parquet --model .
-evaluate denim good.parquet --out a.parquet --model selvage --seed 1
-evaluate nothing good.parquet --out a.parquet
-show denim --out good.json
-show denim --out {"a" * 300}
-""".strip().splitlines()
+LINES = Path(__file__).with_name("bad_commands.txt").read_text(encoding="utf-8").splitlines()
+"""Commands as bodies of f-strings, then words of the sentence that refuses each."""
+
+COMMANDS = [(eval(f"f'''{line}'''"), words) for line, _, words in (line.partition(" => ") for line in LINES)]
 
 CONTENTS = [
     "",
@@ -358,29 +225,34 @@ def put(name, content):
 
 
 def surroundings():
-    """Write the good files that commands name."""
+    """Write the good files that commands name, and bad ones that stay."""
     Path("good.json").write_text('[{"method": "a"}]')
     Path("good.xml").write_text("<scene/>")
     Path("good.wif").write_text(wif_text(load_fabric("denim")))
-    Path("folder.ply").mkdir()
+    for folder in ("folder.ply", "folder.png", "twill_4_4"):
+        Path(folder).mkdir()
     os.mkfifo("pipe.xml")
     for suffix in (".xml", ".toml"):
         write(Path(f"names_{suffix[1:]}.toml"), RECIPE, {"bench.scenes.names": f'["bad{suffix}"]'})
     page = Path("out/report/smoke")
     page.mkdir(parents=True)
-    write_records(page / "records.json", [Record(method="a")], this_machine(1))
-    query = {
-        "u": 0.5,
-        "v": 0.5,
-        "sigma": 0.5,
-        "wi_x": 0.0,
-        "wi_y": 0.0,
-        "wi_z": 1.0,
-        "wo_x": 0.0,
-        "wo_y": 0.0,
-        "wo_z": 1.0,
-    }
-    pq.write_table(pa.table({name: pa.array([value], pa.float32()) for name, value in query.items()}), "good.parquet")
+    for path in (page / "records.json", Path("records.json")):
+        write_records(path, [Record(method="a")], this_machine(1))
+    query = {"u": 0.5, "v": 0.5, "sigma": 0.5, "wi_x": 0.6, "wi_y": 0.0, "wi_z": 0.8}
+    query |= {"wo_x": 0.0, "wo_y": 0.0, "wo_z": 1.0}
+    rows = {name: np.full(10, value) for name, value in query.items()}
+    pq.write_table(pa.table(rows), "good.parquet")
+    rows["wi_z"][[4, 9]] = 3.0
+    pq.write_table(pa.table(rows), "long.parquet")
+    Path("cut.parquet").write_bytes(Path("good.parquet").read_bytes()[:-100])
+    Path("file").write_text("no table and no folder")
+    Path("twill_4_4/x").touch()
+    Path("threadless.wif").write_text(wif(THREADING=None), encoding="utf-8")
+    Path("broken.toml").write_text("name = \n")
+    Path("neither.toml").write_text('name = "x"\n')
+    write(Path("nan.toml"), FABRIC, {"warp.bend": "nan"})
+    write(Path("satin.toml"), {key: text for key, text in FABRIC.items() if "draft" not in key}, SATIN)
+    Path("bare.xml").write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
 
 
 @pytest.fixture(scope="module")
@@ -408,26 +280,29 @@ def clear():
     shutil.rmtree("broken", ignore_errors=True)
 
 
-def faults(code, sentence, shown):
-    """Return what is wrong with the end of a command."""
+def faults(code, sentence, shown, words=()):
+    """Return what is wrong with the end of a command, whose sentence should have some words."""
     lines = sentence.splitlines()
     found = [] if code in (1, 2) else [f"exit code {code}"]
     found += [] if len(lines) == 1 else [f"{len(lines)} lines on stderr"]
     found += [f"{len(line)} letters" for line in lines if len(line) > MOST_LETTERS]
     found += ["control characters"] if not (sentence + shown).replace("\n", "").isprintable() else []
-    return found + [word for word in ("Traceback", "this is a bug") if word in sentence]
+    found += [word for word in ("Traceback", "this is a bug") if word in sentence]
+    return found + [f"lacks {part!r}" for part in words if part not in sentence]
 
 
-def wrong_end(command, capsys):
-    """Run a command that must be refused; return what is wrong with its end, and its sentence."""
+def wrong_end(command, capsys, words=""):
+    """Run a command that must be refused; return what is wrong with its end, its sentence, and files that it left."""
+    before = set(Path().iterdir())
     signal.signal(signal.SIGALRM, _late)
     signal.alarm(SECONDS)
     try:
-        code = main(command.split(" "))
+        code = main(shlex.split(command))
     finally:
         signal.alarm(0)
     captured = capsys.readouterr()
-    wrong = faults(code, captured.err, captured.out)
+    wrong = faults(code, captured.err, captured.out, words.split(" & "))
+    wrong += [f"wrote {name}" for name in set(Path().iterdir()) - before]
     return [(command[:100], wrong, code, captured.err[:1000])] if wrong else []
 
 
@@ -498,13 +373,13 @@ def test_any_other_json_is_refused(name, place, capsys):
     assert not wrong
 
 
-@pytest.mark.parametrize("verb", sorted({command.partition(" ")[0] for command in COMMANDS}))
+@pytest.mark.parametrize("verb", sorted({command.partition(" ")[0] for command, _ in COMMANDS}))
 def test_a_command_that_cannot_be_used_is_refused(verb, place, capsys):
-    commands = [command for command in COMMANDS if command.partition(" ")[0] == verb]
     wrong = []
-    for command in commands:
-        clear()
-        wrong += wrong_end(command, capsys)
+    for command, words in COMMANDS:
+        if command.partition(" ")[0] == verb:
+            clear()
+            wrong += wrong_end(command, capsys, words)
     assert not wrong
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jobs.verbs.run
-from jobs.cli import main
+import jobs.verbs.show
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -16,20 +16,6 @@ from reports.images.exr import read_exr
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
-
-
-@pytest.fixture
-def twillight(capsys, monkeypatch, tmp_path):
-    """Run the command line in a folder of its own; return exit code, output and complaint."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*tokens):
-        code = main(tokens)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 def complaint(answer, code=2):
@@ -71,7 +57,8 @@ def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
+def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path, monkeypatch):
+    monkeypatch.setattr(jobs.verbs.show, "SWATCH_SIZE", "32x24")
     code, text, _ = twillight("show", "denim", "--out", "shown")
     kinds = ("drawdown.png", "colours.png", "height.png", "normals.png", "maps.exr", "swatch.png")
     names = [f"denim-{kind}" for kind in kinds]
@@ -81,50 +68,6 @@ def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
     geometry = surface_at(load_fabric("denim"), np.array([1.5 / 64]), np.array([2.5 / 64]))
     assert maps.channels["height"][-3, 1] == pytest.approx(geometry.height[0], abs=1e-6)
     assert maps.stack("normal.X", "normal.Y", "normal.Z")[-3, 1] == pytest.approx(geometry.normal[0], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("tokens", "words"),
-    [
-        (["plna", "quick"], ["plna", 'Did you mean "plan"']),
-        (["generate", "quick", "--workrs", "2"], ["--workrs", "Did you mean --workers"]),
-        (["generate", "quick", "--workers", "two"], ["two"]),
-        (["plan"], ["recipe"]),
-        (["plan", "quik"], ["'quik'", "did you mean 'quick'"]),
-        (["plan", "missing.toml"], ["missing.toml", "no such file"]),
-        (["plan", "broken.toml"], ["broken.toml", "line 1"]),
-        (["show", "denin"], ["'denin'", "did you mean 'denim'"]),
-        (["show", "nan.toml"], ["nan.toml", "warp.bend = nan", "finite"]),
-        (["show", "satin.toml"], ["satin.toml", "draft.move = 3"]),
-        (["check", "denim", "--repair"], ["--repair", "'denim'", "name a recipe"]),
-        (["check", "smoke", "--repair"], ["holds no products", "`twillight run smoke`"]),
-        (["check", "."], ["manifest.json", "does not exist"]),
-        (["check", "denin"], ["'denin'", "did you mean 'denim'", "ablations"]),
-        (["check", "quik"], ["'quik'", "did you mean 'quick'", "denim"]),
-        (["check", "missing.toml"], ["missing.toml", "no such file"]),
-        (["check", "satin.toml"], ["satin.toml", "draft.move = 3"]),
-        (["check", "neither.toml"], ["neither.toml", "has neither [dataset] nor [draft]"]),
-        (["check", "twill_4_4"], ["'twill_4_4'", "is both preset and folder", "./twill_4_4"]),
-        (["generate", "smoke", "--out", "nan.toml"], ["nan.toml", "a folder that can be written"]),
-        (["generate", "smoke", "--scheduler", "tcp//nowhere"], ["tcp//nowhere", "no dask scheduler"]),
-    ],
-)
-def test_bad_input_ends_with_one_sentence_and_code_2(twillight, tmp_path, tokens, words):
-    (tmp_path / "broken.toml").write_text("name = \n")
-    (tmp_path / "neither.toml").write_text('name = "x"\n')
-    (tmp_path / "twill_4_4").mkdir()
-    fabric = (
-        'name = "x"\n[draft]\n{draft}\n[warp]\nbend = {bend}\nroughness = 0.3\n[weft]\nbend = 20\nroughness = 0.3\n'
-    )
-    (tmp_path / "nan.toml").write_text(fabric.format(draft='family = "plain"', bend="nan"))
-    (tmp_path / "satin.toml").write_text(fabric.format(draft='family = "satin"\nends = 6\nmove = 3', bend="20"))
-    sentence = complaint(twillight(*tokens))
-    for word in words:
-        assert word in sentence, sentence
-
-
-def test_work_left_out_is_failed_work(twillight):
-    assert "run `twillight generate` first" in complaint(twillight("train", "smoke"), code=1)
 
 
 def _caused(error, by):

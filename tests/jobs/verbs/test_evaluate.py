@@ -69,49 +69,6 @@ def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
     assert listed == ["row,column,value,reason", "3,sigma,0.0,must be greater than 0"]
 
 
-@pytest.mark.parametrize(
-    ("tokens", "said"),
-    [
-        (["missing.parquet"], "missing.parquet: no such file"),
-        (["file"], "file: not a whole Parquet file"),
-        (["cut.parquet"], "cut.parquet: not a whole Parquet file"),
-        (["."], "is a folder: a Parquet file is needed"),
-        (["bad.parquet"], "row 4, column wi_x..z = [0.6, 0.0, 3.0]: must have unit length (1 more bad row;"),
-        (["queries.parquet", "--out", "queries.parquet"], "must not be the file of the queries"),
-        (["queries.parquet", "--out", "."], "is a folder"),
-        (["queries.parquet", "--out", "file/result.parquet"], "a folder that can be written is needed"),
-        (["queries.parquet", "--estimator", "oven"], "--estimator = 'oven': did you mean 'owen'? known: "),
-        (["queries.parquet", "--relative-error", "0"], "--relative-error = 0.0: Input should be greater than 0"),
-        (["queries.parquet", "--relative-error", "1.5"], "--relative-error = 1.5"),
-        (["queries.parquet", "--relative-error", "nan"], "--relative-error = nan"),
-        (["queries.parquet", "--footprint", "ring"], "--footprint = 'ring': Input should be 'gaussian' or 'box'"),
-        (["queries.parquet", "--max-count", "1000"], "must be a power of two"),
-        (["queries.parquet", "--seed", "-1"], "--seed = -1: must be from 0"),
-        (["queries.parquet", "--seed", "one"], "one"),
-        (["queries.parquet", "--workers", "-1"], "--workers = -1: must be from 0 (one per core) to 1024"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_nothing_is_written(twillight, tmp_path, tokens, said):
-    (tmp_path / "file").write_text("no table")
-    content = (tmp_path / "queries.parquet").read_bytes()
-    (tmp_path / "cut.parquet").write_bytes(content[:-100])
-    columns = query_columns()
-    columns["wi_z"][[4, 9]] = 3.0
-    pq.write_table(pa.table(columns), tmp_path / "bad.parquet")
-    before = sorted(path.name for path in tmp_path.iterdir())
-    code, text, complaint = twillight(*tokens, *([] if "--out" in tokens else ["--out", "result.parquet"]))
-    assert code == 2 and text == "" and said in complaint, complaint
-    assert complaint.count("\n") == 1 and "Traceback" not in complaint
-    assert sorted(path.name for path in tmp_path.iterdir()) == before
-    assert (tmp_path / "queries.parquet").read_bytes() == content
-
-
-def test_an_unknown_fabric_and_a_missing_option_are_named(twillight):
-    assert "did you mean 'denim'" in twillight("queries.parquet", "--out", "result.parquet", fabric="denin")[2]
-    code, _, complaint = twillight("queries.parquet")
-    assert code == 2 and "--out" in complaint
-
-
 def test_ctrl_c_says_that_nothing_was_written(twillight, tmp_path, monkeypatch):
     def stop(*arguments, **options):
         raise KeyboardInterrupt

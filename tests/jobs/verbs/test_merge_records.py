@@ -31,18 +31,3 @@ def test_records_of_two_machines_are_joined_and_shown(files, tmp_path, capsys, m
     assert "woven" in said and "50" in said and "20" in said and "3 Records of 2 machines; 1 are alike" in said
     assert main(["compare", str(out), files[0]]) == 2
     assert "holds Records of several machines" in capsys.readouterr().err
-
-
-def test_what_cannot_be_joined_is_refused_in_a_sentence(files, tmp_path, capsys):
-    out = str(tmp_path / "all.json")
-    for arguments, sentence in (
-        ([files[0], "--out", out], "two files of Records or more are needed"),
-        ([*files, "--out", files[0]], "is one of the files to join"),
-        ([*files, "--out", str(tmp_path / "all.txt")], "ending in .json"),
-        ([*files, "--out", str(tmp_path / "none" / "all.json")], "in a folder that exists"),
-        ([files[0], str(tmp_path / "nothing"), "--out", out], "does not exist"),
-    ):
-        assert main(["records", "merge", *arguments]) == 2
-        complaint = capsys.readouterr().err
-        assert sentence in complaint and complaint.count("\n") == 1, complaint
-    assert read_records([tmp_path / "2.json"]) == [MSE, TIME]

@@ -9,7 +9,6 @@ from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE
 from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
-from weaves.errors import BadInput
 
 
 def finish(ledger, task, seconds):
@@ -63,12 +62,6 @@ def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys
     told = capsys.readouterr().out.replace("\n", " ")
     for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in " ".join(told.split())
-
-
-@pytest.mark.parametrize("workers", ["-1", "100001"])
-def test_an_impossible_number_of_workers_is_refused(files, out, capsys, workers):
-    assert main(["plan", str(files.path), "--out", str(out), "--workers", workers]) == BadInput.exit_code
-    assert "--workers" in capsys.readouterr().err
 
 
 def test_a_plan_of_a_folder_that_is_not_there_is_one_of_new_tasks(files, tmp_path, capsys):

@@ -95,16 +95,3 @@ def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_pa
     freed = said.split(f"{shards.relative_to(tmp_path / 'out')} 5 ")[1].split()
     manifest = (shards / "manifest.json").stat().st_size
     assert freed[1] == "kB" and float(freed[0]) == pytest.approx(manifest / 1000, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("tokens", "words"),
-    [
-        (["narrow.toml", "--out", "nothing"], "holds no products"),
-        (["quik"], "did you mean 'quick'"),
-        ([], "recipes"),
-    ],
-)
-def test_bad_input_is_one_sentence(two, tokens, words):
-    code, _, told = two(*tokens)
-    assert code == 2 and words in told.lower() and told.count("\n") == 1

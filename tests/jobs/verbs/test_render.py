@@ -177,43 +177,6 @@ def test_a_mitsuba_file_has_its_own_size_and_wears_the_fabric_that_is_named(rend
     assert exr.stack(*"RGB")[exr.channels["A"] == 1].mean() > 0.05
 
 
-BARE = '<scene version="3.0.0"><shape type="sphere"/></scene>'
-
-
-@pytest.mark.parametrize(
-    ("tokens", "says"),
-    [
-        (("nix", "--out", "a.png"), "or a scene that comes with the package"),
-        (("bare.xml", "--out", "a.png"), "a shape must wear a fabric"),
-        (("drape", "--out", "a.gif"), "must end in .png, .exr or .mp4"),
-        (("drape", "--out", "there"), "File exists"),
-        (("drape", "--out", "bare.xml/a.png"), "a folder that can be written"),
-        (("drape", "--out", "folder.png"), "is a folder"),
-        (("drape", "--out", "a.png", "--size", "0x3"), "each from 1 to 16384"),
-        (("drape", "--out", "a.png", "--size", "1000000x1000000"), "each from 1 to 16384"),
-        (("drape", "--out", "a.png", "--size", "big"), "WIDTHxHEIGHT"),
-        (("drape", "--out", "a.png", "--samples", "5"), "must be one of 1, 4, 9"),
-        (("drape", "--out", "a.png", "--samples", "1000000"), "must be one of 1, 4, 9"),
-        (("drape", "--out", "a.png", "--directions", "0"), "greater than or equal to 4"),
-        (("drape", "--out", "a.png", "--exposure", "nan"), "from -20 to 20 stops"),
-        (("drape", "--out", "a.png", "--frames", "2"), "holds one frame"),
-        (("drape", "--out", "film", "--frames", "0"), "from 1 to 100000"),
-        (("drape", "--out", "a.png", "--method", "selvege"), "did you mean"),
-        (("drape", "--out", "a.png", "--method", "woven"), "must be trained first"),
-        (("drape", "--out", "a.png", "--fabric", "nix"), "a preset is needed"),
-        (("drape", "--out", "a.png", "--fabric", "denim", "--fabric", "voile"), "one fabric more than cloths"),
-        (("drape", "--out", "a.png", "--tone", "film"), "srgb"),
-    ],
-)
-def test_bad_input_is_one_sentence(render, tmp_path, tokens, says):
-    (tmp_path / "bare.xml").write_text(BARE)
-    (tmp_path / "folder.png").mkdir()
-    (tmp_path / "there").write_text("a file where the folder should be")
-    code, _, complaint = render(*tokens)
-    assert code == 2 and complaint.count("\n") == 1 and says in complaint
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.xml", "folder.png", "there"]
-
-
 def test_without_the_library_for_films_a_sentence_names_it(render, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     code, _, complaint = render("drape", "--out", "a.mp4")

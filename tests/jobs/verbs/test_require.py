@@ -125,24 +125,6 @@ def test_a_method_that_only_an_old_page_has_is_refused(require, tmp_path):
     assert require("plane", "--method", "point_sampled")[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("tokens", "words"),
-    [
-        (["plane", "--method", "wovn"], "did you mean 'woven'"),
-        (["plane", "--error", "0"], "--error = 0.0: must be > 0"),
-        (["plane", "--time", "nan"], "--time = nan: must be > 0"),
-        (["plane", "--margin", ".5"], "--margin = 0.5: must be >= 1"),
-        (["plane", "--effort", "0"], "--effort = 0.0: must be > 0"),
-        (["plane", "--set", "hidden"], "--set = 'hidden': must be KEY=VALUE"),
-        (["plain"], "did you mean 'plane'"),
-        (["attic.toml"], "no such file"),
-    ],
-)
-def test_bad_input_is_one_sentence(require, tokens, words):
-    code, text, told = require(*tokens)
-    assert (code, text) == (2, "") and told.count("\n") == 1 and words in told, told
-
-
 def test_without_a_page_it_says_so(require, tmp_path):
     (tmp_path / "out" / "report" / "wide" / OF_A_PAGE).unlink()
     code, _, told = require("plane")

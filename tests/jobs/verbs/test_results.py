@@ -50,12 +50,3 @@ def test_only_the_block_of_a_readme_is_written(out, capsys):
     capsys.readouterr()
     assert main(["results", "smoke", "--out", str(out), "--readme", str(file)]) == 0
     assert "unchanged" in capsys.readouterr().out and file.read_text(encoding="utf-8") == text
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [(["quick"], "no page of the recipe quick"), (["smoke", "--readme", "none.md"], "none.md: does not exist")],
-)
-def test_what_is_missing_is_said_in_one_sentence(out, capsys, options, said):
-    assert main(["results", *options, "--out", str(out)]) == 2
-    assert said in capsys.readouterr().err

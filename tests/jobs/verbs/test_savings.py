@@ -259,8 +259,3 @@ def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):
     assert "its page is older than the recipe" in refused()
     runs.own.write_text(runs.own.read_text().replace('name = "neumip"', 'name = "other"'))
     assert "no such method" in refused()
-
-
-def test_scenes_that_do_not_exist_are_refused(runs, capsys):
-    assert main(["savings", str(runs.general), "spere", "--out", str(runs.out)]) == 2
-    assert "did you mean 'sphere'" in capsys.readouterr().err

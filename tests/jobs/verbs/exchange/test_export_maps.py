@@ -179,27 +179,6 @@ def test_a_full_disk_leaves_the_maps_of_before(folder, tmp_path, monkeypatch, ca
     assert not filecmp.dircmp(folder, made).diff_files and len([*made.iterdir()]) == len([*folder.iterdir()])
 
 
-@pytest.mark.parametrize(
-    ("tokens", "sentence"),
-    [
-        (["--maps", "a", "--size", "0"], "must be a power of two from 64 to 4096"),
-        (["--maps", "a", "--size", "1000000"], "must be a power of two from 64 to 4096"),
-        (["--maps", "file"], "is no folder"),
-        (["--maps", "file/a"], "a folder that can be written is needed"),
-        (["--maps", "a", "--vertices", "8"], "--vertices = 8: is not for maps"),
-        (["--mesh", "a.ply", "--size", "64"], "--size = 64: is not for mesh"),
-    ],
-)
-def test_what_cannot_be_written_is_said_in_one_sentence(tmp_path, monkeypatch, capsys, tokens, sentence):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    (tmp_path / "file").touch()
-    assert call("denim", *tokens) == 2
-    said = capsys.readouterr().err
-    assert sentence in said and len(said.splitlines()) == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
 @pytest.mark.parametrize("library", ["MaterialX", "pygltflib"])
 def test_a_missing_library_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, capsys, library):
     monkeypatch.setenv("COLUMNS", "200")

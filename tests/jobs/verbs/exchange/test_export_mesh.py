@@ -3,7 +3,6 @@
 import re
 
 import numpy as np
-import pytest
 
 from jobs.cli import main
 from weaves.fabric import load_fabric
@@ -68,31 +67,6 @@ def _srgb(linear):
     """Encode as IEC 61966-2-1 does, in 8 bits."""
     linear = np.asarray(linear)
     return 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-@pytest.mark.parametrize(
-    ("tokens", "said"),
-    [
-        (["denin", "--mesh", "a.ply"], "did you mean 'denim'"),
-        (["denim", "--mesh", "a.obj"], "a path that ends in .ply is needed"),
-        (["denim", "--mesh", "a.ply", "--vertices", "1"], "--vertices = 1: must be at least 2"),
-        (["denim", "--mesh", "a.ply", "--repeats", "0"], "--repeats = 0: must be at least 1"),
-        (["denim", "--mesh", "a.ply", "--vertices", "many"], "many"),
-        (["denim", "--mesh", "a.ply", "--vertices", "9999"], "with fewer vertices or repeats"),
-        (["denim", "--mesh", "file/a.ply"], "a folder that can be written is needed"),
-        (["denim"], "nothing: one of --mesh, --wif, --maps and --shader is needed"),
-        (
-            ["denim", "--mesh", "a.ply", "--wif", "a.wif"],
-            "--mesh and --wif: one of --mesh, --wif, --maps and --shader is needed",
-        ),
-    ],
-)
-def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, said):
-    (tmp_path / "file").write_text("no folder")
-    code, text, complaint = twillight("export", *tokens)
-    assert code == 2 and text == "" and said in complaint
-    assert complaint.count("\n") == 1 and "Traceback" not in complaint
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_help_lists_export_after_show(capsys, monkeypatch):

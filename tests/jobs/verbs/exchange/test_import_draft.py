@@ -1,7 +1,5 @@
 """`twillight import` and `export --wif`: the files, what is printed, and the sentences for what cannot be used."""
 
-import pytest
-
 from tests.weaves.draft_files.drafts import numbered, wif
 from weaves.fabric import load_fabric
 
@@ -33,29 +31,3 @@ def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
     assert twillight("import", "h.wif", "--out", "h.toml", "--like", "herringbone")[0] == 0
     first, again = load_fabric("herringbone"), load_fabric(tmp_path / "h.toml")
     assert again.weave == first.weave and again.optics() == first.optics()
-
-
-@pytest.mark.parametrize(
-    ("tokens", "said"),
-    [
-        (["import", "nothing.wif", "--out", "b.toml"], "nothing.wif: no such file"),
-        (["import", "a.jpg", "--out", "b.toml"], "its name must end in .wif"),
-        (["import", "a.wif", "--out", "b.txt"], "a path that ends in .toml is needed"),
-        (["import", "a.wif", "--out", "b.toml", "--like", "denin"], "did you mean 'denim'"),
-        (["import", "a.wif", "--out", "b.toml", "--name", "Ü"], "a name has 1 to 60 letters"),
-        (["import", "a.wif", "--out", "b.toml", "--warp.bend", "95"], "warp.bend = 95"),
-        (["import", "a.wif", "--out", "b.toml", "--warp.twist", "nan"], "warp.twist = nan"),
-        (["import", "bad.wif", "--out", "b.toml"], "[THREADING] is missing"),
-        (["import", "a.wif", "--out", "a.wif/b.toml"], "a folder that can be written is needed"),
-        (["import", "a.wif"], "--out"),
-        (["export", "denim", "--wif", "b.txt"], "a path that ends in .wif is needed"),
-        (["export", "denim", "--wif", "b.wif", "--repeats", "2"], "--repeats = 2: is not for wif; leave it out"),
-    ],
-)
-def test_bad_input_is_one_sentence(twillight, tmp_path, tokens, said):
-    (tmp_path / "a.wif").write_text(wif(), encoding="utf-8")
-    (tmp_path / "bad.wif").write_text(wif(THREADING=None), encoding="utf-8")
-    code, text, complaint = twillight(*tokens)
-    assert code == 2 and text == "" and said in complaint
-    assert complaint.count("\n") == 1 and "Traceback" not in complaint
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.wif", "bad.wif"]

@@ -1,26 +1,8 @@
 """`twillight view` on the command line."""
 
-import pytest
-
 from jobs.cli import main
 from reports.viewer import view
 from tests.reports.viewer.conftest import find
-
-
-@pytest.mark.parametrize(
-    ("tokens", "allowed"),
-    [
-        (("--out", "x.htm"), "a path that ends in .html is needed"),
-        (("--out", "x.html", "--truth", "5"), "must be from 8 to 512, or 0 for none"),
-        (("--out", "x.html", "--truth", "-1"), "must be from 8 to 512, or 0 for none"),
-    ],
-)
-def test_bad_input_is_one_sentence(capsys, monkeypatch, tmp_path, tokens, allowed):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    assert main(["view", "gingham", *tokens]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and allowed in said and not list(tmp_path.iterdir())
 
 
 def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path):
