@@ -10,6 +10,7 @@ Credentials come from the environment, as each file system of fsspec defines it 
 
 from __future__ import annotations
 
+import os
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -98,6 +99,18 @@ def fetch(path: Path, target: Path) -> None:
     """Copy a file of object storage to this machine."""
     remote: Any = path
     remote.fs.get_file(remote.path, str(target))
+
+
+def workspace(out: Path) -> Path:
+    """Return the folder of this machine and user for an address, made if it is missing; BadInput if it cannot be."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "twillight" / fingerprint(str(out))
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:  # no folder of all users instead: a stranger may have put files there
+        allowed = "XDG_CACHE_HOME must name a folder that can be written"
+        raise BadInput(str(cache), "", error.strerror or error, allowed) from error
+    return folder
 
 
 class Stored(NamedTuple):

@@ -7,9 +7,24 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
-from jobs.plan.task import Task, urgencies
+from jobs.plan.task import Task
+
+
+def chains(tasks: Sequence[Task], seconds: Mapping[str, float]) -> dict[str, float]:
+    """Return for each task the seconds of the longest chain of tasks that starts with it, from those of each task.
+
+    Taking the longest chain first is the classical list schedule [Graham1969Bounds]. The longest of all is the time
+    that no number of workers beats.
+    """
+    after = dict.fromkeys((task.id for task in tasks), 0.0)
+    chain = {}
+    for task in reversed(tasks):  # a plan lists every task after those it needs
+        chain[task.id] = seconds[task.id] + after[task.id]
+        for need in after.keys() & set(task.needs):
+            after[need] = max(after[need], chain[task.id])
+    return chain
 
 
 class Ready:
@@ -25,7 +40,7 @@ class Ready:
 
     def __init__(self, tasks: Sequence[Task], finished: Iterable[str]) -> None:
         self._done = set(finished)
-        self._order = {id: -seconds for id, seconds in urgencies(tasks).items()}
+        self._order = {id: -chain for id, chain in chains(tasks, {task.id: task.cost for task in tasks}).items()}
         self._waiting: dict[str, Task] = {}
         self._unmet: dict[str, int] = {}  # of every task that has ever waited; right for those that wait
         self._after: dict[str, list[str]] = {}
@@ -59,7 +74,7 @@ class Ready:
         return taken
 
     def free(self, task: Task) -> None:
-        """Note that a started task has ended, so that its slot is free; `finish`, `fail` or `again` follows."""
+        """Note that a started task has ended, so that its slot is free; what needs a task that failed stays waiting."""
         self._running.pop(task.id, None)
 
     def finish(self, task: Task) -> None:
@@ -71,10 +86,6 @@ class Ready:
                 self._unmet[id] -= 1
                 if not self._unmet[id]:
                     self._push(self._waiting[id])
-
-    def fail(self, task: Task) -> None:
-        """Note that a started task failed; what needs it stays waiting."""
-        self.free(task)
 
     def again(self, task: Task) -> None:
         """Put a started task back, to be started once more when its needs are done."""

@@ -1,8 +1,15 @@
-"""Schedule: how long a plan takes on some workers, simulated with the rule by which a run starts its tasks."""
+"""How long tasks take on this machine, and a plan on some workers.
+
+Times of tasks follow from the costs that they state and the times that others took. A schedule is simulated with the
+rule by which a run starts its tasks.
+"""
 
 from __future__ import annotations
 
 import heapq
+import math
+import time
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
@@ -11,6 +18,13 @@ from jobs.plan.task import Task
 
 LEAST_GAIN: Final = 0.05
 """Share of the time that twice the workers must save; else the plan has stopped scaling."""
+
+# Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. Short tasks, whose
+# cost is less than what any task takes, say nothing about long ones.
+_WEIGHTS: Final = (10.0, 10.0, 0.5)
+_LEAST_SHARE: Final = 0.05  # of a task under way, from which its own speed is known
+_MOST_LOAD: Final = 0.02  # of the driver's time that goes into estimates
+_SECONDS_BETWEEN: Final = 1.0  # two estimates
 
 
 class Schedule(NamedTuple):
@@ -33,54 +47,108 @@ class Schedule(NamedTuple):
     work: float
     tail: float
 
+    @classmethod
+    def of(cls, tasks: Sequence[Task], seconds: Mapping[str, float], workers: int) -> Schedule:
+        """Simulate a run.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            The tasks to do; needs outside them count as done.
+        seconds : mapping
+            Duration of each task, by its id.
+        workers : int
+            Number of workers, each with one task at a time.
+        """
+        own = {task.id for task in tasks}
+        ready = Ready(tasks, {need for task in tasks for need in task.needs if need not in own})
+        running: list[tuple[float, int, Task]] = []  # with the time of its end
+        now = full = 0.0
+        number = 0
+        while True:
+            for task in ready.take(workers):
+                number += 1
+                heapq.heappush(running, (now + seconds[task.id], number, task))
+            if not running:
+                return cls(workers, now, sum(seconds[task.id] for task in tasks), now - full)
+            if len(running) == workers:
+                full = running[0][0]  # all are busy until the first ends
+            now, _, ended = heapq.heappop(running)
+            ready.finish(ended)
+
     @property
     def efficiency(self) -> float:
         """Share of the workers' time in which they are busy."""
         return self.work / (self.makespan * self.workers) if self.makespan else 1.0
 
 
-def schedule(tasks: Sequence[Task], seconds: Mapping[str, float], workers: int) -> Schedule:
-    """Simulate a run.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The tasks to do; needs outside them count as done.
-    seconds : mapping
-        Duration of each task, by its id.
-    workers : int
-        Number of workers, each with one task at a time.
-    """
-    own = {task.id for task in tasks}
-    ready = Ready(tasks, {need for task in tasks for need in task.needs if need not in own})
-    running: list[tuple[float, int, Task]] = []  # with the time of its end
-    now = full = 0.0
-    number = 0
-    while True:
-        for task in ready.take(workers):
-            number += 1
-            heapq.heappush(running, (now + seconds[task.id], number, task))
-        if not running:
-            return Schedule(workers, now, sum(seconds[task.id] for task in tasks), now - full)
-        if len(running) == workers:
-            full = running[0][0]  # all are busy until the first ends
-        now, _, ended = heapq.heappop(running)
-        ready.finish(ended)
-
-
 def doublings(tasks: Sequence[Task], seconds: Mapping[str, float]) -> list[Schedule]:
     """Return the schedules of 1, 2, 4, … workers, up to the first number that stops scaling."""
-    found = [schedule(tasks, seconds, 1)]
+    found = [Schedule.of(tasks, seconds, 1)]
     while found[-1].makespan > 0 and found[-1].workers < len(tasks):
-        found.append(schedule(tasks, seconds, 2 * found[-1].workers))
+        found.append(Schedule.of(tasks, seconds, 2 * found[-1].workers))
         if found[-1].makespan > (1 - LEAST_GAIN) * found[-2].makespan:
             break
     return found
 
 
-def longest_chain(tasks: Sequence[Task], seconds: Mapping[str, float]) -> float:
-    """Return the seconds of the longest chain of tasks that need each other; no number of workers is faster."""
-    end: dict[str, float] = {}
-    for task in tasks:  # each after those it needs
-        end[task.id] = seconds[task.id] + max((end.get(need, 0.0) for need in task.needs), default=0.0)
-    return max(end.values(), default=0.0)
+class Estimate:
+    """Seconds that tasks take.
+
+    What finished tasks took is compared with their cost, by kind, by stage and overall. A kind of which little was done
+    is assumed to be as its stage, and a stage as everything. Before anything was done a cost is taken as it is.
+    """
+
+    def __init__(self) -> None:
+        self._sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])  # seconds and costs, by kind
+        self._end = self._next = -math.inf  # of the run, as last estimated; when the next estimate is due
+
+    def learn(self, task: Task, seconds: float) -> None:
+        """Take the time of a finished task."""
+        for kind in _kinds(task):
+            self._sums[kind][0] += seconds
+            self._sums[kind][1] += task.cost
+
+    def seconds(self, task: Task) -> float:
+        """Return how long a task takes on one worker."""
+        ratio = 1.0
+        for kind, weight in zip(_kinds(task), _WEIGHTS, strict=True):
+            seconds, cost = self._sums.get(kind, (0.0, 0.0))
+            ratio = (seconds + ratio * weight) / (cost + weight)
+        return ratio * task.cost
+
+    def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
+        """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            The tasks that have not ended, each after those it needs.
+        under_way : mapping
+            Of those that have begun the time of the beginning, by `time.monotonic`, and the finished share; by id.
+        workers : int
+            Number of workers.
+        """
+        now = time.monotonic()
+        if not tasks:
+            return 0.0
+        if now >= self._next:
+            seconds = {task.id: self.seconds(task) for task in tasks}
+            for id, (began, share) in under_way.items():
+                if id in seconds:
+                    seconds[id] = _rest(seconds[id], now - began, share)
+            self._end = now + Schedule.of(tasks, seconds, max(1, workers)).makespan
+            self._next = now + max(_SECONDS_BETWEEN, (time.monotonic() - now) / _MOST_LOAD)
+        return max(0.0, self._end - now)
+
+
+def _rest(seconds: float, elapsed: float, share: float) -> float:
+    """Return how long a task under way goes on; `seconds` is the estimate of the whole."""
+    if share >= _LEAST_SHARE:
+        return elapsed * (1 - share) / share
+    return max(seconds - elapsed, 0.1 * elapsed)
+
+
+def _kinds(task: Task) -> tuple[str, str, str]:
+    """Return the names under which times are collected, the narrowest last."""
+    return "", task.stage, f"{task.stage} {task.group}"

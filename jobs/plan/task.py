@@ -7,7 +7,7 @@ work is the same task in another recipe, in another order or on more workers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
@@ -133,20 +133,6 @@ class Task(TaskPart):
     def run(self, out: Path, progress: Progress) -> None:
         """Do the work in a worker process; the products then lie in `out`. Heavy libraries are imported here."""
         raise NotImplementedError
-
-
-def urgencies(tasks: Sequence[Task]) -> dict[str, float]:
-    """Return for each task the estimated seconds of the longest chain of tasks that starts with it.
-
-    Taking the longest chain first is the classical list schedule [Graham1969Bounds].
-    """
-    after = dict.fromkeys((task.id for task in tasks), 0.0)
-    chain = {}
-    for task in reversed(tasks):  # a plan lists every task after those it needs
-        chain[task.id] = task.cost + after[task.id]
-        for need in after.keys() & set(task.needs):
-            after[need] = max(after[need], chain[task.id])
-    return chain
 
 
 def _optics(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> Any:

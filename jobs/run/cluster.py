@@ -14,10 +14,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from http.client import HTTPException
 from pathlib import Path
 from typing import Any, Final, NamedTuple
-from urllib.request import ProxyHandler, build_opener
 
 from pipeline.own_process import ONE_THREAD, interrupts_held
 from weaves.errors import BadInput, WorkFailed
@@ -116,17 +114,6 @@ def _external(scheduler: Scheduler, say: Callable[[str], None]) -> Iterator[Any]
                 raise BadInput("--scheduler", "", given, "this scheduler has no worker: start one") from error
             needed.result()
         yield client
-
-
-def dashboard_of(client: Any) -> str | None:
-    """Return the address of the scheduler's dashboard; None if it has none that this machine can open."""
-    try:
-        address = str(client.dashboard_link)
-        # A scheduler names an address also without a dashboard, and then has no page there.
-        build_opener(ProxyHandler({})).open(address, timeout=_SECONDS).close()
-    except (KeyError, OSError, ValueError, HTTPException):
-        return None
-    return address
 
 
 async def _answer(address: str, security: Any) -> None:

@@ -27,56 +27,48 @@ _LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "owen")
 
 
 class KernelGroup(NamedTuple):
-    """Kernels that are compiled together.
-
-    Attributes
-    ----------
-    name : str
-        The estimator, or the model's name.
-    model : Options or None
-        Options of the model; None for an estimator.
-    """
+    """Kernels that are compiled together: those of an estimator, or of a model."""
 
     name: str
-    model: Options | None
+    """The estimator, or the model's name."""
+    model: Options | None = None
+    """Options of the model; None for an estimator."""
+
+    def compile(self, ready: Callable[[str], None]) -> None:
+        """Compile the kernels, or read them from the cache; `ready` is called with the name of each kernel."""
+        from pipeline.compiled.decorators import announced
+        from pipeline.models.registry import load_methods
+        from pipeline.shards.queries import QueryOptions, draw_queries
+        from pipeline.truth.estimator import estimate
+        from weaves.fabric import load_fabric, preset_names
+
+        fabric = load_fabric(preset_names()[0])
+        # Rotated footprints call kernels that round ones do not.
+        kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if self.name == "auto" else [QueryOptions()]
+        with announced(ready):
+            for kind in kinds:
+                queries = draw_queries(kind, fabric.weave.repeat, 0, 0, _ROWS)
+                if self.model is None:
+                    options = {"estimator": self.name, "min_count": 32, "max_count": 32}
+                    estimate(fabric, queries, TruthOptions.model_validate(options), 0)
+                else:
+                    for method in load_methods(self.model):
+                        method.predict(fabric, queries)
 
 
 def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
     """Return the groups that some tasks use, those that take longest first."""
-    found: dict[str, KernelGroup] = {}
+    groups: dict[str, KernelGroup] = {}
     for task in tasks:
         for name in _estimators(task):
             name = "owen" if name in _SAMPLED else name
-            found[name] = KernelGroup(name, None)
+            groups[name] = KernelGroup(name)
         for options in _models(task):
             # The value of the parameter is an argument of the same kernels.
-            found.setdefault(
-                options.model_dump_json(exclude={"name", options.parameter}), KernelGroup(options.name, options)
-            )
+            key = options.model_dump_json(exclude={"name", options.parameter})
+            groups.setdefault(key, KernelGroup(options.name, options))
     order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
-    return sorted(found.values(), key=lambda group: order.get(group.name, len(order)))
-
-
-def compile_group(group: KernelGroup, ready: Callable[[str], None]) -> None:
-    """Compile the kernels of a group, or read them from the cache; `ready` is called with the name of each kernel."""
-    from pipeline.compiled.decorators import announced
-    from pipeline.models.registry import load_methods
-    from pipeline.shards.queries import QueryOptions, draw_queries
-    from pipeline.truth.estimator import estimate
-    from weaves.fabric import load_fabric, preset_names
-
-    fabric = load_fabric(preset_names()[0])
-    # Rotated footprints call kernels that round ones do not.
-    kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if group.name == "auto" else [QueryOptions()]
-    with announced(ready):
-        for kind in kinds:
-            queries = draw_queries(kind, fabric.weave.repeat, 0, 0, _ROWS)
-            if group.model is None:
-                options = {"estimator": group.name, "min_count": 32, "max_count": 32}
-                estimate(fabric, queries, TruthOptions.model_validate(options), 0)
-            else:
-                for method in load_methods(group.model):
-                    method.predict(fabric, queries)
+    return sorted(groups.values(), key=lambda group: order.get(group.name, len(order)))
 
 
 def _estimators(task: Task) -> Iterator[str]:

@@ -8,17 +8,19 @@ computed there.
 from __future__ import annotations
 
 import time
-import traceback
 import uuid
-from collections.abc import Callable, Collection, Mapping
-from functools import cache
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from http.client import HTTPException
 from queue import Empty, SimpleQueue
 from typing import Any, Final
+from urllib.request import ProxyHandler, build_opener
 
 from jobs.plan.task import Task
-from jobs.run.outcome import KILLED, Outcome, one_line, work
+from jobs.run.compiling import KernelGroup
+from jobs.run.outcome import Outcome, work
 from jobs.run.receipt import Product
-from jobs.run.software import difference, digest, software
+from jobs.run.software import difference, software
 from pipeline import patience
 from pipeline.storage import place
 from weaves.errors import WorkFailed
@@ -26,6 +28,8 @@ from weaves.errors import WorkFailed
 _SECONDS_BETWEEN_LOOKS: Final = 1.0
 _SECONDS_BETWEEN_SIGNS: Final = 0.2
 _SECONDS_FOR_AN_ERROR: Final = 5.0
+_SECONDS_FOR_A_PAGE: Final = 5.0
+_SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 
 
 class Crew:
@@ -44,7 +48,6 @@ class Crew:
 
     def __init__(self, client: Any, external: bool, hear: Callable[[Mapping[str, Any]], None]) -> None:
         self._client, self._external, self._hear = client, external, hear
-        self._digest = digest() if external else ""  # that workers must have; empty: any
         self._threads: dict[str, int] = {}
         self._checked: dict[str, str] = {}  # what differs, by address; empty: nothing
         self._looked = -_SECONDS_BETWEEN_LOOKS
@@ -95,9 +98,40 @@ class Crew:
         """Tasks that have not ended."""
         return [task for task, _ in self._running.values()]
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return the future of a function of ``(*arguments, tell)`` in a worker; `tell` sends a message."""
-        return self._client.submit(_told, function, arguments, self._topic, pure=False, **self._where(()))
+    @property
+    def dashboard(self) -> str | None:
+        """Address of the dashboard of somebody else's scheduler; None if it has none that this machine can open."""
+        if not self._external:
+            return None
+        try:
+            address = str(self._client.dashboard_link)
+            # A scheduler names an address also without a dashboard, and then has no page there.
+            build_opener(ProxyHandler({})).open(address, timeout=_SECONDS_FOR_A_PAGE).close()
+        except (KeyError, OSError, ValueError, HTTPException):
+            return None
+        return address
+
+    def compile(self, groups: Sequence[KernelGroup], show: Callable[[int, Iterable[str]], None]) -> None:
+        """Compile groups of kernels in all workers at once; `show` receives how many are done, and which are under way.
+
+        A failure here occurs again in the task that needs the kernel, and is reported there.
+        """
+        from distributed import wait
+
+        waiting, running = list(groups), dict[Any, str]()
+        while waiting or running:
+            self.look()
+            while waiting and len(running) < self.threads:
+                group = waiting.pop(0)
+                future = self._client.submit(_compile, group, self._topic, pure=False, **self._where(()))
+                running[future] = group.name
+            show(len(groups) - len(waiting) - len(running), running.values())
+            with suppress(TimeoutError):
+                first = wait(list(running), timeout=_SECONDS_OF_SILENCE, return_when="FIRST_COMPLETED")  # type: ignore[no-untyped-call]
+                for future in first.done:
+                    del running[future]
+        if groups:
+            show(len(groups), ())
 
     def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
         """Give a task to a worker.
@@ -115,7 +149,7 @@ class Crew:
         """
         self._number += 1  # a second try must not get the first one's result
         key = f"{task.stage}-{task.id}-{self._topic}-{self._number}"
-        given = task, out, inputs, self._topic, self._digest
+        given = task, out, inputs, self._topic, software() if self._external else None
         future = self._client.submit(_work, *given, key=key, **self._where(avoided))
         self._running[key] = task, future
         future.add_done_callback(lambda future: self._ended.put((future.key, None)))
@@ -158,10 +192,10 @@ class Crew:
 
         error = future.exception(timeout=_SECONDS_FOR_AN_ERROR)
         if isinstance(error, KilledWorker):
-            innocent = Outcome({}, 0.0, "its worker died before it began", refused=True)
-            return Outcome({}, 0.0, KILLED) if task.id in self._begun else innocent
-        error = error or RuntimeError("its worker sent no outcome")
-        return Outcome({}, 0.0, one_line(error), "".join(traceback.format_exception(error)))
+            if task.id not in self._begun:
+                return Outcome(reason="its worker died before it began", refused=True)
+            return Outcome(reason="the process that ran it was killed several times over; is there enough memory?")
+        return Outcome.failed(error or RuntimeError("its worker sent no outcome"))
 
     def _where(self, avoided: Collection[str]) -> dict[str, Any]:
         """Return the arguments of `Client.submit` that keep a task from refused and from `avoided` workers."""
@@ -185,15 +219,15 @@ class Crew:
         return f"worker {address} gets no task: {self._checked[address]}; install the same version there"
 
 
-def _told(function: Callable[..., Any], arguments: tuple[Any, ...], topic: str) -> Any:
-    """Call a function in a worker."""
+def _compile(group: KernelGroup, topic: str) -> None:
+    """Compile a group of kernels in a worker."""
     from distributed import get_worker
 
     worker = get_worker()
-    return function(*arguments, lambda message: worker.log_event(topic, message))
+    group.compile(lambda kernel: worker.log_event(topic, {"kernel": kernel}))
 
 
-def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected: str) -> None:
+def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected: dict[str, str] | None) -> None:
     """Do a task in a worker, unless its software is not the `expected` one, and send the outcome as a message.
 
     A message costs less than a result that dask gathers, and is not lost if the worker dies after it.
@@ -209,8 +243,8 @@ def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected:
             last = now
 
     patience.tell(lambda sentence: worker.log_event(topic, {"sentence": sentence}))
-    if expected and expected != _digest():
-        outcome = Outcome({}, 0.0, "its worker has other software than the driver", refused=True)
+    if expected and expected != software():
+        outcome = Outcome(reason="its worker has other software than the driver", refused=True)
     else:
         worker.log_event(topic, {"task": task.id, "share": 0.0})
         outcome = work(task, place(out), progress, inputs, worker.state.nthreads)
@@ -223,6 +257,3 @@ def _outcome(content: Mapping[str, Any]) -> Outcome:
     """Return the outcome in a message."""
     files = {name: Product(**product) for name, product in content["files"].items()}
     return Outcome(**{**content, "files": files})
-
-
-_digest = cache(digest)

@@ -12,22 +12,24 @@ ones behind a training. A task that measures time starts when nothing else runs,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from rich.console import Console
 
-from jobs.plan.estimate import Estimate
 from jobs.plan.ready import Ready
+from jobs.plan.schedule import Estimate
 from jobs.plan.task import STAGES, Stage, Task
-from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected, dashboard_of
+from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
+from jobs.run.compiling import kernel_groups
 from jobs.run.crew import Crew
 from jobs.run.ledger import Ledger
+from jobs.run.manifest_file import ManifestFile
 from jobs.run.outcome import Outcome
 from jobs.run.progress import Board
 from jobs.run.progress_forms import ProgressForm, form_of
-from jobs.run.receipt import Product, measure
+from jobs.run.receipt import Product
 from jobs.terminal import Terminal
 from pipeline import patience
 from pipeline.cores import cores
@@ -35,29 +37,7 @@ from pipeline.storage import size_of
 from weaves.errors import BadInput, WorkFailed
 
 _SECONDS_BETWEEN_LOOKS: Final = 1.0  # for workers that have come
-_SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 _TRIES: Final = 3  # of a task that ends with an unexpected exception
-
-Recorded = Callable[[Task, Mapping[str, Product]], None]
-"""Function that hears of a task that is done, and of its products by file name."""
-
-
-class Preparation(NamedTuple):
-    """Preparation of a worker: compile a group of kernels.
-
-    Attributes
-    ----------
-    name : str
-        Name that progress shows.
-    function : callable
-        ``function(argument, ready)``; it calls ``ready`` with the name of each kernel.
-    argument : object
-        Its first argument.
-    """
-
-    name: str
-    function: Callable[[Any, Callable[[str], None]], None]
-    argument: Any
 
 
 class RunSummary(NamedTuple):
@@ -76,9 +56,7 @@ def execute(
     stages: Sequence[Stage] = STAGES,
     scheduler: Scheduler = HERE,
     workers: int = 0,
-    prepare: Callable[[Sequence[Task]], Sequence[Preparation]] = lambda todo: (),
-    recorded: Recorded = lambda task, files: None,
-    settle: Callable[[], None] = lambda: None,
+    manifests: Sequence[ManifestFile] = (),
     console: Console | None = None,
     progress: ProgressForm = "auto",
 ) -> RunSummary:
@@ -96,13 +74,9 @@ def execute(
         A running dask scheduler; by default a cluster on this machine, which ends with this process.
     workers : int
         Worker processes of the local cluster, one thread each; 0: one a core.
-    prepare : callable
-        Work of workers before the first task.
-    recorded : callable
-        Called in this process with a task and its products by file name, after its receipt is written, or products
-        are taken from another data set.
-    settle : callable
-        Called before a task starts that needs others, and at the end, so that `recorded` may put work off.
+    manifests : sequence of ManifestFile
+        Manifests that list the shards that are made, or taken from another data set. They are whole when a task
+        starts that needs others, and at the end.
     console : Console, optional
         Terminal that shows progress.
     progress : str
@@ -118,29 +92,34 @@ def execute(
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")
-    summary = RunSummary(_done(tasks, ledger, recorded), [], [], [])
-    settle()
+    estimate, summary = Estimate(), RunSummary([], [], [], [])
+    for task in tasks:
+        receipt = ledger.done(task)
+        if not receipt and (receipt := ledger.adopt(task)):
+            for manifest in manifests:
+                manifest.add(task, receipt.files)  # to which it was not there a moment ago
+        if receipt:
+            summary.before.append(task)
+            estimate.learn(task, receipt.seconds)
+    for manifest in manifests:
+        manifest.save()
     finished = {task.id for task in summary.before}
     todo = [task for task in tasks if task.id not in finished and task.stage in stages]
     _refuse_gaps(todo, tasks, finished)
     if not todo:
         return summary
 
-    estimate = Estimate()
-    for task in summary.before:
-        estimate.learn(task, ledger.seconds(task))
     board = Board(todo, estimate, form_of(progress, console or Terminal(stderr=True)))
-    external = bool(scheduler.address)
     with connected(scheduler, min(workers or cores(), len(todo)), board.say) as client, board:
-        crew = Crew(client, external, board.hear)
-        board.tally.workers = len(crew.accepted)
-        _prepare(crew, prepare(todo), board)
-        board.start(len(crew.accepted), dashboard_of(client) if external else None)
-        driver = _Driver(tasks, Ready(todo, finished), crew, ledger, board, estimate, stages, summary, recorded, settle)
+        crew, groups = Crew(client, bool(scheduler.address), board.hear), kernel_groups(todo)
+        board.workers = len(crew.accepted)
+        crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
+        board.start(len(crew.accepted), crew.dashboard)
+        driver = _Driver(tasks, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
         try:
             driver.run()
         finally:
-            settle()
+            driver.settle()
     driver.close()
     return summary
 
@@ -155,16 +134,14 @@ class _Driver:
         crew: Crew,
         ledger: Ledger,
         board: Board,
-        estimate: Estimate,
         stages: Sequence[Stage],
         summary: RunSummary,
-        recorded: Recorded,
-        settle: Callable[[], None],
+        manifests: Sequence[ManifestFile],
     ) -> None:
         self._tasks = {task.id: task for task in tasks}
         self._ready, self._crew, self._ledger, self._board = ready, crew, ledger, board
-        self._stages, self._summary, self._recorded, self._settle = stages, summary, recorded, settle
-        self._estimate, self._out = estimate, str(ledger.out.resolve())
+        self._stages, self._summary, self._manifests = stages, summary, manifests
+        self._out = str(ledger.out.resolve())
         self._lost: list[Task] = []  # damaged products of stages that do not run
         self._failed_on: dict[str, list[str]] = {}  # workers, by the id of a task that is tried again
         self._failed_once: set[str] = set()
@@ -173,7 +150,7 @@ class _Driver:
         """Work until no task is left that can start."""
         while True:
             self._crew.look()
-            self._board.tally.workers = len(self._crew.accepted)
+            self._board.workers = len(self._crew.accepted)
             started = self._start()
             if not self._ready.running:
                 if started:
@@ -185,7 +162,12 @@ class _Driver:
             self._start(alone=False)  # workers have something to do while receipts are written
             for task, outcome in ended:
                 self._take(task, _verified(task, outcome, self._ledger))
-            self._board.waiting_for(self._crew.running, workers=len(self._crew.accepted))
+            self._board.waiting_for(self._crew.running)
+
+    def settle(self) -> None:
+        """Write what the manifests have put off."""
+        for manifest in self._manifests:
+            manifest.save()
 
     def close(self) -> None:
         """List what waits for tasks that failed; WorkFailed if products of a stage that does not run were damaged."""
@@ -205,7 +187,7 @@ class _Driver:
                 self._ready.again(task)
                 continue
             if task.needs:
-                self._settle()
+                self.settle()
             self._board.begin(task)
             self._crew.start(task, self._out, self._hashes(task), self._failed_on.get(task.id, ()))
         return started
@@ -219,8 +201,9 @@ class _Driver:
             return {}
         hashes = dict[str, str]()
         for need in self._needs(task):
-            files = self._ledger.products(need)
-            hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
+            if receipt := self._ledger.receipt(need):
+                files = receipt.files
+                hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
         return hashes
 
     def _take(self, task: Task, outcome: Outcome) -> None:
@@ -233,10 +216,10 @@ class _Driver:
         if not outcome.reason:
             self._ledger.finish(task, outcome.files, outcome.seconds)
             self._ready.finish(task)
-            self._recorded(task, outcome.files)
-            self._estimate.learn(task, outcome.seconds)
+            for manifest in self._manifests:
+                manifest.add(task, outcome.files)
             self._summary.ran.append(task)
-            self._board.end(task)
+            self._board.end(task, seconds=outcome.seconds)
         elif self._again(task, outcome):
             self._ready.again(task)
             self._board.end(task, outcome.reason, again=True)
@@ -244,7 +227,6 @@ class _Driver:
             times = len(self._failed_on.get(task.id, ()))
             reason = f"{outcome.reason}; tried {times} times" if times > 1 else outcome.reason
             self._ledger.fail(task, reason, outcome.traceback)
-            self._ready.fail(task)
             self._summary.failed.append(task)
             self._board.end(task, reason)
 
@@ -276,42 +258,6 @@ class _Driver:
                 self._ready.lose(task)
 
 
-def _done(tasks: Sequence[Task], ledger: Ledger, recorded: Recorded) -> list[Task]:
-    """Return the tasks that are done, some by the products of another data set."""
-    before = []
-    for task in tasks:
-        done = ledger.done(task) is not None
-        if not done and ledger.adopt(task):
-            recorded(task, ledger.products(task))  # to whom it was not there a moment ago
-            done = True
-        if done:
-            before.append(task)
-    return before
-
-
-def _prepare(crew: Crew, preparations: Sequence[Preparation], board: Board) -> None:
-    """Compile kernels in all workers at once and show how far it is.
-
-    A failure here occurs again in the task that needs the kernel, and is reported there.
-    """
-    waiting, running = list(preparations), dict[Any, str]()
-    while waiting or running:
-        crew.look()
-        while waiting and len(running) < crew.threads:
-            preparation = waiting.pop(0)
-            running[crew.submit(_prepare_one, preparation)] = preparation.name
-        board.compiling(len(preparations) - len(waiting) - len(running), len(preparations), running.values())
-        for future in _ended(running):
-            del running[future]
-    if preparations:
-        board.compiling(len(preparations), len(preparations), ())
-
-
-def _prepare_one(preparation: Preparation, tell: Callable[[dict[str, str]], None]) -> None:
-    """Do one preparation in a worker."""
-    preparation.function(preparation.argument, lambda kernel: tell({"kernel": kernel}))
-
-
 def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
     """Refuse to start if a product is missing of a stage that does not run."""
     planned = {task.id: task for task in tasks}
@@ -332,7 +278,7 @@ def _verified(task: Task, outcome: Outcome, ledger: Ledger) -> Outcome:
         expected = outcome.files[Path(path).name]
         try:
             # In object storage its size is enough: whoever fetches a file compares its hash.
-            as_written = measure(out / path) == expected if local else size_of(out / path) == expected.bytes
+            as_written = Product.of(out / path) == expected if local else size_of(out / path) == expected.bytes
         except OSError as error:
             if not local and not isinstance(error, FileNotFoundError):
                 raise  # it is the storage that fails
@@ -341,13 +287,3 @@ def _verified(task: Task, outcome: Outcome, ledger: Ledger) -> Outcome:
         if not as_written:
             return outcome._replace(reason=f"{path} is not the file that its worker wrote: every worker must see {out}")
     return outcome
-
-
-def _ended(running: Iterable[Any]) -> list[Any]:
-    """Wait a while until at least one of these futures has ended, and return those that have."""
-    from distributed import wait
-
-    try:
-        return list(wait(list(running), timeout=_SECONDS_OF_SILENCE, return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
-    except TimeoutError:
-        return []

@@ -14,12 +14,12 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Task
-from jobs.run.receipt import Product, Receipt, leaves, read_receipt
-from jobs.run.store import LEDGER, store_of
+from jobs.run.receipt import Product, Receipt
+from jobs.run.store import LEDGER, Store
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_json
@@ -34,7 +34,7 @@ class Ledger:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.store = store_of(out)
+        self.store = Store.of(out)
         self._synced = -math.inf
         self._sound: set[str] = set()  # tasks whose products were read, or made, by this process
 
@@ -46,7 +46,7 @@ class Ledger:
         """Yield every valid receipt of the folder but those of some tasks, given by their ids."""
         names = {Path(path).stem for path in self.store.below([LEDGER]) if path.endswith(".json")}
         for name in sorted(name for name in names - set(tasks) if "." not in name):
-            if receipt := read_receipt(self.store.copy(f"{LEDGER}/{name}.json"), name):
+            if receipt := Receipt.read(self.store.copy(f"{LEDGER}/{name}.json"), name):
                 yield receipt
 
     def state(self, task: Task) -> State:
@@ -67,7 +67,7 @@ class Ledger:
 
     def receipt(self, task: Task) -> Receipt | None:
         """Return a task's receipt; None if there is none, or no valid one."""
-        return read_receipt(self.store.copy(self.receipt_path(task)), task.id)
+        return Receipt.read(self.store.copy(self.receipt_path(task)), task.id)
 
     def places(self, receipt: Receipt) -> Iterator[str]:
         """Yield the paths of the existing files that a receipt is about, relative to the output folder."""
@@ -108,11 +108,9 @@ class Ledger:
         It waits for the disk once a second at most. After a loss of power some of the last receipts may be missing;
         their tasks run again.
         """
-        identity = leaves(task.identity())
-        receipt = Receipt(**_heading(task), files=dict(files), seconds=round(seconds, 3), identity=identity)
         durable = (now := time.monotonic()) - self._synced >= _SECONDS_BETWEEN_SYNCS
         self._synced = now if durable else self._synced
-        self.store.write(self.receipt_path(task), receipt.sealed(), durable=durable)
+        self.store.write(self.receipt_path(task), Receipt.of(task, files, seconds).sealed(), durable=durable)
         for path in task.products:
             self.store.wrote(path, files[Path(path).name].bytes)
         self.store.remove(_note(task))
@@ -120,26 +118,27 @@ class Ledger:
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
         """Note why a task failed."""
-        note: dict[str, Any] = {**_heading(task), "reason": reason, "traceback": traceback}
+        heading = {"task": task.id, "stage": task.stage, "title": task.title}
+        note = heading | {"reason": reason, "traceback": traceback}
         self.store.write(_note(task), json.dumps(note, indent=1).encode() + b"\n")
 
-    def adopt(self, task: Task) -> bool:
-        """Take a task's products from another data set; return whether the task is then done.
+    def adopt(self, task: Task) -> Receipt | None:
+        """Take a task's products from another data set; return the receipt of the task if it is then done.
 
         Data sets share shards (the same id is the same bytes), yet each folder is whole, so that it can be copied
         away; a hard link costs no space.
         """
         receipt = self.receipt(task)
         if receipt is None:
-            return False
+            return None
         for path in task.products:
             if self._is_whole(path, receipt):
                 continue
             source = next((file for file in self._copies(path) if self._is_whole(file, receipt, verify=True)), None)
             if source is None:
-                return False
+                return None
             self.store.link(source, path, receipt.files[Path(path).name].bytes)
-        return self.done(task) is not None
+        return self.done(task)
 
     def is_elsewhere(self, task: Task) -> bool:
         """Return whether a task that is not done here has products of the right size in other data sets."""
@@ -202,7 +201,3 @@ class Ledger:
 
 def _note(task: Task) -> str:
     return f"{LEDGER}/{task.id}.failed.json"
-
-
-def _heading(task: Task) -> dict[str, str]:
-    return {"task": task.id, "stage": task.stage, "title": task.title}

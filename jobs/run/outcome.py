@@ -14,45 +14,40 @@ from filelock import FileLock
 
 from jobs.plan.dataset import DATASETS
 from jobs.plan.task import Progress, Task
-from jobs.run.receipt import Product, measure
-from jobs.run.store import workspace_of
+from jobs.run.receipt import Product
 from pipeline import patience, storage
 from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.own_process import ProcessEnded, in_own_process
 from weaves.errors import BadInput, WorkFailed
 
-KILLED = "the process that ran it was killed several times over; is there enough memory?"
-"""Reason of a task whose process died before it could report."""
-
 
 class Outcome(NamedTuple):
-    """Result of a task: its products, or the reason of its failure.
+    """Result of a task: its products, or the reason of its failure."""
 
-    Attributes
-    ----------
-    files : dict
-        Products by file name.
-    seconds : float
-        Time that the task took.
-    reason : str
-        One line; empty if the task is done.
-    traceback : str
-        That of an unexpected exception, which may not occur elsewhere; empty for bad input and for work that failed.
-    worker : str
-        Address of the worker; empty if it is not known.
-    refused : bool
-        True if nothing was computed: the worker's software is not the driver's, or the worker died before.
-    storage_failed : bool
-        True if the storage failed for longer than it is waited for, or refused: no other task can be done either.
-    """
-
-    files: dict[str, Product]
-    seconds: float
+    files: Mapping[str, Product] = MappingProxyType({})
+    """Products by file name."""
+    seconds: float = 0.0
+    """Time that the task took."""
     reason: str = ""
+    """One line; empty if the task is done."""
     traceback: str = ""
+    """That of an unexpected exception, which may not occur elsewhere; empty for bad input and for work that failed."""
     worker: str = ""
+    """Address of the worker; empty if it is not known."""
     refused: bool = False
+    """True if nothing was computed: the worker's software is not the driver's, or the worker died before."""
     storage_failed: bool = False
+    """True if the storage failed for longer than it is waited for, or refused: no other task can be done either."""
+
+    @classmethod
+    def failed(cls, error: BaseException) -> Outcome:
+        """Return the outcome of a task that an exception has ended."""
+        trace = "".join(traceback.format_exception(error))
+        if isinstance(error, BadInput | WorkFailed):
+            kept = trace if isinstance(error, ProcessEnded) else ""
+            return cls(reason=str(error), traceback=kept, storage_failed=isinstance(error, patience.StorageFailed))
+        message = str(error).strip().partition("\n")[0]
+        return cls(reason=": ".join(filter(None, (type(error).__name__, message))), traceback=trace)
 
 
 def work(
@@ -79,23 +74,13 @@ def work(
     try:
         with _workspace(task, out, inputs) as folder:
             in_own_process(task.run, folder, progress=progress) if own else task.run(folder, progress)
-            files = {Path(path).name: measure(folder / path) for path in task.products}
-    except ProcessEnded as error:
-        return Outcome({}, time.perf_counter() - start, str(error), traceback.format_exc())
+            outcome = Outcome({Path(path).name: Product.of(folder / path) for path in task.products})
     except (BadInput, WorkFailed) as error:
-        failed = isinstance(error, patience.StorageFailed)
-        return Outcome({}, time.perf_counter() - start, str(error), storage_failed=failed)
+        outcome = Outcome.failed(error)
     except Exception as error:
-        if not storage.is_local(out) and (found := storage.explained(error)):
-            return Outcome({}, time.perf_counter() - start, str(found), storage_failed=True)
-        return Outcome({}, time.perf_counter() - start, one_line(error), traceback.format_exc())
-    return Outcome(files, time.perf_counter() - start)
-
-
-def one_line(error: BaseException) -> str:
-    """Return an unexpected exception in one line."""
-    lines = str(error).strip().splitlines() or [""]
-    return f"{type(error).__name__}: {lines[0]}" if lines[0] else type(error).__name__
+        explained = None if storage.is_local(out) else storage.explained(error)
+        outcome = Outcome(reason=str(explained), storage_failed=True) if explained else Outcome.failed(error)
+    return outcome._replace(seconds=time.perf_counter() - start)
 
 
 @contextmanager
@@ -111,7 +96,7 @@ def _workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Pat
     from pipeline.shards.manifest import FILE
 
     patience.expect()  # the driver was answered
-    folder = workspace_of(out)
+    folder = storage.workspace(out)
     for path, sha256 in inputs.items():
         _fetch(out, folder, path, sha256)
     for parent in sorted({str(Path(path).parent) for path in inputs if path.startswith(f"{DATASETS}/")}):

@@ -13,7 +13,7 @@ from threading import Lock
 from types import TracebackType
 from typing import Any, Final, Literal, NamedTuple
 
-from jobs.plan.estimate import Estimate
+from jobs.plan.schedule import Estimate
 from jobs.plan.task import STAGES, Stage, Task
 from pipeline import patience
 
@@ -21,40 +21,39 @@ _SILENCE: Final = 60.0  # seconds without a report until the first line says so
 _MOST_NAMED: Final = 5  # tasks in that line
 
 
+EventName = Literal["compile", "start", "begin", "progress", "end", "failed", "again", "message", "stop"]
+"""Kernels are ready; the tasks start; a task begins, advances, ends, failed, or failed and is tried again; a sentence;
+the end, also if the tasks never began."""
+
+
 class Event(NamedTuple):
-    """Something that happened in a run.
+    """Something that happened in a run."""
 
-    Attributes
-    ----------
-    name : str
-        ``compile``: kernels are ready; ``start`` of the tasks; ``begin`` of a task, ``progress``, ``end``, ``failed``,
-        ``again``: it failed and is tried again; ``message``: a sentence; ``stop``: the end, also if it never began.
-    task : Task or None
-        The task that it is about.
-    share : float or None
-        Its finished share.
-    message : str or None
-        Reason of a failure, or a sentence.
-    """
-
-    name: Literal["compile", "start", "begin", "progress", "end", "failed", "again", "message", "stop"]
-    task: Task | None = None
-    share: float | None = None
-    message: str | None = None
+    name: EventName
+    task: Task | None
+    """The task that it is about."""
+    share: float | None
+    """Its finished share."""
+    message: str | None
+    """Reason of a failure, or a sentence."""
 
 
-class Tally:
-    """Numbers of a run. Work is measured by what each task is expected to cost, in seconds on one core.
+class Board:
+    """The tasks of a run as they begin, advance and end, in numbers; a context manager that ends what is shown.
+
+    Work is measured by what each task is expected to cost, in seconds on one core.
 
     Parameters
     ----------
     tasks : sequence of Task
         The tasks to do.
     estimate : Estimate
-        Knows how long they take.
+        Knows how long they take, and learns it.
+    show : callable
+        Shows an event, with the numbers after it. Calls come from the driver's thread and from that of its dask client.
     """
 
-    def __init__(self, tasks: Sequence[Task], estimate: Estimate) -> None:
+    def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Board], None]) -> None:
         self.planned: Counter[Stage] = Counter()
         self.ended: Counter[Stage] = Counter()
         """Tasks by stage, done or failed."""
@@ -66,38 +65,26 @@ class Tally:
         """Expected cost of everything, by stage."""
         self.workers = 0
         self.dashboard: str | None = None
-        self._estimate = estimate
+        self._estimate, self._show = estimate, show
         self._left: dict[str, Task] = {}
         self._under_way: dict[str, tuple[float, float]] = {}  # begin and finished share, by id
         self._began: float | None = None
+        self._kernels: set[str] = set()
+        self._heard, self._silence = time.monotonic(), _SILENCE
+        self._said: dict[str, float] = {}  # when each sentence was last said
+        self._lock = Lock()
         for task in tasks:
             self.add(task)
 
-    def add(self, task: Task) -> None:
-        """Count a task to do."""
-        self.planned[task.stage] += 1
-        self.all_work[task.stage] = self.all_work.get(task.stage, 0.0) + task.cost
-        self.work.setdefault(task.stage, 0.0)
-        self._left[task.id] = task
+    def __enter__(self) -> Board:
+        patience.tell(self.say_once)
+        return self
 
-    def start(self, workers: int, dashboard: str | None) -> None:
-        """Start the clock."""
-        self._began, self.workers, self.dashboard = time.monotonic(), workers, dashboard
-
-    def advance(self, task: Task, share: float) -> None:
-        """Take the finished share of a task under way."""
-        began, before = self._under_way.get(task.id, (0.0, 0.0))
-        self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker
-        self.work[task.stage] += task.cost * (share - before)
-
-    def end(self, task: Task, *, failed: bool = False, again: bool = False) -> None:
-        """Take the end of a task; `again`: it is to be done once more."""
-        self.advance(task, 0.0 if again else 1.0)
-        self._under_way.pop(task.id)
-        if not again:
-            self.ended[task.stage] += 1
-            self.failed[task.stage] += failed
-            self._left.pop(task.id, None)
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        patience.tell(None)
+        self._emit("stop")
 
     @property
     def rate(self) -> float:
@@ -112,54 +99,27 @@ class Tally:
             return None
         return self._estimate.seconds_left(list(self._left.values()), dict(self._under_way), self.workers)
 
-
-class Board:
-    """The tasks of a run as they begin, advance and end; a context manager that ends what is shown.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The tasks to do.
-    estimate : Estimate
-        Knows how long they take.
-    show : callable
-        Shows an event, with the numbers after it. Calls come from the driver's thread and from that of its dask client.
-    """
-
-    def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Tally], None]) -> None:
-        self.tally = Tally(tasks, estimate)
-        self._show = show
-        self._tasks = {task.id: task for task in tasks}
-        self._under_way: set[str] = set()
-        self._kernels: set[str] = set()
-        self._heard, self._silence = time.monotonic(), _SILENCE
-        self._said: dict[str, float] = {}  # when each sentence was last said
-        self._lock = Lock()
-
-    def __enter__(self) -> Board:
-        patience.tell(self.say_once)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        patience.tell(None)
-        self._emit(Event("stop"))
+    def add(self, task: Task) -> None:
+        """Count a task to do, also one that was done before and is made again."""
+        self.planned[task.stage] += 1
+        self.all_work[task.stage] = self.all_work.get(task.stage, 0.0) + task.cost
+        self.work.setdefault(task.stage, 0.0)
+        self._left[task.id] = task
 
     def start(self, workers: int, dashboard: str | None) -> None:
-        """Show the start of the tasks."""
-        self.tally.start(workers, dashboard)
-        self._emit(Event("start"))
+        """Start the clock and show the start of the tasks."""
+        self._began, self.workers, self.dashboard = time.monotonic(), workers, dashboard
+        self._emit("start")
 
     def compiling(self, done: int, groups: int, under_way: Iterable[str]) -> None:
         """Show how many groups of kernels are compiled, and which are under way."""
         now = "" if done == groups else f"; now {', '.join(under_way)}"
         kernels = f"{len(self._kernels)} ready, {done} of {groups} groups done"
-        self._emit(Event("compile", message=f"compiling kernels: {kernels}{now}"))
+        self._emit("compile", message=f"compiling kernels: {kernels}{now}")
 
     def say(self, sentence: str) -> None:
         """Show a sentence about the run."""
-        self._emit(Event("message", message=sentence))
+        self._emit("message", message=sentence)
 
     def say_once(self, sentence: str) -> None:
         """Show a sentence that several processes may say, unless it was said in the last minute."""
@@ -177,34 +137,31 @@ class Board:
             self.say_once(message["sentence"])
         elif "kernel" in message:
             self._kernels.add(message["kernel"])
-        elif message["task"] in self._under_way:
-            task, share = self._tasks[message["task"]], min(1.0, message["share"])
-            with self._lock:
-                self.tally.advance(task, share)
-            self._emit(Event("progress", task, share))
-
-    def add(self, task: Task) -> None:
-        """Add a task that was done before and is made again."""
-        self._tasks[task.id] = task
-        self.tally.add(task)
+        elif (task := self._left.get(message["task"])) and task.id in self._under_way:
+            share = min(1.0, message["share"])
+            self._advance(task, share)
+            self._emit("progress", task, share)
 
     def begin(self, task: Task) -> None:
         """Show that a task begins."""
         self._reported()
-        self._under_way.add(task.id)
-        with self._lock:
-            self.tally.advance(task, 0.0)
-        self._emit(Event("begin", task))
+        self._advance(task, 0.0)
+        self._emit("begin", task)
 
-    def end(self, task: Task, reason: str = "", *, again: bool = False) -> None:
-        """Count a task as done, or as failed for a reason; `again`: it is tried once more."""
+    def end(self, task: Task, reason: str = "", *, seconds: float = 0.0, again: bool = False) -> None:
+        """Count a task as done in some seconds, or as failed for a reason; `again`: it is tried once more."""
         self._reported()
-        self._under_way.discard(task.id)
-        with self._lock:
-            self.tally.end(task, failed=bool(reason), again=again)
-        self._emit(Event("again" if again else "failed" if reason else "end", task, message=reason or None))
+        self._advance(task, 0.0 if again else 1.0)
+        self._under_way.pop(task.id)
+        if not again:
+            self.ended[task.stage] += 1
+            self.failed[task.stage] += bool(reason)
+            self._left.pop(task.id, None)
+        if not reason:
+            self._estimate.learn(task, seconds)
+        self._emit("again" if again else "failed" if reason else "end", task, message=reason or None)
 
-    def waiting_for(self, tasks: Iterable[Task], workers: int) -> None:
+    def waiting_for(self, tasks: Iterable[Task]) -> None:
         """Name the tasks under way when nothing was reported for a minute, and again after 2, 4, … minutes."""
         silence = time.monotonic() - self._heard
         if silence < self._silence:
@@ -213,11 +170,21 @@ class Board:
         names = [f"{task.stage} {task.title}" for task in tasks]
         more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
         titles = ", ".join(names[:_MOST_NAMED]) + more
-        where = f"{workers} workers" if workers > 1 else "1 process" if workers else "no worker: the scheduler has none"
+        where = "1 process" if self.workers == 1 else f"{self.workers} workers"
+        where = where if self.workers else "no worker: the scheduler has none"
         self.say(f"nothing reported for {silence:.0f} s; under way: {titles} ({where})")
 
-    def _emit(self, event: Event) -> None:
-        self._show(event, self.tally)
+    def _advance(self, task: Task, share: float) -> None:
+        """Take the finished share of a task under way."""
+        with self._lock:
+            began, before = self._under_way.get(task.id, (0.0, 0.0))
+            self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker
+            self.work[task.stage] += task.cost * (share - before)
+
+    def _emit(
+        self, name: EventName, task: Task | None = None, share: float | None = None, message: str | None = None
+    ) -> None:
+        self._show(Event(name, task, share, message), self)
 
     def _reported(self) -> None:
         self._heard, self._silence = time.monotonic(), _SILENCE

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.status import Status
 
 from jobs.plan.task import Stage
-from jobs.run.progress import Event, Tally
+from jobs.run.progress import Board, Event
 
 ProgressForm = Literal["auto", "rich", "plain", "json"]
 """How progress is shown; auto: bars on a terminal, lines elsewhere."""
@@ -23,7 +23,7 @@ _SECONDS_BETWEEN_LINES: Final = 30.0
 _SECONDS_BETWEEN_OBJECTS: Final = 1.0  # that only tell the share of a task
 
 
-def form_of(name: ProgressForm, console: Console) -> Callable[[Event, Tally], None]:
+def form_of(name: ProgressForm, console: Console) -> Callable[[Event, Board], None]:
     """Return what shows an event on a console."""
     if name == "auto":
         name = "rich" if console.is_terminal else "plain"
@@ -32,13 +32,13 @@ def form_of(name: ProgressForm, console: Console) -> Callable[[Event, Tally], No
     return _Lines(console).show if name == "plain" else _Objects(console).show
 
 
-def _rate(tally: Tally) -> str:
-    return f"{tally.rate:.3g} tasks/s" if tally.rate >= 0.1 else f"{60 * tally.rate:.2g} tasks/min"
+def _rate(board: Board) -> str:
+    return f"{board.rate:.3g} tasks/s" if board.rate >= 0.1 else f"{60 * board.rate:.2g} tasks/min"
 
 
-def _left(tally: Tally) -> str:
+def _left(board: Board) -> str:
     """Return the time left in words; empty if it is not known."""
-    if (seconds := tally.seconds_left) is None:
+    if (seconds := board.seconds_left) is None:
         return ""
     minutes, rest = divmod(math.ceil(seconds), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02} left"
@@ -63,7 +63,7 @@ class _Bars:
             name, BarColumn(bar_width=None), *texts, TimeElapsedColumn(), console=console, expand=True
         )
 
-    def show(self, event: Event, tally: Tally) -> None:
+    def show(self, event: Event, board: Board) -> None:
         if event.name == "compile":
             self._status = self._status or self._console.status("")
             self._status.update(str(event.message))
@@ -73,29 +73,29 @@ class _Bars:
             self._status.stop()
             self._status = None
         if event.name == "start":
-            if tally.dashboard:
-                self._print(f"dashboard: {tally.dashboard}")
-            for stage in tally.all_work:
-                self._update(stage, tally)
+            if board.dashboard:
+                self._print(f"dashboard: {board.dashboard}")
+            for stage in board.all_work:
+                self._update(stage, board)
             self._bars.start()
         if event.name == "stop":
             self._bars.stop()
         elif event.message:
             self._print(_failure(event) if event.task else event.message)
         if event.task:
-            self._update(event.task.stage, tally)
-            self._row("all", start=True, total=1.0, completed=_share(tally), left=_left(tally))
+            self._update(event.task.stage, board)
+            self._row("all", start=True, total=1.0, completed=_share(board), left=_left(board))
 
-    def _update(self, stage: Stage, tally: Tally) -> None:
-        whole = tally.ended[stage] == tally.planned[stage]  # rounding must not leave a bar short of its end
-        failed = f", {tally.failed[stage]} failed" if tally.failed[stage] else ""
+    def _update(self, stage: Stage, board: Board) -> None:
+        whole = board.ended[stage] == board.planned[stage]  # rounding must not leave a bar short of its end
+        failed = f", {board.failed[stage]} failed" if board.failed[stage] else ""
         self._row(
             stage,
-            start=tally.work[stage] > 0,
-            total=tally.all_work[stage],
-            completed=tally.all_work[stage] if whole else tally.work[stage],
-            count=f"{tally.ended[stage]}/{tally.planned[stage]} tasks{failed}",
-            rate=_rate(tally) if tally.ended[stage] else "",
+            start=board.work[stage] > 0,
+            total=board.all_work[stage],
+            completed=board.all_work[stage] if whole else board.work[stage],
+            count=f"{board.ended[stage]}/{board.planned[stage]} tasks{failed}",
+            rate=_rate(board) if board.ended[stage] else "",
         )
 
     def _row(self, name: str, start: bool, **fields: object) -> None:
@@ -110,9 +110,9 @@ class _Bars:
         self._bars.console.print(sentence, style="yellow", soft_wrap=True, highlight=False, markup=False)
 
 
-def _share(tally: Tally) -> float:
+def _share(board: Board) -> float:
     """Return the share of the work that is done."""
-    return sum(tally.work.values()) / max(sum(tally.all_work.values()), 1e-9)
+    return sum(board.work.values()) / max(sum(board.all_work.values()), 1e-9)
 
 
 class _Lines:
@@ -122,23 +122,23 @@ class _Lines:
         self._console = console
         self._last = -math.inf
 
-    def show(self, event: Event, tally: Tally) -> None:
+    def show(self, event: Event, board: Board) -> None:
         due = time.monotonic() - self._last >= _SECONDS_BETWEEN_LINES
         if event.name == "start":
-            stages = ", ".join(f"{stage} {tally.planned[stage]:,}" for stage in tally.work)
-            where = f"; dashboard: {tally.dashboard}" if tally.dashboard else ""
-            self._print(f"{tally.planned.total():,} tasks ({stages}) on {tally.workers} workers{where}")
+            stages = ", ".join(f"{stage} {board.planned[stage]:,}" for stage in board.work)
+            where = f"; dashboard: {board.dashboard}" if board.dashboard else ""
+            self._print(f"{board.planned.total():,} tasks ({stages}) on {board.workers} workers{where}")
         elif event.task:
             if event.message:
                 self._print(_failure(event))
             stage = event.task.stage
-            ended = event.name in ("end", "failed") and tally.ended[stage] == tally.planned[stage]
+            ended = event.name in ("end", "failed") and board.ended[stage] == board.planned[stage]
             if due or ended:
-                done = f"{stage} {tally.ended[stage]:,} of {tally.planned[stage]:,} tasks"
-                failed = f"{tally.failed.total()} failed" if tally.failed.total() else ""
-                rate = _rate(tally) if tally.ended.total() else ""
-                numbers = ", ".join(filter(None, (failed, rate, _left(tally))))
-                self._print(f"{done}; all {tally.ended.total():,} of {tally.planned.total():,}, {numbers}")
+                done = f"{stage} {board.ended[stage]:,} of {board.planned[stage]:,} tasks"
+                failed = f"{board.failed.total()} failed" if board.failed.total() else ""
+                rate = _rate(board) if board.ended.total() else ""
+                numbers = ", ".join(filter(None, (failed, rate, _left(board))))
+                self._print(f"{done}; all {board.ended.total():,} of {board.planned.total():,}, {numbers}")
         elif event.message and (event.name != "compile" or due or "; now " not in event.message):
             self._print(event.message)
 
@@ -155,12 +155,12 @@ class _Objects:
         self._lock = threading.Lock()
         self._last = -math.inf
 
-    def show(self, event: Event, tally: Tally) -> None:
+    def show(self, event: Event, board: Board) -> None:
         if event.name == "progress":
             if time.monotonic() - self._last < _SECONDS_BETWEEN_OBJECTS:
                 return
             self._last = time.monotonic()
-        left, task = tally.seconds_left, event.task
+        left, task = board.seconds_left, event.task
         content = {
             "event": event.name,
             "time": round(time.time(), 3),
@@ -169,13 +169,13 @@ class _Objects:
             "title": task and task.title,
             "share": None if event.share is None else round(event.share, 4),
             "message": event.message,
-            "done": tally.ended.total() - tally.failed.total(),
-            "total": tally.planned.total(),
-            "failed": tally.failed.total(),
-            "rate": round(tally.rate, 4),
+            "done": board.ended.total() - board.failed.total(),
+            "total": board.planned.total(),
+            "failed": board.failed.total(),
+            "rate": round(board.rate, 4),
             "seconds_left": None if left is None else round(left, 1),
-            "workers": tally.workers,
-            "dashboard": tally.dashboard,
+            "workers": board.workers,
+            "dashboard": board.dashboard,
         }
         with self._lock:
             self._console.file.write(json.dumps(content) + "\n")

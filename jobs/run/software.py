@@ -10,8 +10,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final
 
-from pipeline.fingerprint import fingerprint
-
 _PACKAGES: Final = ("weaves", "pipeline", "reports", "jobs")
 _LIBRARIES: Final = ("numba", "numpy", "torch")
 
@@ -27,19 +25,14 @@ def software() -> dict[str, str]:
     return {"twillight's sources": _sources(), "Python": python, **libraries}
 
 
-def digest() -> str:
-    """Return one hash of the software of this process."""
-    return fingerprint(software())
-
-
 def difference(there: Mapping[str, str] | BaseException) -> str:
     """Return how a worker's software differs from this process's, in words; empty if it does not."""
     if isinstance(there, BaseException):
         return f"it has no twillight of this version ({type(there).__name__})"
     here = software()
     other = [name for name in here if there.get(name) != here[name]]
-    found = [f"{name} {there.get(name, 'missing')} (here {here[name]})" for name in other]
-    return f"it has {', '.join(found)}" if found else ""
+    words = [f"{name} {there.get(name, 'missing')} (here {here[name]})" for name in other]
+    return f"it has {', '.join(words)}" if words else ""
 
 
 def _sources() -> str:

@@ -9,9 +9,7 @@ may be removed while no run uses it.
 from __future__ import annotations
 
 import glob
-import os
 import tempfile
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
@@ -24,7 +22,6 @@ from filelock import FileLock, Timeout
 from jobs.plan.dataset import DATASETS
 from pipeline import storage
 from pipeline.atomic import atomic_write, link
-from pipeline.fingerprint import fingerprint
 from weaves.errors import BadInput, WorkFailed
 
 LEDGER: Final = "ledger"
@@ -33,46 +30,49 @@ LEDGER: Final = "ledger"
 _FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "report")
 
 
-class Store(ABC):
-    """The files of an output folder; only one process at a time writes through it.
+class Store:
+    """The files of an output folder of this machine; only one process at a time writes through it."""
 
-    Parameters
-    ----------
-    out : Path
-        The output folder.
-    """
-
-    is_local: bool
+    is_local = True
 
     def __init__(self, out: Path) -> None:
         self.out = out
 
-    @abstractmethod
+    @staticmethod
+    def of(out: Path) -> Store:
+        """Return the files of an output folder, also of one in object storage."""
+        return Store(out) if storage.is_local(out) else _RemoteStore(out)
+
     def size(self, path: str) -> int | None:
         """Return the size of a file in bytes; None if there is none."""
+        try:
+            return (self.out / path).stat().st_size
+        except OSError:
+            return None
 
-    @abstractmethod
     def is_file(self, path: str) -> bool:
         """Return whether there is such a file."""
+        return (self.out / path).is_file()
 
-    @abstractmethod
     def named(self, folder: str, name: str) -> list[str]:
         """Return the sorted paths of all files of a name in the folders of a pattern."""
+        return sorted(str(path.relative_to(self.out)) for path in self.out.glob(f"{folder}/{glob.escape(name)}"))
 
-    @abstractmethod
     def below(self, folders: Iterable[str]) -> Iterator[str]:
         """Yield the paths of all files in or below some folders."""
+        for folder in folders:
+            yield from (str(path.relative_to(self.out)) for path in (self.out / folder).rglob("*") if path.is_file())
 
-    @abstractmethod
     def copy(self, path: str) -> Path:
         """Return a file of this machine with the content of a file of the ledger; it exists if the file does."""
+        return self.out / path
 
     def write(self, path: str, content: bytes, *, durable: bool = True) -> None:
         """Write a file of the ledger, whole or not at all; `durable` as for `pipeline.atomic.atomic_path`."""
         atomic_write(self.out / path, content, durable=durable)
 
-    def wrote(self, path: str, size: int) -> None:  # noqa: B027, a folder is looked at each time
-        """Note that another process has written a file."""
+    def wrote(self, path: str, size: int) -> None:
+        """Note that another process has written a file; a folder of this machine is looked at each time."""
 
     def remove(self, path: str) -> None:
         """Remove a file if it is there."""
@@ -110,41 +110,8 @@ class Store(ABC):
         finally:
             lock.release()
 
-    @abstractmethod
     def _lock_folder(self) -> Path:
         """Return the folder of this machine in which runs lock each other out."""
-
-
-def store_of(out: Path) -> Store:
-    """Return the files of an output folder."""
-    return _LocalStore(out) if storage.is_local(out) else _RemoteStore(out)
-
-
-class _LocalStore(Store):
-    """Files in a folder of this machine."""
-
-    is_local = True
-
-    def size(self, path: str) -> int | None:
-        try:
-            return (self.out / path).stat().st_size
-        except OSError:
-            return None
-
-    def is_file(self, path: str) -> bool:
-        return (self.out / path).is_file()
-
-    def named(self, folder: str, name: str) -> list[str]:
-        return sorted(str(path.relative_to(self.out)) for path in self.out.glob(f"{folder}/{glob.escape(name)}"))
-
-    def below(self, folders: Iterable[str]) -> Iterator[str]:
-        for folder in folders:
-            yield from (str(path.relative_to(self.out)) for path in (self.out / folder).rglob("*") if path.is_file())
-
-    def copy(self, path: str) -> Path:
-        return self.out / path
-
-    def _lock_folder(self) -> Path:
         return self.out / LEDGER
 
 
@@ -205,12 +172,12 @@ class _RemoteStore(Store):
             yield
 
     def _lock_folder(self) -> Path:
-        return workspace_of(self.out)
+        return storage.workspace(self.out)
 
     @property
     def _folder(self) -> Path:
         """Folder of the copies."""
-        return workspace_of(self.out) / "receipts"
+        return storage.workspace(self.out) / "receipts"
 
     @property
     def _sizes(self) -> dict[str, int]:
@@ -246,15 +213,3 @@ class _RemoteStore(Store):
         for name in kept - current:
             if name.endswith(".json"):
                 (self._folder / name).unlink(missing_ok=True)
-
-
-def workspace_of(out: Path) -> Path:
-    """Return the folder of this machine and user for an address, made if it is missing; BadInput if it cannot be."""
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = cache / "twillight" / fingerprint(str(out))
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:  # no folder of all users instead: a stranger may have put files there
-        allowed = "XDG_CACHE_HOME must name a folder that can be written"
-        raise BadInput(str(cache), "", error.strerror or error, allowed) from error
-    return folder

@@ -7,9 +7,9 @@ from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
 
-from jobs.plan.estimate import Estimate
 from jobs.plan.plan import plan
-from jobs.plan.schedule import LEAST_GAIN, doublings, longest_chain, schedule
+from jobs.plan.ready import chains
+from jobs.plan.schedule import LEAST_GAIN, Estimate, Schedule, doublings
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
@@ -96,7 +96,7 @@ def _print_plan(tasks: Sequence[Task], facts: Facts) -> None:
     rows.append(("all", "", *_sums(tasks, facts), ""))
     if len(left) < len(tasks):
         rows.append(("to do", "", *_sums(left, facts), ""))
-    seconds = schedule(left, facts.seconds, cores()).makespan
+    seconds = Schedule.of(left, facts.seconds, cores()).makespan
     caption = f"about {duration(seconds)} on the {cores()} cores of this machine" if left else "nothing to do"
     dim = {index: "dim" for index, row in enumerate(rows) if row[-1] == "done"}
     columns = ("stage", "what", "tasks", "rows", "one core", "why")
@@ -122,16 +122,16 @@ def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
     left = facts.left(tasks)
     schedules = {one.workers: one for one in doublings(tasks, facts.seconds)}
     last = max(schedules)
-    chosen = schedules[workers] = schedule(tasks, facts.seconds, workers)
+    chosen = schedules[workers] = Schedule.of(tasks, facts.seconds, workers)
     rows = []
     for count, one in sorted(schedules.items()):
-        rest = duration(schedule(left, facts.seconds, count).makespan)
+        rest = duration(Schedule.of(left, facts.seconds, count).makespan)
         rows.append((f"{count:,}", duration(one.makespan), rest, f"{one.efficiency:.0%}", duration(one.tail)))
     notes = (
         f"{workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
         "workers (tail)",
         f"more than {max(1, last // 2):,} workers save less than {LEAST_GAIN:.0%} each time they double; the longest "
-        f"chain of tasks takes {duration(longest_chain(tasks, facts.seconds))}",
+        f"chain of tasks takes {duration(max(chains(tasks, facts.seconds).values(), default=0.0))}",
         f"{facts.measured:,} of {len(tasks):,} durations are measured, the others estimated",
     )
     bold = {sorted(schedules).index(workers): "bold"}

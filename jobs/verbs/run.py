@@ -10,11 +10,9 @@ from jobs.plan.page import Page
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.compiling import compile_group, kernel_groups
-from jobs.run.executor import Preparation, execute
+from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.receipt import Product
 from jobs.terminal import duration, number, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, WorkerFlags
 from weaves.errors import WorkFailed
@@ -61,24 +59,13 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
             manifest.save()  # whatever its file holds now
         if "bench" in stages:
             _withdraw(page, tasks, ledger)
-
-        def recorded(task: Task, files: Mapping[str, Product]) -> None:
-            for manifest in manifests:
-                manifest.add(task, files)
-
-        def settle() -> None:
-            for manifest in manifests:
-                manifest.save()
-
         summary = execute(
             tasks,
             ledger,
             stages=stages,
             scheduler=on.connection(),
             workers=on.workers,
-            prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
-            recorded=recorded,
-            settle=settle,
+            manifests=manifests,
             progress=on.progress,
         )
     chosen = [task for task in tasks if task.stage in stages]

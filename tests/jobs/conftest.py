@@ -1,6 +1,10 @@
+from contextlib import nullcontext, suppress
+
 import pytest
 
 from jobs.cli import main
+from jobs.run import executor
+from jobs.run.outcome import work
 
 RECIPE = """
 name = "tiny"
@@ -104,3 +108,35 @@ def twillight(capsys, monkeypatch, tmp_path):
         return code, captured.out, captured.err
 
     return call
+
+
+class Here:
+    """Stands in for the crew: each task is done in this process when it is started."""
+
+    dashboard, threads, slots = None, 1, 1
+
+    def __init__(self, client, external, hear):
+        self.hear, self.accepted, self.running, self.outcomes = hear, ["here"], [], []
+
+    def look(self):
+        pass
+
+    def compile(self, groups, show):
+        for group in groups:
+            with suppress(Exception):  # it is told by the task that needs the kernel
+                group.compile(lambda kernel: self.hear({"kernel": kernel}))
+
+    def start(self, task, out, inputs, avoided=()):
+        hear = self.hear
+        self.outcomes.append((task, work(task, executor.Path(out), lambda s: hear({"task": task.id, "share": s}))))
+
+    def ended(self, seconds):
+        ended, self.outcomes = self.outcomes, []
+        return ended
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Runs without a cluster."""
+    monkeypatch.setattr(executor, "connected", lambda scheduler, workers, say: nullcontext())
+    monkeypatch.setattr(executor, "Crew", Here)

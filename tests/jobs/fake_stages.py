@@ -1,14 +1,20 @@
 """Tasks that write a few bytes, for the executor's tests; a module of its own so that workers can import it."""
 
+import io
 import json
 import os
 import signal
 import sys
 import time
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
+
+from rich.console import Console
 
 from jobs.plan.task import Place, Task
+from jobs.run.executor import execute
+from jobs.run.ledger import Ledger
+from jobs.run.receipt import Product
 
 
 class Fake(Task):
@@ -50,7 +56,7 @@ class Fake(Task):
         return {"fake": 1}
 
     def run(self, out, progress):
-        log(out, "start", self)
+        log(out, "start", self.title)
         for step in range(10):
             time.sleep(self.seconds / 10)
             progress(step / 10)
@@ -69,7 +75,7 @@ class Fake(Task):
             path = out / self.products[0]
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(f"{self.name}\n" * 100)
-        log(out, "end", self)
+        log(out, "end", self.title)
 
 
 class FakeTraining(Fake):
@@ -88,18 +94,49 @@ def task(name, kind=Fake, needs=(), **fields):
     return kind(name=name, after=tuple(need.id for need in needs), **fields)
 
 
-def prepare(argument, ready):
-    """Stand in for the compiling of a group of kernels; `argument` is a folder and a task."""
-    out, of = argument
-    ready(f"kernel of {of.title}")
-    if of.fails:
-        raise eval(of.fails)
-    log(out, "prepared", of)
+class Group(NamedTuple):
+    """Stands in for a group of kernels."""
+
+    name: str
+    out: Path
+    fails: bool = False
+
+    def compile(self, ready):
+        ready(f"kernel of {self.name}")
+        if self.fails:
+            raise ValueError("no kernel")
+        log(self.out, "compiled", self.name)
 
 
-def log(out, event, task):
+class Heard(list):
+    """Stands in for a manifest: titles of tasks that are done, and "saved"; `hook` is called with each task."""
+
+    def __init__(self, hook=lambda task: None):
+        self.hook = hook
+
+    def add(self, task, files):
+        self.append(task.title)
+        self.hook(task)
+
+    def save(self):
+        self.append("saved")
+
+
+def run(tasks, out, console=None, **options):
+    """Execute tasks; what is shown of it is lost but for the `console`."""
+    return execute(tasks, Ledger(out), console=console or Console(file=io.StringIO(), width=400), **options)
+
+
+def done(out, *tasks):
+    """Write the products and receipts of tasks, as a run would."""
+    for task in tasks:
+        task.run(out, lambda share: None)
+        Ledger(out).finish(task, {Path(path).name: Product.of(out / path) for path in task.products}, 1.0)
+
+
+def log(out, event, name):
     threads = os.environ.get("NUMBA_NUM_THREADS")
-    line = json.dumps({"event": event, "name": task.title, "pid": os.getpid(), "at": time.time(), "threads": threads})
+    line = json.dumps({"event": event, "name": name, "pid": os.getpid(), "at": time.time(), "threads": threads})
     with (out / "log.jsonl").open("a") as file:
         file.write(line + "\n")
 
@@ -108,22 +145,13 @@ def events(out):
     return [json.loads(line) for line in (out / "log.jsonl").read_text().splitlines()]
 
 
-def chain():
-    """Eight slow shards and a training that needs them."""
-    shards = [task(f"shard {index}", seconds=0.4) for index in range(8)]
-    return [*shards, task("net", FakeTraining, needs=shards)]
-
-
 def timed():
-    """Two shards, then a task that runs alone for a minute."""
+    """Two shards and what needs them, then a task that runs alone for a minute."""
     shards = [task(f"shard {index}") for index in range(2)]
-    return [*shards, task("long", FakeTiming, needs=shards, seconds=60)]
+    return [*shards, task("net", FakeTraining, needs=shards), task("long", FakeTiming, needs=shards, seconds=60)]
 
 
 if __name__ == "__main__":
-    import fake_stages  # so that its classes have the name by which other processes import them
+    from tests.jobs import fake_stages  # so that its classes have the name by which other processes import them
 
-    from jobs.run.executor import execute
-    from jobs.run.ledger import Ledger
-
-    execute(getattr(fake_stages, sys.argv[2])(), Ledger(Path(sys.argv[1])), workers=2)
+    run(fake_stages.timed(), Path(sys.argv[1]), Console(stderr=True), workers=2)

@@ -15,7 +15,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.executor import RunSummary
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.receipt import measure
+from jobs.run.receipt import Product
 from pipeline.atomic import link
 from pipeline.models.card import write_model
 from pipeline.shards.generate import ShardTask
@@ -53,7 +53,7 @@ def make(task, out):
             path.write_text(json.dumps({"file": path.name, "date": now, "values": [0.5] * 20}))
 
 
-def execute(tasks, ledger, *, stages=STAGES, recorded=lambda task, files: None, settle=lambda: None, **rest):
+def execute(tasks, ledger, *, stages=STAGES, manifests=(), **rest):
     """Do the unfinished tasks one after the other in this process, as `jobs.run.executor.execute` would."""
     summary = RunSummary([], [], [], [])
     for task in tasks:
@@ -61,11 +61,13 @@ def execute(tasks, ledger, *, stages=STAGES, recorded=lambda task, files: None, 
             summary.before.append(task)
         elif task.stage in stages:
             make(task, ledger.out)
-            files = {Path(path).name: measure(ledger.out / path) for path in task.products}
+            files = {Path(path).name: Product.of(ledger.out / path) for path in task.products}
             ledger.finish(task, files, 1.5)
-            recorded(task, files)
+            for manifest in manifests:
+                manifest.add(task, files)
             summary.ran.append(task)
-    settle()
+    for manifest in manifests:
+        manifest.save()
     return summary
 
 

@@ -15,7 +15,7 @@ from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
-from jobs.run.receipt import measure
+from jobs.run.receipt import Product
 from pipeline import patience
 from pipeline.storage import place
 from tests.jobs import fake_stages
@@ -201,7 +201,7 @@ def test_finished_tasks_cost_one_request_a_receipt_and_then_none(switch, tmp_pat
         task_file = tmp_path / "out" / task.products[0]
         task_file.parent.mkdir(parents=True, exist_ok=True)
         task_file.write_text(task.name)
-        here.finish(task, {task_file.name: measure(task_file)}, 1.0)
+        here.finish(task, {task_file.name: Product.of(task_file)}, 1.0)
     s3fs.S3FileSystem().put(f"{tmp_path / 'out'}/", "s3://products/many/", recursive=True)
     there = place("s3://products/many")
     listings = 2 + 3 * 3  # of five folders; s3fs asks twice more about each that is empty
@@ -225,7 +225,7 @@ def test_a_ledger_sees_what_it_has_written(switch, tmp_path):
     assert (ledger.state(task), ledger.reason(task)) == ("failed", "the disk was full")
     product = ledger.out / task.products[0]
     product.write_bytes(b"whole")
-    ledger.finish(task, {product.name: measure(product)}, 1.0)
+    ledger.finish(task, {product.name: Product.of(product)}, 1.0)
     for one in (ledger, Ledger(ledger.out)):
         assert (one.state(task), one.reason(task), one.seconds(task)) == ("done", "", 1.0)
     twin = fake_stages.task("a", folder="datasets/b")
@@ -283,7 +283,7 @@ def test_a_storage_that_fails_for_too_long_loses_nothing(switch, tmp_path, capsy
     (tmp_path / "file").write_bytes(b"whole")
     out = place("s3://products/long")
     (out / task.products[0]).write_bytes(b"whole")
-    Ledger(out).finish(task, {Path(task.products[0]).name: measure(tmp_path / "file")}, 1.0)
+    Ledger(out).finish(task, {Path(task.products[0]).name: Product.of(tmp_path / "file")}, 1.0)
     switch.set("fail")
     with pytest.raises(patience.StorageFailed, match="failed for 2 s"):
         Ledger(out).state(task)

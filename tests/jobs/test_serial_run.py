@@ -1,13 +1,9 @@
 """A run of the smallest recipe, from a fabric to its page, task after task in this process: no cluster, no scene."""
 
-from types import SimpleNamespace
-
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
-from jobs.run import outcome
 from jobs.run.ledger import Ledger
-from jobs.verbs import run
 from reports.record import read_records
 
 RECIPE = """
@@ -54,23 +50,7 @@ truth = { relative_error = 0.2, min_count = 64, max_count = 64 }
 """
 
 
-def serially(tasks, ledger, *, stages, recorded, settle, **_):
-    """Do the tasks of some stages in the order of the plan, as `jobs.run.executor.execute` does on a cluster."""
-    ran = []
-    for task in tasks:
-        if task.stage in stages and ledger.done(task) is None:
-            settle()
-            done = outcome.work(task, ledger.out, lambda share: None)
-            assert not done.reason, done.traceback
-            ledger.finish(task, done.files, done.seconds)
-            recorded(task, done.files)
-            ran.append(task)
-    settle()
-    return SimpleNamespace(ran=ran, failed=[], waiting=[])
-
-
-def test_a_recipe_becomes_a_page(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(run, "execute", serially)
+def test_a_recipe_becomes_a_page(tmp_path, here, capsys):
     (tmp_path / "serial.toml").write_text(RECIPE)
     command = ["run", str(tmp_path / "serial.toml"), "--out", str(tmp_path / "out")]
     assert main(command) == 0, capsys.readouterr().err

@@ -118,8 +118,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
                 ledger,
                 scheduler=connection,
                 workers=2,
-                recorded=manifest.add,
-                settle=manifest.save,
+                manifests=[manifest],
                 console=quiet,
             )
             assert len(summary.ran) + len(summary.before) == count, summary

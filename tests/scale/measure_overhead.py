@@ -19,8 +19,7 @@ from rich.console import Console
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import DatasetOptions
-from jobs.run.compiling import compile_group, kernel_groups
-from jobs.run.executor import Preparation, execute
+from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 
 RECIPE = """
@@ -56,7 +55,6 @@ def main() -> None:
             tasks,
             ledger,
             workers=options.workers,
-            prepare=lambda todo: [Preparation(group.name, compile_group, group) for group in kernel_groups(todo)],
             console=Console(file=log),
             progress="json",
         )

@@ -24,7 +24,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
-from jobs.run.receipt import measure
+from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 from pipeline.storage import place
 from tests.jobs.s3_server import serving
@@ -52,7 +52,7 @@ def fill(tasks: list[Shard], folder: Path, address: str) -> None:
         for path in task.products:
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(task.id)
-        ledger.finish(task, {Path(path).name: measure(folder / path) for path in task.products}, 1.0)
+        ledger.finish(task, {Path(path).name: Product.of(folder / path) for path in task.products}, 1.0)
     storage = s3fs.S3FileSystem()
     storage.makedirs(address.split("/")[2])
     storage.put(str(folder) + "/", address + "/", recursive=True)

@@ -5,8 +5,8 @@ from typing import ClassVar
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jobs.plan.ready import Ready
-from jobs.plan.task import Task, urgencies
+from jobs.plan.ready import Ready, chains
+from jobs.plan.task import Task
 
 
 class Step(Task):
@@ -46,7 +46,7 @@ def plans(draw):
 @given(plans(), st.integers(1, 3), st.randoms(use_true_random=False))
 @settings(max_examples=150, deadline=None)
 def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
-    ready, urgency = Ready(tasks, []), urgencies(tasks)
+    ready, urgency = Ready(tasks, []), chains(tasks, {task.id: task.cost for task in tasks})
     done, waiting, running = set(), {task.id: task for task in tasks}, {}
     while waiting or running:
         taken = ready.take(slots)
@@ -77,7 +77,7 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(tasks, slots, random):
                 ready.again(task)
                 waiting[task.id] = task
             case "fail":
-                ready.fail(task)
+                ready.free(task)
                 # What needs it, directly or not, stays behind.
                 lost = {task.id}
                 for other in tasks:
@@ -97,7 +97,7 @@ def test_a_free_slot_is_filled_before_the_task_that_ended_is_done():
     assert ready.take(1, alone=False) == [other]  # what needs the first still waits
     ready.finish(first)
     ready.free(other)
-    ready.fail(other)
+    ready.free(other)
     assert ready.take(1, alone=False) == [after]
     ready.finish(after)
     assert ready.take(1, alone=False) == [] and ready.take(1) == [alone]
@@ -134,3 +134,10 @@ def test_what_needs_a_lost_task_waits_for_ever():
     ready = Ready([after], [first.id])
     ready.lose(first)
     assert not ready.take(9) and ready.waiting == [after]
+
+
+def test_the_longest_chain_is_the_most_urgent():
+    short, long = Step(name=1), Step(name=2)
+    after = Step(name=3, after=(long.id, "done before"))
+    seconds = {short.id: 5, long.id: 1, after.id: 30}
+    assert chains([short, long, after], seconds) == {short.id: 5, long.id: 31, after.id: 30}

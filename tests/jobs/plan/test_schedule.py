@@ -1,11 +1,14 @@
-"""Schedules against closed forms."""
+"""Schedules against closed forms; the time left, learnt by kind and counted along the schedule."""
 
+import time
 from typing import ClassVar
 
 import pytest
 
-from jobs.plan.schedule import doublings, longest_chain, schedule
+from jobs.plan.ready import chains
+from jobs.plan.schedule import Estimate, Schedule, doublings
 from jobs.plan.task import Task
+from tests.jobs.fake_stages import FakeTraining, task
 
 
 class Step(Task):
@@ -35,7 +38,7 @@ def of(tasks, seconds):
 )
 def test_equal_tasks_take_the_rounded_number_of_turns(workers, makespan, tail):
     tasks = [Step(name=index) for index in range(12)]
-    found = schedule(tasks, of(tasks, [1.0] * 12), workers)
+    found = Schedule.of(tasks, of(tasks, [1.0] * 12), workers)
     assert (found.makespan, found.tail, found.work) == (makespan, tail, 12.0)
     assert found.efficiency == pytest.approx(12 / (workers * makespan))
 
@@ -45,15 +48,15 @@ def test_a_long_task_at_the_end_is_the_tail():
     net = Step(name=9, after=tuple(shard.id for shard in shards))
     tasks = [*shards, net]
     seconds = of(tasks, [1.0] * 8 + [10.0])
-    found = schedule(tasks, seconds, 4)
+    found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0)
-    assert longest_chain(tasks, seconds) == 11.0
-    assert schedule([net], seconds, 4).makespan == 10.0  # what it needs is done
+    assert max(chains(tasks, seconds).values()) == 11.0
+    assert Schedule.of([net], seconds, 4).makespan == 10.0  # what it needs is done
 
 
 def test_tasks_that_measure_time_run_one_by_one():
     tasks = [Step(name=0), Step(name=1), Alone(name=2), Alone(name=3)]
-    assert schedule(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
+    assert Schedule.of(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
 
 
 def test_doubling_ends_where_it_saves_little():
@@ -66,6 +69,45 @@ def test_doubling_ends_where_it_saves_little():
 
 
 def test_nothing_to_do_takes_no_time():
-    found = schedule([], {}, 4)
+    found = Schedule.of([], {}, 4)
     assert found.makespan == found.tail == 0.0 and found.efficiency == 1.0
     assert len(doublings([], {})) == 1
+
+
+class Costly(FakeTraining):
+    kind: ClassVar = "costly"
+
+    @property
+    def cost(self):
+        return self.seconds
+
+    @property
+    def group(self):
+        return self.name.split()[0]
+
+
+def costly(name, seconds, needs=()):
+    return task(name, Costly, needs, seconds=seconds)
+
+
+def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
+    estimate, first, other = Estimate(), costly("a 1", 100.0), costly("b 1", 100.0)
+    assert estimate.seconds(first) == 100.0
+    for _ in range(2):
+        estimate.learn(first, 700.0)
+    assert estimate.seconds(costly("a 2", 50.0)) == pytest.approx(350.0, rel=0.02)
+    assert estimate.seconds(other) == pytest.approx(700.0, rel=0.02)
+    estimate.learn(other, 100.0)
+    assert estimate.seconds(other) == pytest.approx(100.0, rel=0.02)
+
+
+def test_the_longest_chain_and_the_number_of_workers_count():
+    a, b = costly("a", 10.0), costly("b", 10.0)
+    c = costly("c", 10.0, [a])
+    whole = 10.0
+    for workers, lengths in ((1, 3), (2, 2), (9, 2)):
+        assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
+    # A task that is 3/4 done after 30 s goes on for 10 s.
+    began = time.monotonic() - 30.0
+    assert Estimate().seconds_left([a], {a.id: (began, 0.75)}, 1) == pytest.approx(10.0, rel=0.01)
+    assert Estimate().seconds_left([], {}, 1) == 0.0

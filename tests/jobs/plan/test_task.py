@@ -4,7 +4,7 @@ from typing import ClassVar
 import pytest
 from pydantic import ValidationError
 
-from jobs.plan.task import Coloured, Made, Place, Task, Uncoloured, urgencies
+from jobs.plan.task import Coloured, Made, Place, Task, Uncoloured
 from weaves.fabric import load_fabric
 
 
@@ -15,12 +15,7 @@ class Example(Task):
     folder: Place = ""
     network: Made = Made(task="0123", path="models/a")
     version: Place = "1"
-    seconds: Place = "1"
     after: tuple[str, ...] = ()
-
-    @property
-    def cost(self):
-        return float(self.seconds)
 
     @property
     def needs(self):
@@ -79,9 +74,3 @@ def test_colours_are_part_of_an_identity_where_they_shape_the_result(kind, chang
     assert kind(fabric=elsewhere).id == kind(fabric=fabric).id
     thick = fabric.model_copy(update={"optical_thickness": 3.0})
     assert kind(fabric=thick).id != kind(fabric=fabric).id
-
-
-def test_the_longest_chain_is_the_most_urgent():
-    short, long = Example(x=1, seconds="5"), Example(x=2, seconds="1")
-    after = Example(x=3, seconds="30", after=(long.id, "done before"))
-    assert urgencies([short, long, after]) == {short.id: 5, long.id: 31, after.id: 30}

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -13,32 +14,23 @@ from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
+import distributed
 import psutil
 import pytest
 from distributed import Client, LocalCluster
 from rich.console import Console
 
-from jobs.run.cluster import HERE, Scheduler, connected, dashboard_of
-from jobs.run.executor import execute
+from jobs.run import executor
+from jobs.run.cluster import HERE, Scheduler, connected
+from jobs.run.crew import Crew
 from jobs.run.ledger import Ledger
+from tests.jobs import fake_stages as fake
 from weaves.errors import BadInput, WorkFailed
 
 pytestmark = pytest.mark.external  # clusters of dask
 
-TESTS = Path(__file__).parents[1]
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parents[1])])}
-
-
-@pytest.fixture
-def fake(monkeypatch):
-    monkeypatch.syspath_prepend(TESTS)
-    import fake_stages
-
-    return fake_stages
-
-
-def quiet():
-    return Console(file=io.StringIO())
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+SHARDS = [fake.task(f"shard {index}", breaks=True) for index in range(3)]
 
 
 class Processes:
@@ -86,31 +78,38 @@ def processes(tmp_path):
 
 
 @pytest.fixture
-def scheduler(processes):
-    """A scheduler with one worker, which may see other files."""
+def shown():
+    return Console(file=io.StringIO(), width=400)
+
+
+def test_workers_of_somebody_elses_scheduler(tmp_path, processes, capfd):
+    """What one wrote elsewhere is no product; the scheduler's end is told."""
     processes.add(ELSEWHERE="1")
-    return processes.given, processes.processes[0]
-
-
-def test_a_scheduler_that_dies_ends_the_run_with_a_sentence_and_no_traceback(tmp_path, fake, scheduler, capfd):
-    address, process = scheduler
+    out, hidden = tmp_path / "out", fake.task("hidden", hides=True)
+    out.mkdir()
+    assert fake.run([hidden], out, scheduler=processes.given).failed == [hidden]
+    assert "every worker must see --out" in Ledger(out).reason(hidden)
     tasks = [fake.task("first"), *(fake.task(f"long {index}", seconds=30) for index in range(2))]
-
-    def kill(task, files):
-        process.kill()
-
+    kill = fake.Heard(lambda task: processes.processes[0].kill())
+    capfd.readouterr()
     with pytest.raises(WorkFailed, match="the dask scheduler is gone"):
-        execute(tasks, Ledger(tmp_path), scheduler=address, console=quiet(), recorded=kill)
-    assert Ledger(tmp_path).state(tasks[0]) == "done"
+        fake.run(tasks, out, scheduler=processes.given, manifests=[kill])
+    assert Ledger(out).state(tasks[0]) == "done"
     assert capfd.readouterr().err == ""
 
 
-def test_a_product_that_was_written_elsewhere_is_no_product(tmp_path, fake, scheduler):
-    task = fake.task("hidden", hides=True)
-    (tmp_path / "out").mkdir()
-    summary = execute([task], Ledger(tmp_path / "out"), scheduler=scheduler[0], console=quiet())
-    assert summary.failed == [task]
-    assert "every worker must see --out" in Ledger(tmp_path / "out").reason(task)
+def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, processes, monkeypatch):
+    """Also when the broken worker is there first and takes everything."""
+    processes.add(ELSEWHERE="1")
+
+    def join(todo):
+        processes.add()
+        processes.wait_for(2)
+        return ()
+
+    monkeypatch.setattr(executor, "kernel_groups", join)
+    summary = fake.run(SHARDS, tmp_path, scheduler=processes.given)
+    assert len(summary.ran) == 3 and not summary.failed
 
 
 OTHER_NUMBA = """
@@ -125,55 +124,37 @@ sys.modules["jobs"] = None
 """
 
 
-@pytest.mark.parametrize(
-    ("preload", "difference"),
-    [(OTHER_NUMBA, r"it has numba 0\.1 \(here \d+\.\d+\.\d+\)"), (NO_PACKAGE, r"it has no twillight of this version")],
-)
-def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, fake, processes, preload, difference):
-    processes.add(preload)
-    with pytest.raises(
-        WorkFailed, match=rf"^every worker is refused; worker tcp://127\.0\.0\.1:\d+ gets no task: {difference}"
-    ):
-        execute([fake.task("one")], Ledger(tmp_path), scheduler=processes.given, console=quiet())
+def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, processes, shown):
+    for preload in (OTHER_NUMBA, NO_PACKAGE):
+        processes.add(preload)
+    processes.wait_for(2)
+    refusal = r"worker tcp://127\.0\.0\.1:\d+ gets no task: it has "
+    with pytest.raises(WorkFailed, match=rf"^every worker is refused; {refusal}"):
+        fake.run(SHARDS, tmp_path, shown, scheduler=processes.given)
+    for difference in (r"numba 0\.1 \(here \d+\.\d+\.\d+\)", "no twillight of this version"):
+        assert len(re.findall(refusal + difference, shown.file.getvalue())) == 1
     assert not (tmp_path / "log.jsonl").exists()
 
 
 @pytest.mark.slow
-def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, fake, processes):
+def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, processes, shown):
     processes.add()
     tasks = [fake.task(f"shard {index}", seconds=0.3) for index in range(8)]
-    before = []
 
-    def join(task, files):
-        if not before:
+    def join(task):
+        if len(before) == 2:  # the manifests were saved, and one task is done
             processes.add(OTHER_NUMBA)
             processes.wait_for(2)
-        before.append(task)
 
-    console = quiet()
-    summary = execute(tasks, Ledger(tmp_path), scheduler=processes.given, console=console, recorded=join)
+    before = fake.Heard(join)
+    summary = fake.run(tasks, tmp_path, shown, scheduler=processes.given, manifests=[before])
     assert len(summary.ran) == 8
     assert len({event["pid"] for event in fake.events(tmp_path)}) == 1
-    told = console.file.getvalue()
-    assert told.count("gets no task: it has numba 0.1") == 1
-
-
-def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, fake, processes):
-    """Also when the broken worker is there first and takes everything."""
-    processes.add(ELSEWHERE="1")
-    tasks = [fake.task(f"shard {index}", breaks=True) for index in range(3)]
-
-    def prepare(todo):
-        processes.add()
-        processes.wait_for(2)
-        return ()
-
-    summary = execute(tasks, Ledger(tmp_path), scheduler=processes.given, console=quiet(), prepare=prepare)
-    assert len(summary.ran) == 3 and not summary.failed
+    assert shown.file.getvalue().count("gets no task: it has numba 0.1") == 1
 
 
 @pytest.mark.slow
-def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypatch):
+def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     shards = [fake.task(f"shard {index}", seconds=0.3) for index in range(18)]
     tasks = [*shards, fake.task("net", fake.FakeTraining, needs=shards)]
@@ -191,7 +172,7 @@ def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypa
             while not condition() and time.monotonic() < limit:
                 time.sleep(0.05)
 
-        def change(task, files):
+        def change(task):
             if len(seen) == 2:
                 wait_for(lambda: count() > 1)
             if len(seen) == 10:
@@ -200,29 +181,23 @@ def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, fake, monkeypa
             seen.append(count())
 
         given = Scheduler(cluster.scheduler_address)
-        summary = execute(tasks, Ledger(tmp_path), scheduler=given, console=quiet(), recorded=change)
+        summary = fake.run(tasks, tmp_path, scheduler=given, manifests=[fake.Heard(change)])
     assert len(summary.ran) == len(tasks) and not summary.failed and not summary.waiting
     assert all((tmp_path / task.products[0]).read_text() == f"{task.title}\n" * 100 for task in tasks)
     assert seen[2] > 1 and seen[10] == 1
 
 
-def test_a_port_that_listens_and_never_answers_is_bad_input(fake, tmp_path):
+def test_a_port_that_listens_and_never_answers_is_bad_input(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(BadInput, match="no dask scheduler answers"):
-            execute(fake.chain(), Ledger(tmp_path), scheduler=Scheduler(address), console=quiet())
+            fake.run(SHARDS, tmp_path, scheduler=Scheduler(address))
 
 
-def test_files_of_certificates_must_be_there(fake, tmp_path):
+def test_files_of_certificates_must_be_there(tmp_path):
     given = Scheduler("tls://127.0.0.1:1", key="nowhere.pem")
     with pytest.raises(BadInput, match=r"--tls-key: nowhere\.pem: is no file"):
-        execute(fake.chain(), Ledger(tmp_path), scheduler=given, console=quiet())
-
-
-@pytest.mark.parametrize("workers", [-3, 1025, 10**6])
-def test_an_impossible_number_of_workers_is_bad_input(fake, tmp_path, workers):
-    with pytest.raises(BadInput, match="--workers"):
-        execute(fake.chain(), Ledger(tmp_path), workers=workers, console=quiet())
+        fake.run(SHARDS, tmp_path, scheduler=given)
 
 
 STRANGER = """
@@ -246,37 +221,6 @@ for address in sys.argv[1:]:
 """
 
 
-def test_a_stranger_gets_no_answer_from_the_cluster_on_this_machine():
-    """Neither without a certificate nor with one of its own, over TLS or not."""
-    with connected(HERE, 1, str) as client:
-        addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
-        addresses += [worker["nanny"] for worker in client.scheduler_info()["workers"].values()]
-        assert len(addresses) == 3 and all(address.startswith("tls://127.0.0.1:") for address in addresses)
-        command = [sys.executable, "-c", STRANGER, *addresses]
-        done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False)
-        assert done.stdout.split() == ["refused"] * 12, done.stderr
-        # And the run's own client still works.
-        assert client.submit(os.getpid).result() != os.getpid()
-
-
-def test_a_cluster_that_does_not_end_in_time_is_killed(monkeypatch):
-    """As on a busy machine, where a worker compiles while it is to end."""
-    from distributed import LocalCluster
-
-    left = []
-
-    def close(cluster, timeout=None):
-        left.append(cluster)
-        raise TimeoutError
-
-    with monkeypatch.context() as patched, connected(HERE, 1, str) as client:
-        worker = psutil.Process(client.submit(os.getpid).result())
-        patched.setattr(LocalCluster, "close", close)
-    psutil.wait_procs([worker], timeout=300)
-    assert not worker.is_running()
-    left[0].close()
-
-
 def listening():
     """Return the ports at which this process and those it started wait for others."""
     driver = psutil.Process()
@@ -284,18 +228,40 @@ def listening():
     return {one.laddr.port for one in connections if one.status == "LISTEN"}
 
 
-def test_the_ports_of_the_cluster_on_this_machine_have_no_web_pages():
-    before = listening()
-    with connected(HERE, 1, str):
+def test_the_cluster_on_this_machine_answers_no_stranger_and_ends(monkeypatch):
+    """Neither without a certificate nor with one of its own, over TLS or not; no web page; no worker is left.
+
+    A worker that compiles on a busy machine may not end in time.
+    """
+    before, left = listening(), []
+
+    def close(cluster, timeout=None):
+        left.append(cluster)
+        raise TimeoutError
+
+    with monkeypatch.context() as patched, connected(HERE, 1, str) as client:
+        addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
+        addresses += [worker["nanny"] for worker in client.scheduler_info()["workers"].values()]
+        assert len(addresses) == 3 and all(address.startswith("tls://127.0.0.1:") for address in addresses)
+        command = [sys.executable, "-c", STRANGER, *addresses]
+        done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False)
+        assert done.stdout.split() == ["refused"] * 12, done.stderr
         ports = listening() - before
         assert len(ports) >= 4
         for port, page in product(ports, ("", "health", "info/main/workers.html", "json/counts.json", "metrics")):
             with pytest.raises(OSError):  # HTTPError is one
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}", timeout=60)
+        # And the run's own client still works.
+        worker = psutil.Process(client.submit(os.getpid).result())
+        patched.setattr(LocalCluster, "close", close)
+    assert worker.pid != os.getpid()
+    psutil.wait_procs([worker], timeout=300)
+    assert not worker.is_running()
+    left[0].close()
 
 
-@pytest.mark.parametrize(("found", "expected"), [(200, True), (404, False)])
-def test_a_dashboard_is_an_address_with_a_page(found, expected):
+@pytest.mark.parametrize("found", [200, 404])
+def test_a_dashboard_is_an_address_with_a_page(found):
     """A scheduler without one names its address too."""
 
     class Page(BaseHTTPRequestHandler):
@@ -308,17 +274,20 @@ def test_a_dashboard_is_an_address_with_a_page(found, expected):
 
     with HTTPServer(("127.0.0.1", 0), Page) as server:
         threading.Thread(target=server.handle_request, daemon=True).start()
-        client = SimpleNamespace(dashboard_link=f"http://127.0.0.1:{server.server_port}/status")
-        assert dashboard_of(client) == (client.dashboard_link if expected else None)
-    assert dashboard_of(client) is None  # nobody answers
+        crew = _crew(f"http://127.0.0.1:{server.server_port}/status")
+        assert crew.dashboard == (crew._client.dashboard_link if found == 200 else None)
+    assert crew.dashboard is None  # nobody answers
 
 
-def test_workers_that_cannot_start_are_no_bug(monkeypatch, fake, tmp_path):
-    import distributed
+def _crew(dashboard):
+    client = SimpleNamespace(dashboard_link=dashboard, subscribe_topic=lambda *given: None, nthreads=dict)
+    return Crew(client, True, print)
 
+
+def test_workers_that_cannot_start_are_no_bug(monkeypatch, tmp_path):
     def broken(**options):
         raise RuntimeError("Nanny failed to start.\nmore")
 
     monkeypatch.setattr(distributed, "LocalCluster", broken)
     with pytest.raises(WorkFailed, match=r"could not start: Nanny failed to start\.$"):
-        execute(fake.chain(), Ledger(tmp_path), console=quiet())
+        fake.run(SHARDS, tmp_path)

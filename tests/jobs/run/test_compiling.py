@@ -2,7 +2,7 @@ import pytest
 
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
-from jobs.run.compiling import compile_group, kernel_groups
+from jobs.run.compiling import kernel_groups
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def test_each_group_is_compiled_once_whatever_the_value_of_a_knob(tasks):
 
 def test_what_a_process_has_is_not_compiled_again(tasks):
     group = next(group for group in kernel_groups(tasks) if group.name == "prefiltered")
-    compile_group(group, lambda kernel: None)
+    group.compile(lambda kernel: None)
     heard = []
-    compile_group(group, heard.append)
+    group.compile(heard.append)
     assert heard == []

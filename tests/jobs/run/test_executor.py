@@ -1,7 +1,7 @@
-import hashlib
+"""What the driver decides, with each task done in this process; then runs on processes of this machine."""
+
 import io
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,196 +13,126 @@ import psutil
 import pytest
 from rich.console import Console
 
+from jobs.run import executor
 from jobs.run.cluster import Scheduler
-from jobs.run.executor import Preparation, execute
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import work
-from jobs.run.receipt import measure
+from tests.jobs import fake_stages as fake
 from weaves.errors import BadInput, WorkFailed
 
-pytestmark = pytest.mark.external  # clusters of dask
-
-HERE = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
-def fake(monkeypatch):
-    monkeypatch.syspath_prepend(HERE)
-    import fake_stages
-
-    return fake_stages
-
-
-def quiet():
-    return Console(file=io.StringIO())
+def plan():
+    shards = [fake.task(f"shard {index}") for index in range(3)]
+    net = fake.task("net", fake.FakeTraining, needs=shards)
+    return [*shards, net, fake.task("error", fake.FakeBench, needs=[net])]
 
 
-def hashes(out):
-    files = sorted(path for folder in ("generate", "train") for path in (out / folder).glob("*"))
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+def titles(tasks):
+    return [task.title for task in tasks]
 
 
-def test_a_failing_task_stops_only_what_needs_it(tmp_path, fake):
-    good, timed = fake.task("good"), fake.task("timed", fake.FakeTiming, seconds=0.3)
-    bad = fake.task("bad", fails="ZeroDivisionError('by zero')")
-    forgetful = fake.task("forgetful", forgets=True)
-    fine, stuck = fake.task("fine", fake.FakeTraining, needs=[good]), fake.task("stuck", fake.FakeTraining, needs=[bad])
-    slow = [fake.task(f"slow {index}", seconds=0.5) for index in range(2)]
-    tasks = [good, bad, forgetful, *slow, timed, fine, stuck]
-    recorded = []
-    summary = execute(
-        tasks, Ledger(tmp_path), workers=2, recorded=lambda task, files: recorded.append(task.title), console=quiet()
-    )
-
-    assert {task.title for task in summary.ran} == {"good", "fine", "timed", "slow 0", "slow 1"} == set(recorded)
-    assert {task.title for task in summary.failed} == {"bad", "forgetful"}
-    assert [task.title for task in summary.waiting] == ["stuck"]
-    ledger = Ledger(tmp_path)
-    assert ledger.reason(bad) == "ZeroDivisionError: by zero; tried 3 times"
-    assert "forgetful.txt" in ledger.reason(forgetful)
-    assert ledger.state(stuck) == "missing"
-
-    # What measures time ran after all else, alone, in a process that had done nothing before.
-    events = fake.events(tmp_path)
-    assert events[-1]["name"] == events[-2]["name"] == "timed"
-    assert events[-1]["pid"] not in {event["pid"] for event in events[:-2]}
-    assert {event["threads"] for event in events} == {"1"}
-
-    # A second run does the failed ones again and nothing else.
-    again = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
-    assert {task.title for task in again.ran + again.failed} == {"bad", "forgetful"}
-    assert len(again.before) == 5
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
 
 
-def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, fake):
-    done, bad = fake.task("done"), fake.task("bad", fails="ValueError('no kernel')")
-    execute([done], Ledger(tmp_path), workers=1, console=quiet())
-    tasks = [done, bad, *(fake.task(f"new {index}") for index in range(3))]
+def test_manifests_hear_of_each_task_and_are_whole_before_a_task_that_needs_others(tmp_path, here, plan):
+    heard = fake.Heard()
+    summary = fake.run(plan[:4], tmp_path, manifests=[heard])
+    assert titles(summary.ran) == ["shard 0", "shard 1", "shard 2", "net"]
+    assert heard == ["saved", *titles(plan[:3]), "saved", "net", "saved"]
+    again = fake.run(plan, tmp_path)
+    assert titles(again.before) == titles(plan[:4]) and titles(again.ran) == ["error"]
 
-    def prepare(todo):
-        return [Preparation(task.title, fake.prepare, (tmp_path, task)) for task in todo]
 
-    summary = execute(tasks, Ledger(tmp_path), workers=2, prepare=prepare, console=quiet())
+def test_kernels_are_compiled_before_the_tasks_that_are_not_done(tmp_path, here, monkeypatch, plan):
+    asked = []
+
+    def groups(tasks):
+        asked.extend(titles(tasks))
+        return [fake.Group("bad", tmp_path, fails=True), fake.Group("good", tmp_path)]
+
+    fake.done(tmp_path, plan[0])
+    monkeypatch.setattr(executor, "kernel_groups", groups)
+    summary = fake.run(plan[:3], tmp_path)
+    assert asked == titles(summary.ran) == ["shard 1", "shard 2"]
     events = [(event["event"], event["name"]) for event in fake.events(tmp_path)][2:]
-    assert {name for event, name in events[:3] if event == "prepared"} == {"new 0", "new 1", "new 2"}
-    # What cannot be compiled is told by the task that needs it.
-    assert [task.title for task in summary.failed] == ["bad"]
+    assert events[:2] == [("compiled", "good"), ("start", "shard 1")]
 
 
-def test_a_killed_worker_costs_one_retry(tmp_path, fake):
-    tasks = [fake.task("victim", dies=True, seconds=0.2), fake.task("other", seconds=0.4)]
-    summary = execute(tasks, Ledger(tmp_path), workers=2, console=quiet())
-    assert {task.title for task in summary.ran} == {"victim", "other"}
-    starts = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
-    assert starts.count("victim") == 2
+def test_a_damaged_shard_is_made_again_and_nothing_else(tmp_path, here, plan):
+    fake.done(tmp_path, *plan[:3])
+    shard = tmp_path / plan[1].products[0]
+    whole = shard.read_bytes()
+    flip(shard)
+    assert Ledger(tmp_path).state(plan[1]) == "done"  # its size is right
+    console = Console(file=io.StringIO(), width=200)
+    summary = fake.run(plan, tmp_path, console)
+    assert titles(summary.ran) == ["shard 1", "net", "error"] and titles(summary.before) == ["shard 0", "shard 2"]
+    assert shard.read_bytes() == whole
+    assert "generate shard 1: damaged, made again" in console.file.getvalue()
 
 
-@pytest.mark.slow
-def test_a_task_that_kills_every_worker_fails_alone(tmp_path, fake):
-    """The shards that wait at its worker die with it each time, and are done nevertheless."""
-    killer = fake.task("killer", dies=True, always=True)
-    tasks = [killer, *(fake.task(f"shard {index}") for index in range(2))]
-    summary = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
-    assert summary.failed == [killer] and len(summary.ran) == 2
-    assert "is there enough memory" in Ledger(tmp_path).reason(killer)
+def test_a_chain_of_damaged_products_is_made_again_and_what_no_task_reads_is_not_looked_at(tmp_path, here, plan):
+    fake.done(tmp_path, *plan[:4])
+    flip(tmp_path / plan[0].products[0])
+    assert titles(fake.run(plan, tmp_path).ran) == ["error"]
+    (tmp_path / "ledger" / f"{plan[4].id}.json").unlink()
+    flip(tmp_path / plan[3].products[0])
+    assert titles(fake.run(plan, tmp_path).ran) == ["shard 0", "net", "error"]
 
 
-@pytest.mark.slow
-def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path, fake):
-    """By default dask never replaces a worker that is not back when its time is over, and the run stands still."""
-    with dask.config.set({"distributed.deploy.lost-worker-timeout": "50ms"}):
-        tasks = [fake.task(f"victim {index}", dies=True) for index in range(2)]
-        summary = execute(tasks, Ledger(tmp_path), workers=1, console=quiet())
-    assert len(summary.ran) == 2
+def test_a_damaged_product_of_a_stage_that_does_not_run_is_named(tmp_path, here, plan):
+    fake.done(tmp_path, *plan[:3])
+    flip(tmp_path / plan[1].products[0])
+    for reason in (
+        "shard 1: its products were damaged and are removed; run `twillight generate`",
+        "train: 1 tasks that it needs are not done; run `twillight generate` first",
+    ):
+        with pytest.raises(WorkFailed, match=reason):
+            fake.run(plan, tmp_path, stages=["train"])
 
 
-def test_tasks_that_run_alone_have_a_process_each(tmp_path, fake):
-    tasks = [fake.task(f"timed {index}", fake.FakeTiming, dies=index == 3) for index in range(5)]
-    failing = fake.task("fails", fake.FakeTiming, fails="ValueError('late')")
-    summary = execute([*tasks, failing], Ledger(tmp_path), workers=2, console=quiet())
-    assert {task.title for task in summary.ran} == {task.title for task in tasks}
-    assert Ledger(tmp_path).reason(failing) == "ValueError: late; tried 3 times"
-    starts = [event for event in fake.events(tmp_path) if event["event"] == "start"]
-    assert (
-        len(starts) == len({event["pid"] for event in starts}) == 9
-    )  # one died and was replaced, one was tried three times
-    assert {event["threads"] for event in starts} == {"1"}
+@pytest.mark.parametrize("always", [False, True])
+def test_a_task_that_fails_on_an_input_damaged_meanwhile_is_tried_once_more(tmp_path, here, always):
+    shards = [fake.task(f"shard {index}") for index in range(2)]
+    victim = str(tmp_path / shards[0].products[0])
+    net = fake.task("net", fake.FakeTraining, needs=shards, damages=victim, always=always)
+    summary = fake.run([*shards, net], tmp_path)
+    if always:
+        assert titles(summary.failed) == ["net"]
+        return
+    assert titles(summary.ran) == ["shard 1", "shard 0", "net"]
+    names = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
+    assert names.count("shard 0") == names.count("net") == 2 and names.count("shard 1") == 1
 
 
-def test_work_left_out_before_is_named(tmp_path, fake):
-    with pytest.raises(WorkFailed, match="train: 8 tasks that it needs are not done; run `twillight generate` first"):
-        execute(fake.chain(), Ledger(tmp_path), stages=["train"], console=quiet())
-
-
-def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, fake):
-    with pytest.raises(BadInput, match="no dask scheduler answers"):
-        execute(fake.chain(), Ledger(tmp_path), scheduler=Scheduler("nonsense://"), console=quiet())
-
-
-def driver(out, plan="chain"):
-    command = [sys.executable, str(HERE / "fake_stages.py"), str(out), plan]
-    path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
-    # A background shell hands down an ignored SIGINT; the driver is to hear it as from a terminal.
-    process = subprocess.Popen(
-        command,
-        env={**os.environ, "PYTHONPATH": path},
-        start_new_session=True,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    deadline = time.monotonic() + 300
-    while len(list((out / "ledger").glob("[!.]*.json"))) < 2 or (plan == "timed" and '"long"' not in log(out)):
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.02)
-    return process, psutil.Process(process.pid).children(recursive=True)
-
-
-def log(out):
-    return (out / "log.jsonl").read_text()
-
-
-def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path, fake):
-    """Kill the driver in the middle; its workers end, and the next run comes to the bytes of an undisturbed one."""
-    process, workers = driver(tmp_path)
-    process.kill()
-    process.communicate(timeout=300)
-    _, alive = psutil.wait_procs(workers, timeout=300)
-    assert not alive
-    tasks = fake.chain()
-    done = sum(Ledger(tmp_path).state(task) == "done" for task in tasks)
-    assert 2 <= done < len(tasks)
-    summary = execute(tasks, Ledger(tmp_path), workers=2, console=quiet())
-    assert len(summary.before) == done and len(summary.ran) == len(tasks) - done
-    expected = {f"{task.title}.txt": hashlib.sha256(f"{task.title}\n".encode() * 100).hexdigest() for task in tasks}
-    assert hashes(tmp_path) == expected
-
-
-def test_a_task_that_runs_alone_ends_with_the_driver(tmp_path, fake):
-    process, children = driver(tmp_path, "timed")
-    process.kill()
-    process.communicate(timeout=300)
-    _, alive = psutil.wait_procs(children, timeout=300)
-    assert not alive
-    assert [event["event"] for event in fake.events(tmp_path) if event["name"] == "long"] == ["start"]
-
-
-def test_what_is_taken_from_another_data_set_is_recorded(tmp_path, fake):
-    """A second data set that shares a shard must hear of it: its manifest was written when the shard was not there."""
-    (tmp_path / "datasets" / "a").mkdir(parents=True)
-    (tmp_path / "datasets" / "a" / "x.txt").write_bytes(b"twelve bytes")
-    first, twin = (fake.task("x", folder=f"datasets/{name}") for name in "ab")
+def test_each_need_is_read_once(tmp_path, plan):
+    fake.done(tmp_path, *plan[:3])
     ledger = Ledger(tmp_path)
-    ledger.finish(first, {"x.txt": measure(tmp_path / first.products[0])}, 1.0)
-    recorded = []
-    summary = execute([twin], Ledger(tmp_path), recorded=lambda task, files: recorded.append(task), console=quiet())
-    assert recorded == [twin] == summary.before and not summary.ran
-    recorded.clear()
-    execute([twin], Ledger(tmp_path), recorded=lambda task, files: recorded.append(task), console=quiet())
-    assert not recorded
+    assert ledger.damaged(plan[:3]) == []
+    flip(tmp_path / plan[1].products[0])
+    assert ledger.damaged(plan[:3]) == []
+    assert ledger.damaged(plan[:3], anew=True) == [plan[1]]
+    assert not (tmp_path / plan[1].products[0]).exists()
+    assert Ledger(tmp_path).state(plan[1]) == "missing"
 
 
-def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, fake, monkeypatch):
+def test_what_is_taken_from_another_data_set_is_heard_of_once(tmp_path):
+    """A second data set that shares a shard: its manifest was written when the shard was not there."""
+    first, twin = (fake.task("x", folder=f"datasets/{name}") for name in "ab")
+    fake.done(tmp_path, first)
+    for expected in (["x", "saved"], ["saved"]):
+        heard = fake.Heard()
+        summary = fake.run([twin], tmp_path, manifests=[heard])
+        assert heard == expected and summary.before == [twin] and not summary.ran
+
+
+def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, monkeypatch):
     """A worker with several threads: two trainings in its process would draw from the same random numbers."""
     monkeypatch.setattr(fake.Fake, "shares_process", True)
     monkeypatch.setattr(fake.FakeTraining, "shares_process", False)
@@ -213,3 +143,87 @@ def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, fak
     pids = {event["name"]: event["pid"] for event in fake.events(tmp_path)}
     assert pids["generate 0"] == pids["generate 1"] == os.getpid()
     assert len({*pids.values()}) == 3
+
+
+@pytest.mark.parametrize("workers", [-3, 1025, 10**6])
+def test_an_impossible_number_of_workers_is_bad_input(tmp_path, plan, workers):
+    with pytest.raises(BadInput, match="--workers"):
+        fake.run(plan, tmp_path, workers=workers)
+
+
+def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, plan):
+    with pytest.raises(BadInput, match="no dask scheduler answers"):
+        fake.run(plan, tmp_path, scheduler=Scheduler("nonsense://"))
+
+
+@pytest.mark.external
+def test_a_run_on_processes_of_this_machine(tmp_path, monkeypatch):
+    """Kernels first; a worker that dies, tasks that fail alone, and at the end tasks with a process each."""
+    good, victim = fake.task("good", seconds=0.4), fake.task("victim", dies=True, seconds=0.2)
+    bad, forgetful = fake.task("bad", fails="ZeroDivisionError('by zero')"), fake.task("forgetful", forgets=True)
+    fine, stuck = fake.task("fine", fake.FakeTraining, needs=[good]), fake.task("stuck", fake.FakeTraining, needs=[bad])
+    timed = [fake.task(f"timed {index}", fake.FakeTiming, dies=index == 1) for index in range(3)]
+    late = fake.task("late", fake.FakeTiming, fails="ValueError('late')")
+    tasks = [good, bad, forgetful, victim, *timed, late, fine, stuck]
+    groups = [fake.Group("whole", tmp_path), fake.Group("broken", tmp_path, fails=True)]
+    monkeypatch.setattr(executor, "kernel_groups", lambda todo: groups)
+    heard = fake.Heard()
+    summary = fake.run(tasks, tmp_path, workers=2, manifests=[heard])
+
+    assert set(titles(summary.ran)) == {"good", "victim", "fine", *titles(timed)} == {*heard} - {"saved"}
+    assert set(titles(summary.failed)) == {"bad", "forgetful", "late"} and titles(summary.waiting) == ["stuck"]
+    ledger = Ledger(tmp_path)
+    assert ledger.reason(bad) == "ZeroDivisionError: by zero; tried 3 times"
+    assert ledger.reason(late) == "ValueError: late; tried 3 times"
+    assert "forgetful.txt" in ledger.reason(forgetful) and ledger.state(stuck) == "missing"
+    events = fake.events(tmp_path)
+    assert (events[0]["event"], events[0]["name"]) == ("compiled", "whole")
+    starts = [event for event in events if event["event"] == "start"]
+    assert [event["name"] for event in starts].count("victim") == 2
+    # What measures time runs after all else, alone, in a new process: one died and was replaced, one was tried thrice.
+    alone = [event for event in starts if event["name"].startswith(("timed", "late"))]
+    assert starts[-len(alone) :] == alone and len(alone) == 7
+    assert len({event["pid"] for event in alone} - {event["pid"] for event in starts[: -len(alone)]}) == 7
+    assert {event["threads"] for event in events} == {"1"}
+
+
+@pytest.mark.external
+@pytest.mark.slow
+def test_a_task_that_kills_every_worker_fails_alone(tmp_path):
+    """The shards that wait at its worker die with it each time, and are done nevertheless."""
+    killer = fake.task("killer", dies=True, always=True)
+    tasks = [killer, *(fake.task(f"shard {index}") for index in range(2))]
+    summary = fake.run(tasks, tmp_path, workers=1)
+    assert summary.failed == [killer] and len(summary.ran) == 2
+    assert "is there enough memory" in Ledger(tmp_path).reason(killer)
+
+
+@pytest.mark.external
+@pytest.mark.slow
+def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path):
+    """By default dask never replaces a worker that is not back when its time is over, and the run stands still."""
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "50ms"}):
+        tasks = [fake.task(f"victim {index}", dies=True) for index in range(2)]
+        summary = fake.run(tasks, tmp_path, workers=1)
+    assert len(summary.ran) == 2
+
+
+@pytest.mark.external
+def test_a_killed_driver_leaves_no_process_and_the_next_run_goes_on(tmp_path, here):
+    """It is killed while a task runs alone; tests/faults/test_kills.py has random moments, and compares all bytes."""
+    command = [sys.executable, "-m", "tests.jobs.fake_stages", str(tmp_path)]
+    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.DEVNULL)
+    log, deadline = tmp_path / "log.jsonl", time.monotonic() + 300
+    while not log.exists() or '"long"' not in log.read_text():
+        assert time.monotonic() < deadline and driver.poll() is None
+        time.sleep(0.02)
+    children = psutil.Process(driver.pid).children(recursive=True)
+    driver.kill()
+    driver.wait()
+    assert children and not psutil.wait_procs(children, timeout=300)[1]
+    assert [event["event"] for event in fake.events(tmp_path) if event["name"] == "long"] == ["start"]
+    *shards, net, long = fake.timed()
+    more = fake.task("more", fake.FakeTraining, needs=shards)
+    summary = fake.run([*shards, net, more], tmp_path)
+    assert titles(summary.before) == ["shard 0", "shard 1", "net"] and titles(summary.ran) == ["more"]
+    assert Ledger(tmp_path).state(long) == "missing"

@@ -1,22 +1,24 @@
 import json
 import tempfile
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import Field
 
 from jobs.plan.task import Place, Task
 from jobs.run.ledger import Ledger
-from jobs.run.receipt import Product, Receipt, leaves, measure, read_receipt
-from jobs.run.store import store_of
+from jobs.run.receipt import Product, Receipt
+from jobs.run.store import Store
 from weaves.errors import BadInput, WorkFailed
 
 
 class Shard(Task):
     stage: ClassVar = "generate"
     folder: Place
+    about: dict[str, Any] = Field(default={})
 
     @property
     def title(self):
@@ -27,7 +29,7 @@ class Shard(Task):
         return (f"{self.folder}/part-x.parquet",)
 
     def versions(self):
-        return {}
+        return {"shard": 5}
 
 
 TASK = Shard(folder="datasets/a-1")
@@ -40,7 +42,7 @@ def done(tmp_path):
     product.parent.mkdir(parents=True)
     product.write_bytes(b"twelve bytes")
     ledger = Ledger(tmp_path)
-    ledger.finish(TASK, {product.name: measure(product)}, 1.5)
+    ledger.finish(TASK, {product.name: Product.of(product)}, 1.5)
     return ledger
 
 
@@ -116,20 +118,23 @@ def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
 
 
 def test_a_receipt_says_what_its_task_depended_on(done):
-    assert done.receipt(TASK).identity == leaves(TASK.identity())
+    assert done.receipt(TASK).identity == {"versions.shard": 5, "about": "#44136fa3"}
     (done.out / "ledger" / f"{'0' * 16}.json").write_text("{}")
     done.fail(TASK, "for the test")
     assert [receipt.task for receipt in done.receipts([])] == [TASK.id]
     assert not list(done.receipts([TASK.id]))
 
 
-def test_leaves_are_short():
-    identity = {"version": 5, "optics": {"warp": {"bend": 1.5}, "thick": 2.0}, "about": "x" * 25, "none": {}}
-    found = leaves(identity)
-    assert found.keys() == {"version", "optics.warp", "optics.thick", "about", "none"}
-    assert (found["version"], found["optics.thick"]) == (5, 2.0)
-    assert all(found[key].startswith("#") and len(found[key]) == 9 for key in ("optics.warp", "about", "none"))
-    assert leaves(identity | {"about": "y" * 25})["about"] != found["about"]
+def test_an_identity_on_a_receipt_is_short():
+    about = {"warp": {"bend": 1.5}, "thick": 2.0, "long": "x" * 25, "none": {}, "short": "y" * 24}
+    first, other = (
+        Receipt.of(Shard(folder="a", about=about | {"long": letter * 25}), {}, 0.0).identity for letter in "xz"
+    )
+    assert first.keys() == {"versions.shard", *(f"about.{key}" for key in about)}
+    assert (first["versions.shard"], first["about.thick"], first["about.short"]) == (5, 2.0, "y" * 24)
+    hashed = [first[f"about.{key}"] for key in ("warp", "long", "none")]
+    assert all(value.startswith("#") and len(value) == 9 for value in hashed)
+    assert {key for key in first if first[key] != other[key]} == {"about.long"}
 
 
 @pytest.mark.parametrize("value", [[1], {"a": {}}, float("inf")])
@@ -148,11 +153,11 @@ def test_every_flipped_byte_of_a_receipt_is_found(data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "receipt.json"
         path.write_bytes(whole)
-        found = read_receipt(path, "a" * 16)
+        found = Receipt.read(path, "a" * 16)
         assert found is not None and found.encoded() == whole
         assert found.model_dump(exclude={"checksum"}) == receipt.model_dump(exclude={"checksum"})
         path.write_bytes(whole[:place] + bytes([whole[place] ^ mask]) + whole[place + 1 :])
-        assert read_receipt(path, "a" * 16) is None
+        assert Receipt.read(path, "a" * 16) is None
 
 
 def test_a_failure_keeps_its_reason_until_success(tmp_path, done):
@@ -161,7 +166,7 @@ def test_a_failure_keeps_its_reason_until_success(tmp_path, done):
     assert (done.state(TASK), done.reason(TASK)) == ("failed", "the disk was full")
     product = tmp_path / TASK.products[0]
     product.write_bytes(b"whole")
-    done.finish(TASK, {product.name: measure(product)}, 1.0)
+    done.finish(TASK, {product.name: Product.of(product)}, 1.0)
     assert (done.state(TASK), done.reason(TASK)) == ("done", "")
 
 
@@ -182,7 +187,7 @@ def test_a_changed_shard_is_not_adopted(done):
 
 
 def test_one_run_at_a_time(tmp_path):
-    first, second = store_of(tmp_path), store_of(tmp_path)
+    first, second = Store.of(tmp_path), Store.of(tmp_path)
     with first.held(), pytest.raises(WorkFailed, match="another run is at work"), second.held():
         pass
     with second.held():
@@ -191,5 +196,5 @@ def test_one_run_at_a_time(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_bad_input(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(BadInput, match="--out must name a folder"), store_of(tmp_path / "file" / "out").held():
+    with pytest.raises(BadInput, match="--out must name a folder"), Store.of(tmp_path / "file" / "out").held():
         pass

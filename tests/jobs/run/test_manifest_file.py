@@ -1,14 +1,10 @@
 """The manifest is written now and then while shards are made, and is whole when it is read."""
 
-import io
-
 import pytest
-from rich.console import Console
 
 from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run import manifest_file
-from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.receipt import Product
@@ -62,23 +58,3 @@ def test_an_unchanged_manifest_is_not_written(made):
     add(parts[1])
     manifest.save()
     assert listed(manifest) == 2
-
-
-def test_what_was_put_off_is_done_before_a_task_that_needs_others(tmp_path, monkeypatch, request):
-    monkeypatch.syspath_prepend(request.path.parents[1])
-    import fake_stages as fake
-
-    shards_ = [fake.task(f"shard {index}") for index in range(3)]
-    net = fake.task("net", fake.FakeTraining, needs=shards_)
-    heard = []
-    execute(
-        [*shards_, net],
-        Ledger(tmp_path),
-        workers=1,
-        recorded=lambda task, files: heard.append(task.title),
-        settle=lambda: heard.append("settled"),
-        console=Console(file=io.StringIO()),
-    )
-    place = heard.index("net")
-    assert heard[place - 1] == "settled" and set(heard[:place]) >= {"shard 0", "shard 1", "shard 2"}
-    assert heard[-1] == "settled"

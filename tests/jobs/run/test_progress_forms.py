@@ -4,25 +4,18 @@ import json
 import pytest
 from rich.console import Console
 
-from jobs.plan import estimate
-from jobs.plan.estimate import Estimate
+from jobs.plan import schedule
+from jobs.plan.schedule import Estimate
 from jobs.run import progress, progress_forms
 from jobs.run.progress import Board
 from jobs.run.progress_forms import form_of
-
-
-@pytest.fixture
-def fake(monkeypatch, request):
-    monkeypatch.syspath_prepend(request.path.parents[1])
-    import fake_stages
-
-    return fake_stages
+from tests.jobs import fake_stages as fake
 
 
 class Clock:
     def __init__(self, monkeypatch):
         self.now = 0.0
-        for module in (progress, progress_forms, estimate):
+        for module in (progress, progress_forms, schedule):
             monkeypatch.setattr(module.time, "monotonic", lambda: self.now)
 
 
@@ -37,12 +30,11 @@ KEYS = {
 }
 
 
-def run(fake, clock, form):
+def run(clock, form):
     """Show a run of four equal shards on a stepped clock: one is done, one fails, one is tried again."""
     out = io.StringIO()
     tasks = [fake.task(f"shard {index}") for index in range(4)]
-    times = Estimate()
-    with Board(tasks, times, form_of(form, Console(file=out, width=200))) as board:
+    with Board(tasks, Estimate(), form_of(form, Console(file=out, width=200))) as board:
         board.compiling(0, 1, ["owen"])
         board.hear({"kernel": "slab"})
         board.compiling(1, 1, [])
@@ -50,8 +42,7 @@ def run(fake, clock, form):
         for task in tasks:
             board.begin(task)
         clock.now = 10.0
-        times.learn(tasks[0], 10.0)
-        board.end(tasks[0])
+        board.end(tasks[0], seconds=10.0)
         clock.now = 20.0
         board.end(tasks[1], "[the] disk was full")
         clock.now = 24.0
@@ -62,8 +53,8 @@ def run(fake, clock, form):
     return tasks, out.getvalue()
 
 
-def test_json_has_one_object_a_line_with_the_same_keys(fake, clock):
-    tasks, text = run(fake, clock, "json")
+def test_json_has_one_object_a_line_with_the_same_keys(clock):
+    tasks, text = run(clock, "json")
     lines = [json.loads(line) for line in text.splitlines()]
     assert all(set(line) == KEYS for line in lines)
     events = [line["event"] for line in lines]
@@ -85,8 +76,8 @@ def test_json_has_one_object_a_line_with_the_same_keys(fake, clock):
     assert by["again"]["message"] == "OSError: once" and 1.0 < by["again"]["seconds_left"] <= 11.0
 
 
-def test_lines_have_failures_rate_time_left_and_dashboard(fake, clock):
-    _, text = run(fake, clock, "plain")
+def test_lines_have_failures_rate_time_left_and_dashboard(clock):
+    _, text = run(clock, "plain")
     lines = text.splitlines()
     assert lines[0].startswith("compiling kernels: ")
     assert "4 tasks (generate 4) on 2 workers; dashboard: http://here:8787/status" in lines
@@ -100,14 +91,14 @@ def test_lines_have_failures_rate_time_left_and_dashboard(fake, clock):
         for task in tasks:
             board.begin(task)
             clock.now += 20.0
-            board.end(task, "why" if task is tasks[2] else "")
+            board.end(task, "why" if task is tasks[2] else "", seconds=1.0)
     shown = [line for line in out.getvalue().splitlines() if " of " in line]
     assert shown[0] == "generate 2 of 4 tasks; all 2 of 4, 3 tasks/min, 0:00:02 left"
     assert shown[-1] == "generate 4 of 4 tasks; all 4 of 4, 1 failed, 3 tasks/min, 0:00:00 left"
 
 
-def test_bars_have_failures_rate_and_dashboard(fake, clock):
-    _, text = run(fake, clock, "rich")
+def test_bars_have_failures_rate_and_dashboard(clock):
+    _, text = run(clock, "rich")
     assert "dashboard: http://here:8787/status" in text
     assert "2/4 tasks, 1 failed" in text and "4 tasks/min" in text
 
@@ -117,3 +108,29 @@ def test_auto_shows_bars_on_a_terminal_alone():
     assert form_of("auto", terminal).__func__ is form_of("rich", terminal).__func__
     log = Console(file=io.StringIO())
     assert form_of("auto", log).__func__ is form_of("plain", log).__func__
+
+
+def test_silence_is_told_after_a_minute_and_less_and_less_often(clock):
+    out = io.StringIO()
+    task = fake.task("tweed")
+    with Board([task], Estimate(), form_of("plain", Console(file=out, width=200))) as board:
+        board.start(2, None)
+        board.begin(task)
+        said = []
+        for clock.now in range(0, 600, 5):
+            before = len(out.getvalue())
+            board.waiting_for([task])
+            if "nothing reported" in out.getvalue()[before:]:
+                said.append(clock.now)
+        assert said == [60, 120, 240, 480]
+        board.hear({"task": task.id, "share": 0.5})
+        board.waiting_for([task])
+        board.workers = 0
+        clock.now += 61
+        board.waiting_for([task])
+        clock.now += 121
+        board.workers = 2
+        board.waiting_for([task] * 70)
+    assert "generate tweed, generate tweed and 65 more (2 workers)" in out.getvalue()
+    assert "under way: generate tweed (2 workers)" in out.getvalue()
+    assert out.getvalue().count("no worker: the scheduler has none") == 1

@@ -142,7 +142,7 @@ def test_values_that_were_never_right_are_odd(run):
     columns = {name: table.column(name).to_numpy().copy() for name in table.schema.names[1:]}
     columns["diffuse_warp"][3] = -1.0
     write_columns(path, "components", shard.shard.fabric.name, columns, {})
-    Ledger(run.out).finish(shard, {path.name: made_up.measure(path)}, 1.0)
+    Ledger(run.out).finish(shard, {path.name: made_up.Product.of(path)}, 1.0)
     code, _, told = run()
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
 

@@ -9,7 +9,7 @@ from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.receipt import measure
+from jobs.run.receipt import Product
 from pipeline.shards.manifest import Manifest
 from tests.jobs import made_up
 from tests.jobs.verbs.test_prune import RECIPE
@@ -84,7 +84,7 @@ def test_other_bytes_of_one_task_are_refused(parts, tmp_path):
     shutil.copytree(tmp_path / "a", tmp_path / "other")
     path = tmp_path / "other" / task.products[0]
     path.write_bytes(b"made with another version that was not told apart")
-    Ledger(tmp_path / "other").finish(task, {path.name: measure(path)}, 1.0)
+    Ledger(tmp_path / "other").finish(task, {path.name: Product.of(path)}, 1.0)
     code, _, told = parts("a", "other", "--out", "c")
     assert code == 2 and f"{path.name} of generate {task.title} has other bytes in each" in told
     assert not list((tmp_path / "c").glob("datasets/*/*"))

@@ -13,7 +13,7 @@ from jobs.plan.measurements.scenes import OnScene, SceneShot
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
-from jobs.run.receipt import measure
+from jobs.run.receipt import Product
 from jobs.verbs.require_recipe import write_recipe
 from jobs.verbs.savings import DIFFERENCE, SceneSaving, Value, conclusion, saved
 from pipeline.models.card import write_model
@@ -80,7 +80,7 @@ class Runs:
                 file.write_text("1234567")
             if task.stage == "train":
                 write_model(self.out / task.folder, b"1234567", {"steps_taken": task.training.steps})
-            files = {(self.out / path).name: measure(self.out / path) for path in task.products}
+            files = {(self.out / path).name: Product.of(self.out / path) for path in task.products}
             ledger.finish(task, files, seconds)
         return self
 
@@ -112,7 +112,7 @@ class Runs:
         page = plan(load_recipe(self.own))[-1]
         (self.out / page.products[0]).write_text("<html>")
         write_files(self.out / page.folder, [])
-        Ledger(self.out).finish(page, {Path(path).name: measure(self.out / path) for path in page.products}, 1.0)
+        Ledger(self.out).finish(page, {Path(path).name: Product.of(self.out / path) for path in page.products}, 1.0)
 
 
 @pytest.fixture
@@ -197,7 +197,7 @@ def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
                 continue
             for path in map(runs.out.joinpath, task.products):
                 path.touch()
-            files = {Path(path).name: measure(runs.out / path) for path in task.products}
+            files = {Path(path).name: Product.of(runs.out / path) for path in task.products}
             Ledger(runs.out).finish(task, files, 1.0)
     row = by_quantity(runs)[DIFFERENCE]
     assert row.narrow == pytest.approx((-0.03, -0.03, -0.03), rel=1e-5) and math.isnan(row.ratio)
