@@ -9,28 +9,20 @@ from reports.truth import path_traced
 from reports.truth.path_traced import OTHER, OURS, RECORDS, Traced, measure
 
 
-@pytest.fixture(scope="module")
-def found():
-    """Return a frame of 4 by 4 pixels; a reference of the same method, so that its own error is noise alone."""
+@pytest.mark.slow
+def test_every_method_has_an_error_and_a_time():
+    """A frame of 4 by 4 pixels; the reference is of the same method, so that its own error is noise alone."""
     import mitsuba as mi
 
     before = mi.variant()
     mitsuba()
-    yield list(measure(("sphere",), 4, {OURS: (1,), OTHER: (1, 2)}, (OURS, 4), 2))
+    found = list(measure(("sphere",), 4, {OURS: (1,), OTHER: (1, 2)}, (OURS, 4), 2))
     if before is not None:
         mi.set_variant(before)
-
-
-@pytest.mark.slow
-def test_every_method_has_an_error_and_a_time(found):
     assert [(one.method, one.samples) for one in found] == [(OTHER, "1"), (OTHER, "2"), (OURS, "1")]
     for one in found:
         assert math.isfinite(one.error) and one.seconds > 0 and one.count == 2
         assert math.isnan(one.gain) == (one.method == OTHER)
-
-
-@pytest.mark.slow
-def test_rows_are_kept_by_their_records(found):
     back = RECORDS.from_records(RECORDS.to_records(found))
     assert [(one.method, one.fabric, one.samples, one.error) for one in back] == [
         (one.method, one.fabric, one.samples, one.error) for one in found

@@ -29,23 +29,19 @@ FOUND = [
 ]
 
 
-def test_rows_come_back_equal():
-    assert ROWS.from_records(ROWS.to_records(FOUND)) == FOUND
-    assert type(ROWS.from_records(ROWS.to_records(FOUND))[0].failures) is int
-
-
-def test_one_record_a_number():
-    first, second, third = ROWS.to_records(FOUND[:1])
-    assert first == Record(
-        method="truth", setting="front | warp", fabric="denim", metric="worst_error", value=0.5, count=7, note="x = 3"
-    )
-    assert (second.metric, second.value, second.note) == ("naive_error", 0.25, "")
-    assert (third.metric, third.value) == ("not_finite", 2.0)
+def test_rows_are_one_record_a_number_and_come_back_equal():
+    records = ROWS.to_records(FOUND)
+    subject = Record(method="truth", setting="front | warp", fabric="denim", count=7)
+    assert records[:3] == [
+        subject.model_copy(update={"metric": metric, "value": value, "note": note})
+        for metric, value, note in (("worst_error", 0.5, "x = 3"), ("naive_error", 0.25, ""), ("not_finite", 2.0, ""))
+    ]
+    assert ROWS.from_records(records) == FOUND
+    assert type(ROWS.from_records(records)[0].failures) is int
 
 
 def test_nan_has_no_record_and_comes_back_as_the_default():
-    rows = [Row("front", "warp", "denim", 0.5, "", 2, 7, math.nan)]
-    records = ROWS.to_records(rows)
+    records = ROWS.to_records([Row("front", "warp", "denim", 0.5, "", 2, 7, math.nan)])
     assert [record.metric for record in records] == ["worst_error", "not_finite"]
     assert ROWS.from_records(records)[0].rival == math.inf
 
