@@ -21,7 +21,6 @@ from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE, along_axes, deviations, line_points
 from pipeline.truth.query import Queries
-from weaves.colour_order import ThreadColours
 from weaves.fabric import Fabric
 
 _REACH: Final = 5.5  # in standard deviations; what lies beyond is 4e-8
@@ -34,25 +33,25 @@ _FAINT: Final = 1e-6  # share of the light by which threads count in any case
 _TINY: Final = 1e-30
 
 
-class Check(NamedTuple):
-    """A coloured fabric as kernels read it.
+class Threads(NamedTuple):
+    """The coloured ends, or picks, of a fabric.
 
     Attributes
     ----------
-    warp, weft : float64 (n, 9)
-        k_s, k_d and k_dt of each end (pick) of the sequence.
-    warp_seen, weft_seen : float64 (ends, picks), (picks, ends)
+    colours : float64 (n, 9)
+        k_s, k_d and k_dt of each of the sequence.
+    seen : float64 (threads of the weave's repeat, crossing threads)
         Share of each cell in which the yarn is seen from above.
-    ends, picks : int
+    repeat : int
         Repeat of weave and colours together.
+    even : float64 (threads of the weave's repeat, 9)
+        Mean colour of those that fall on each of the weave's repeat, over their number.
     """
 
-    warp: Float64
-    weft: Float64
-    warp_seen: Float64
-    weft_seen: Float64
-    ends: int
-    picks: int
+    colours: Float64
+    seen: Float64
+    repeat: int
+    even: Float64
 
 
 def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
@@ -81,14 +80,14 @@ def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
 
 def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of N queries by the sums of each thread, (N, 4, 3)."""
-    table, check = _table(fabric), _check(fabric)
+    table, (warp, weft) = _table(fabric), _threads(fabric)
     result = np.empty((len(queries.u), 4, 3))
     for start in range(0, len(result), _CHUNK):
         part = queries.take(slice(start, start + _CHUNK))
         sums, _ = query_sums(table, part)
         u, v, x, y = (np.ascontiguousarray(a, np.float64) for a in (part.u, part.v, *deviations(part, SMALLEST)[:2]))
         weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
-        found = weighed_colours(check, u, v, x, y, weights)
+        found = weighed_colours(warp, weft, u, v, x, y, weights)
         result[start : start + _CHUNK] = found.transpose(0, 2, 1, 3).reshape(-1, 4, 3)
     return result
 
@@ -96,7 +95,7 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
 def _from_above(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of N queries by what is seen from straight above, (N, 4, 3)."""
     wide = [np.ascontiguousarray(queries[k], np.float64) for k in (0, 1, 2, 5, 6)]
-    means = mean_colours(_check(fabric), *wide).reshape(-1, 2, 3, 3)
+    means = mean_colours(*_threads(fabric), *wide).reshape(-1, 2, 3, 3)
     through = (queries.wi[:, 2] * queries.wo[:, 2] < 0.0)[:, None, None]
     diffuse = np.where(through, means[:, :, 2], means[:, :, 1])
     return np.concatenate([means[:, :, 0], diffuse], axis=1)
@@ -108,36 +107,34 @@ def _table(fabric: Fabric) -> SoftNodeTable:
 
 
 @lru_cache(maxsize=64)
-def _check(fabric: Fabric) -> Check:
+def _threads(fabric: Fabric) -> tuple[Threads, Threads]:
+    """Return the ends and the picks as kernels read them."""
     over = fabric.weave.warp_over
     warp, weft = fabric.warp.width, fabric.weft.width
     warp_seen = np.where(over, warp, (1.0 - weft) * warp)
     weft_seen = np.where(over, (1.0 - warp) * weft, weft)
-
-    def stacked(colours: ThreadColours) -> Float64:
-        return np.ascontiguousarray(np.concatenate(colours, axis=1))
-
-    first, second = fabric.thread_colours()
-    return Check(
-        stacked(first),
-        stacked(second),
-        np.ascontiguousarray(np.maximum(warp_seen.T, _HIDDEN)),
-        np.ascontiguousarray(np.maximum(weft_seen, _HIDDEN)),
-        *fabric.repeat,
-    )
+    found = []
+    for thread_colours, seen, repeat in zip(
+        fabric.thread_colours(), (warp_seen.T, weft_seen), fabric.repeat, strict=True
+    ):
+        colours, even = np.concatenate(thread_colours, axis=1), np.zeros((len(seen), 9))
+        for thread in range(repeat):
+            even[thread % len(seen)] += colours[thread % len(colours)] / repeat
+        visible = np.ascontiguousarray(np.maximum(seen, _HIDDEN))
+        found.append(Threads(np.ascontiguousarray(colours), visible, repeat, even))
+    return found[0], found[1]
 
 
 @allocating_kernel
-def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Float64, angle: Float64) -> Float64:
+def mean_colours(
+    warp: Threads, weft: Threads, u: Float64, v: Float64, major: Float64, minor: Float64, angle: Float64
+) -> Float64:
     """Return k_s, k_d and k_dt of the ends and of the picks in N footprints, (N, 2, 9)."""
-    ends, picks = check.warp_seen.shape
+    ends, picks = warp.seen.shape
     found = np.zeros((len(u), 2, 9))
     weights = np.zeros(2)
     masses = np.zeros(ends), np.zeros(picks)
     sums = np.zeros((ends, 9)), np.zeros((picks, 9))
-    even = np.zeros((ends, 9)), np.zeros((picks, 9))
-    _fold_evenly(check.warp, check.ends, even[0])
-    _fold_evenly(check.weft, check.picks, even[1])
     points = np.zeros((2, _POINTS), np.float32)
     for row in range(len(u)):
         x, y, correlation = along_axes(major[row], minor[row], angle[row])
@@ -146,19 +143,11 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
         weights[:] = 0.0
         for point in range(line_points(correlation, COARSE_LINE, points[0], points[1])):
             z = points[0, point] * shift
-            _fold(check.warp, check.ends, u[row] + z * x, blur * x, even[0], masses[0], sums[0])
-            _fold(
-                check.weft,
-                check.picks,
-                v[row] + math.copysign(z, z * correlation) * y,
-                blur * y,
-                even[1],
-                masses[1],
-                sums[1],
-            )
+            _fold(warp, u[row] + z * x, blur * x, masses[0], sums[0])
+            _fold(weft, v[row] + math.copysign(z, z * correlation) * y, blur * y, masses[1], sums[1])
             share = points[1, point]
-            weights[0] += _add(check.warp_seen, masses[1], masses[0], sums[0], share, found[row, 0])
-            weights[1] += _add(check.weft_seen, masses[0], masses[1], sums[1], share, found[row, 1])
+            weights[0] += _add(warp.seen, masses[1], masses[0], sums[0], share, found[row, 0])
+            weights[1] += _add(weft.seen, masses[0], masses[1], sums[1], share, found[row, 1])
         for family in range(2):
             for c in range(9):
                 found[row, family, c] /= weights[family]
@@ -166,21 +155,20 @@ def mean_colours(check: Check, u: Float64, v: Float64, major: Float64, minor: Fl
 
 
 @allocating_kernel
-def weighed_colours(check: Check, u: Float64, v: Float64, x: Float64, y: Float64, weights: Float64) -> Float64:
+def weighed_colours(
+    warp: Threads, weft: Threads, u: Float64, v: Float64, x: Float64, y: Float64, weights: Float64
+) -> Float64:
     """Return k_s and k_d of the ends and of the picks in N footprints of deviations x and y, (N, 2, 2, 3).
 
     `weights` (N, ends + picks, 2) are the specular and diffuse light of each thread of the weave's repeat.
     """
-    ends, picks = check.warp_seen.shape
+    ends, picks = warp.seen.shape
     found = np.zeros((len(u), 2, 2, 3))
     masses = np.zeros(ends), np.zeros(picks)
     sums = np.zeros((ends, 9)), np.zeros((picks, 9))
-    even = np.zeros((ends, 9)), np.zeros((picks, 9))
-    _fold_evenly(check.warp, check.ends, even[0])
-    _fold_evenly(check.weft, check.picks, even[1])
     for row in range(len(u)):
-        _fold(check.warp, check.ends, u[row], x[row], even[0], masses[0], sums[0])
-        _fold(check.weft, check.picks, v[row], y[row], even[1], masses[1], sums[1])
+        _fold(warp, u[row], x[row], masses[0], sums[0])
+        _fold(weft, v[row], y[row], masses[1], sums[1])
         _weigh(masses[0], sums[0], weights[row, :ends], found[row, 0])
         _weigh(masses[1], sums[1], weights[row, ends:], found[row, 1])
     return found
@@ -206,25 +194,14 @@ def _weigh(masses: Float64, sums: Float64, weights: Float64, found: Float64) -> 
 
 
 @kernel
-def _fold_evenly(colours: Float64, repeat: int, sums: Float64) -> None:
-    """Write the mean colour of the threads that fall on each thread of the weave's repeat, over their number."""
-    threads = len(sums)
-    for thread in range(repeat):
-        for c in range(9):
-            sums[thread % threads, c] += colours[thread % len(colours), c] / repeat
-
-
-@kernel
-def _fold(
-    colours: Float64, repeat: int, centre: float, sigma: float, even: Float64, masses: Float64, sums: Float64
-) -> None:
+def _fold(family: Threads, centre: float, sigma: float, masses: Float64, sums: Float64) -> None:
     """Write the mass of an axis of a footprint on each thread of the weave's repeat, and the same times its colour."""
-    threads = len(masses)
-    if sigma >= _SPREAD_OUT * repeat:
+    threads, colours = len(masses), family.colours
+    if sigma >= _SPREAD_OUT * family.repeat:
         masses[:] = 1.0 / threads
         for thread in range(threads):
             for c in range(9):
-                sums[thread, c] = even[thread, c]
+                sums[thread, c] = family.even[thread, c]
         return
     masses[:], sums[:] = 0.0, 0.0
     first, last = math.floor(centre - _REACH * sigma), math.floor(centre + _REACH * sigma)

@@ -148,11 +148,11 @@ def ggx(wi: Float64, wo: Float64, along: float, across: float, f0: Float64) -> F
     return np.asarray(fresnel * common[:, None])
 
 
-def charlie(wi: Float64, wo: Float64, roughness: float) -> Float64:
+def charlie(wi: Float64, wo: Float64) -> Float64:
     """Return the lobe of a white sheen without the incident cosine, (N,), in 1/sr; parameters as for `ggx`."""
     half = wi + wo
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    inverse = 1.0 / roughness**2
+    inverse = 1.0 / SHEEN_ROUGHNESS**2
     sine = np.sqrt(np.maximum(1.0 - half[:, 2] ** 2, 0.0))
     density = (2.0 + inverse) * sine**inverse / (2.0 * math.pi)
     return np.asarray(density / (4.0 * (wi[:, 2] + wo[2] - wi[:, 2] * wo[2])))
@@ -161,7 +161,9 @@ def charlie(wi: Float64, wo: Float64, roughness: float) -> Float64:
 def ggx_reflectance(along: float, across: float, f0: Float64) -> Float64:
     """Return the hemispherical reflectance of GGX at the grazing view, the mean over azimuths, (3,)."""
     wi = even_sky(_LOBE_DIRECTIONS)
-    return np.asarray(math.pi * np.mean([ggx(wi, wo, along, across, f0).mean(axis=0) for wo in _grazing()], axis=0))
+    return np.asarray(
+        math.pi * np.mean([ggx(wi, wo, along, across, f0).mean(axis=0) for wo in grazing_views()], axis=0)
+    )
 
 
 def white_f0(fabric: Fabric, share: Reflectance) -> Float64:
@@ -171,11 +173,12 @@ def white_f0(fabric: Fabric, share: Reflectance) -> Float64:
     return np.asarray(share.per_area(share.specular) / np.array(whole))
 
 
-def sheen_reflectance(roughness: float = SHEEN_ROUGHNESS) -> float:
-    """Return the hemispherical reflectance of a white sheen at the grazing view."""
-    return float(math.pi * charlie(even_sky(_LOBE_DIRECTIONS), _grazing()[0], roughness).mean())
+def sheen_reflectance(wo: Float64) -> float:
+    """Return the hemispherical reflectance of a white sheen towards a viewer (3,)."""
+    return float(math.pi * charlie(even_sky(_LOBE_DIRECTIONS), wo).mean())
 
 
-def _grazing() -> list[Float64]:
+def grazing_views() -> list[Float64]:
+    """Return viewers at `GRAZING_VIEW`, by azimuth."""
     sine, cosine = math.sin(math.radians(GRAZING_VIEW)), math.cos(math.radians(GRAZING_VIEW))
     return [np.array([sine * math.cos(turn), sine * math.sin(turn), cosine]) for turn in _SKY_VIEWS]

@@ -1,9 +1,8 @@
 """A material of texture maps, read over a footprint and evaluated: what a renderer without yarns does.
 
-Maps are read bilinearly within a mip level and linearly between levels: texels of width h, read so, average as a
-Gaussian of standard deviation h / 2 does, so the level is log2(2 sigma / h_0). A long footprint is the mean of up to
-`TAPS` readings along its longer axis, as anisotropic filters of hardware take it. What is read goes into one evaluation
-(the lobes and their sources are in pipeline.materials.lobes):
+Maps are read at mip levels (pipeline.analytic.mip_levels); a long footprint is the mean of up to `TAPS` readings along
+its longer axis, as anisotropic filters of hardware take it. What is read goes into one evaluation (the lobes and their
+sources are in pipeline.materials.lobes):
 
     opacity [ (1 - E s) (GGX + (1 - F) base / pi) + s charlie ] cos_i      light and viewer on one side
     opacity (1 - E s) through / pi |cos_i|                                  light from behind
@@ -21,9 +20,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.gauss_rules import taps
-from pipeline.compiled.arrays import Float32, Float64, Index
+from pipeline.analytic.mip_levels import MipLevels, add_mean, mip_levels
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, even_sky
+from pipeline.materials.lobes import SHEEN_ROUGHNESS, sheen_reflectance
 from pipeline.materials.planes import Layout, Planes
 from pipeline.materials.textures import Constants, textures
 from pipeline.truth.query import Queries
@@ -41,19 +41,13 @@ _LOBE = np.float32(1.0 / SHEEN_ROUGHNESS**2)
 _VIEWS: Final = 64
 
 
-class MipLevels(NamedTuple):
+class MaterialMaps(NamedTuple):
     """Maps of one cloth in unit colours, and the sheen.
 
     Attributes
     ----------
-    texels : float32 (T, TEXEL_CHANNELS)
-        All levels, finest first, row by row.
-    levels : int64 (L, 3)
-        First texel, columns and rows of each level.
-    extent : float64 (2,)
-        Ends and picks that the maps show.
-    finest : float
-        Width of the finest texels, in yarn spacings (the root of width times height).
+    maps : MipLevels
+        Of TEXEL_CHANNELS.
     sheen : float32 (4,)
         Share of the sheen of each component, in unit colours.
     specular : float32
@@ -64,26 +58,22 @@ class MipLevels(NamedTuple):
         In row n the places of n readings along an axis: of mean 0 and variance 1.
     """
 
-    texels: Float32
-    levels: Index
-    extent: Float64
-    finest: float
+    maps: MipLevels
     sheen: Float32
     specular: np.float32
     white: Float32
     taps: Float64
 
 
-def mip_levels(level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float) -> MipLevels:
+def tabulate(level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float) -> MaterialMaps:
     """Return the maps of a cloth at all levels, down to one texel.
 
     The sums of the finest `level` have red for the warp and green for the weft; `sheen`, (4,), is the share of the
     sheen of each component, `specular` the specular colour of the yarns in the maps.
     """
-    parts, levels, first = [], [], 0
+    levels = []
     while True:
         maps = textures(level, material)
-        height, width = maps.opacity.shape
         planes = (
             maps.opacity[..., None],
             maps.base_color[..., :2],
@@ -94,100 +84,70 @@ def mip_levels(level: Planes, material: Constants, shown: Layout, sheen: Float64
             maps.alpha_along[..., None],
             maps.alpha_across[..., None],
         )
-        parts.append(np.concatenate(planes, axis=-1).reshape(-1, TEXEL_CHANNELS))
-        levels.append((first, width, height))
-        first += width * height
-        if width == height == 1:
+        levels.append(np.concatenate(planes, axis=-1))
+        if maps.opacity.size == 1:
             break
         level = level.halved()
-    return MipLevels(
-        texels=np.concatenate(parts).astype(np.float32),
-        levels=np.array(levels, np.int64),
-        extent=np.array([shown.ends, shown.picks], np.float64),
-        finest=math.sqrt(shown.ends / shown.width * shown.picks / shown.height),
+    cosines = (np.arange(_VIEWS) + 0.5) / _VIEWS
+    views = np.stack([np.sqrt(1.0 - cosines**2), np.zeros(_VIEWS), cosines], axis=1)
+    return MaterialMaps(
+        maps=mip_levels(levels, (shown.ends, shown.picks)),
         sheen=sheen.astype(np.float32),
         specular=np.float32(specular),
-        white=_white_sheen(),
+        white=np.array([sheen_reflectance(view) for view in views], np.float32),
         taps=taps(TAPS),
     )
 
 
-def answer(maps: MipLevels, queries: Queries) -> Float32:
+def answer(tables: MaterialMaps, queries: Queries) -> Float32:
     """Return the components of N queries about flat cloth seen from the front, (N, 4)."""
     shape = (queries.u, queries.v, queries.sigma, queries.sigma_minor, queries.angle, queries.wi, queries.wo)
-    return _answer(maps, *(np.ascontiguousarray(column, np.float32) for column in shape))
-
-
-def _white_sheen() -> Float32:
-    """Return the reflectance of a white sheen at cosines (i + 1/2) / `_VIEWS`."""
-    wi, shares = even_sky(4096), []
-    for cosine in (np.arange(_VIEWS) + 0.5) / _VIEWS:
-        shares.append(
-            math.pi * charlie(wi, np.array([math.sqrt(1.0 - cosine**2), 0.0, cosine]), SHEEN_ROUGHNESS).mean()
-        )
-    return np.array(shares, np.float32)
+    return _answer(tables, *(np.ascontiguousarray(column, np.float32) for column in shape))
 
 
 @allocating_kernel
 def _answer(
-    maps: MipLevels, u: Float32, v: Float32, major: Float32, minor: Float32, angle: Float32, wi: Float32, wo: Float32
+    tables: MaterialMaps,
+    u: Float32,
+    v: Float32,
+    major: Float32,
+    minor: Float32,
+    angle: Float32,
+    wi: Float32,
+    wo: Float32,
 ) -> Float32:
     result = np.zeros((len(u), 4), np.float32)
     read = np.zeros(TEXEL_CHANNELS, np.float32)
     for row in range(len(u)):
         read[:] = _0
-        _read(maps, u[row], v[row], major[row], minor[row], angle[row], read)
+        _read(tables, u[row], v[row], major[row], minor[row], angle[row], read)
         if read[0] > _0:
-            _evaluate(maps, read, wi[row], wo[row], result[row])
+            _evaluate(tables, read, wi[row], wo[row], result[row])
     return result
 
 
 @kernel
-def _read(maps: MipLevels, u: float, v: float, major: float, minor: float, angle: float, read: Float32) -> None:
+def _read(tables: MaterialMaps, u: float, v: float, major: float, minor: float, angle: float, read: Float32) -> None:
     """Add the mean of the maps over a footprint to `read`."""
-    last = len(maps.levels) - 1
     narrow = max(minor, major / TAPS)
     count = min(max(math.ceil(major / narrow - 0.01), 1), TAPS)
     spread = math.sqrt(max(major * major - narrow * narrow, 0.0)) if count > 1 else 0.0
-    level = min(max(math.log2(2.0 * narrow / maps.finest), 0.0), float(last))
-    below = min(int(level), max(last - 1, 0))
-    share, weight = level - below, 1.0 / count
     for tap in range(count):
-        along = spread * maps.taps[count, tap]
-        x = (np.float64(u) + along * math.cos(angle)) / maps.extent[0]
-        y = (np.float64(v) + along * math.sin(angle)) / maps.extent[1]
-        x, y = x - math.floor(x), y - math.floor(y)
-        _add(maps.texels, maps.levels[below], x, y, np.float32(weight * (1.0 - share)), read)
-        if share > 0.0:
-            _add(maps.texels, maps.levels[below + 1], x, y, np.float32(weight * share), read)
+        along = spread * tables.taps[count, tap]
+        x, y = np.float64(u) + along * math.cos(angle), np.float64(v) + along * math.sin(angle)
+        add_mean(tables.maps, x, y, narrow, 1.0 / count, read)
 
 
 @kernel
-def _add(texels: Float32, level: Index, x: float, y: float, share: np.float32, read: Float32) -> None:
-    """Add one level, read bilinearly around shares x and y of the maps' extent."""
-    first, width, height = level[0], level[1], level[2]
-    x, y = x * width - 0.5, y * height - 0.5
-    column, line = math.floor(x), math.floor(y)
-    right, up = np.float32(x - column), np.float32(y - line)
-    for dy in range(2):
-        weight_y = up if dy == 1 else _1 - up
-        for dx in range(2):
-            weight = share * weight_y * (right if dx == 1 else _1 - right)
-            texel = first + ((line + dy + height) % height) * width + (column + dx + width) % width
-            for c in range(TEXEL_CHANNELS):
-                read[c] += weight * texels[texel, c]
-
-
-@kernel
-def _evaluate(maps: MipLevels, read: Float32, wi: Float32, wo: Float32, result: Float32) -> None:
+def _evaluate(tables: MaterialMaps, read: Float32, wi: Float32, wo: Float32, result: Float32) -> None:
     """Write the four components of a material, with the incident cosine."""
     size = _1 / np.sqrt(max(read[7] * read[7] + read[8] * read[8] + read[9] * read[9], _TINY))
     nx, ny, nz = read[7] * size, read[8] * size, read[9] * size
     cos_i, cos_o = wi[0] * nx + wi[1] * ny + wi[2] * nz, wo[0] * nx + wo[1] * ny + wo[2] * nz
     if cos_o <= _0:
         return
-    specular, lost = _1 / maps.specular, maps.sheen[0] + maps.sheen[1] + maps.sheen[2] + maps.sheen[3]
-    under = _1 - lost * maps.white[min(int(cos_o * np.float32(_VIEWS)), _VIEWS - 1)]
+    specular, lost = _1 / tables.specular, tables.sheen[0] + tables.sheen[1] + tables.sheen[2] + tables.sheen[3]
+    under = _1 - lost * tables.white[min(int(cos_o * np.float32(_VIEWS)), _VIEWS - 1)]
     if wi[2] < _0:
         for family in range(2):
             result[2 + family] = read[0] * under * read[5 + family] * _INVERSE_PI * max(-cos_i, _0)
@@ -218,8 +178,8 @@ def _evaluate(maps: MipLevels, read: Float32, wi: Float32, wo: Float32, result: 
     for family in range(2):
         own = read[3 + family] / max(f0, _TINY) * fresnel
         base = (_1 - fresnel) * read[1 + family] * _INVERSE_PI * cos_i
-        result[family] = read[0] * specular * (under * own * ggx + maps.sheen[family] * charlie)
-        result[2 + family] = read[0] * (under * base + maps.sheen[2 + family] * charlie)
+        result[family] = read[0] * specular * (under * own * ggx + tables.sheen[family] * charlie)
+        result[2 + family] = read[0] * (under * base + tables.sheen[2 + family] * charlie)
 
 
 @kernel

@@ -24,6 +24,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.mip_levels import halved
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.materials.lobes import Reflectance, white_f0
 from weaves.errors import BadInput
@@ -99,7 +100,7 @@ class Planes(NamedTuple):
 
     def halved(self) -> Planes:
         """Return the next mip level: half of each side that is longer than one texel."""
-        return Planes(*(_halved(plane) for plane in self))
+        return Planes(*(halved(plane) for plane in self))
 
 
 def layout(fabric: Fabric, size: int) -> Layout:
@@ -226,12 +227,3 @@ def _colours(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, kind
     yarn = surface.yarn[..., None]
     on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])
     return np.asarray(np.where(yarn == GAP, 0.0, on_yarn))
-
-
-def _halved(plane: Float32) -> Float32:
-    """Return the means of two by two texels."""
-    if plane.shape[0] > 1:
-        plane = 0.5 * (plane[0::2] + plane[1::2])
-    if plane.shape[1] > 1:
-        plane = 0.5 * (plane[:, 0::2] + plane[:, 1::2])
-    return np.asarray(plane, np.float32)

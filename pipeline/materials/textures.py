@@ -27,7 +27,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.materials.lobes import Reflectance, ggx_reflectance, sheen_reflectance, white_f0
+from pipeline.materials.lobes import Reflectance, ggx_reflectance, grazing_views, sheen_reflectance, white_f0
 from pipeline.materials.planes import PAIRS, Planes
 from weaves.fabric import Fabric
 
@@ -180,4 +180,4 @@ def _sheen(fabric: Fabric, share: Reflectance) -> Float64:
         lobe = share.coverage[family] * ggx_reflectance(yarn.roughness, 1.0, k_s * factor[family])
         truth = k_d * share.grazing_diffuse[family] + k_s * share.grazing_specular[family]
         missing += truth - k_d * share.diffuse[family] * (1.0 - lobe.max()) - lobe
-    return np.asarray(np.clip(missing / sheen_reflectance(), 0.0, 1.0))
+    return np.asarray(np.clip(missing / sheen_reflectance(grazing_views()[0]), 0.0, 1.0))

@@ -21,9 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.analytic.soft_nodes.groups import USUAL
+from pipeline.compiled.arrays import nbytes
+from pipeline.models.analytic.soft_nodes import soft_tables
 from pipeline.models.method import Around, Method, in_chunks, refuse_other
-from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -42,7 +43,7 @@ class Bounded(Around):
 
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
-        self._tables = PerFabric(tabulate)
+        self._tables = soft_tables(USUAL)
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""
@@ -57,7 +58,7 @@ class Bounded(Around):
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes and those of the table."""
-        return self.method.bytes_stored(fabric) + self._tables.of(fabric).nbytes
+        return self.method.bytes_stored(fabric) + nbytes(self._tables.of(fabric))
 
 
 def limited(components: npt.NDArray[np.float32], bounds: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -2,8 +2,9 @@
 
 import pytest
 
-from pipeline.analytic.exact_points import PointSampler
+from pipeline.analytic.exact_points import sample_points
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -34,16 +35,16 @@ class Points:
 
     def __init__(self, count):
         self.count, self.setting = count, f"k = {count}"
-        self.samplers = {}
+        self.cloths = {}
 
     def covers(self, fabric):
         return True
 
     def prepare(self, fabric):
-        self.samplers[fabric.name] = PointSampler(fabric)
+        self.cloths[fabric.name] = cloth_side(fabric, TruthOptions())
 
     def predict(self, fabric, queries, seed=0):
-        return self.samplers[fabric.name].sample(queries, self.count, seed)
+        return sample_points(self.cloths[fabric.name], queries, self.count, seed)
 
     def bytes_stored(self, fabric):
         return 1000 * self.count

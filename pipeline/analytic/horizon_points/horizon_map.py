@@ -83,11 +83,6 @@ class HorizonMap(NamedTuple):
     yarn: Float32
     thickness: np.float32
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
-
 
 def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> HorizonMap:
     """Tabulate one side of a cloth, `grid` nodes a block and side; `back` is the other one, which hides gaps too.

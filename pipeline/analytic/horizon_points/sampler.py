@@ -31,7 +31,7 @@ from pipeline.analytic.horizon_points.horizon_map import (
     horizon_map,
     locate,
 )
-from pipeline.analytic.horizon_points.shading import BATCH, fill_points, gather, query_rows, shade_all
+from pipeline.analytic.horizon_points.shading import BATCH, fill_points, gather, query_rows, shade, uncover
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
@@ -58,36 +58,20 @@ _UNIT = np.float32(2.0**-23)
 Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
 
 
-class HorizonSampler:
-    """A fabric's horizon map, tabulated once.
+def tabulate(fabric: Fabric, grid: int, azimuths: int) -> HorizonMap:
+    """Return the horizon map of a fabric's front: `grid` nodes a piece of yarn and side, `azimuths` directions."""
+    model = cloth_side(fabric, TruthOptions())
+    return horizon_map(model.front, model.back, grid, azimuths)
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    grid, azimuths : int
-        Nodes of the map a piece of yarn and side, and directions.
-    soft : bool
-        Whether horizons are ramps.
-    """
 
-    def __init__(self, fabric: Fabric, grid: int = 16, azimuths: int = 32, soft: bool = False) -> None:
-        self._soft = soft
-        model = cloth_side(fabric, TruthOptions())
-        self.map = horizon_map(model.front, model.back, grid, azimuths)
-
-    def sample(self, queries: Queries, count: int, r2: bool, seed: int) -> Float32:
-        """Return the components from `count` points a query, (N, 4); queries are flat and lit from the front."""
-        u, v, wi, wo = (
-            np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
-        )
-        footprints = (u, v, *deviations(queries))
-        return _sample(self.map, footprints, wi, wo, count, r2, self._soft, np.uint64(seed))
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the map."""
-        return self.map.nbytes
+def sample_horizons(
+    table: HorizonMap, queries: Queries, count: int, r2: bool, seed: int, soft: bool = False
+) -> Float32:
+    """Return the components from `count` points a query, (N, 4); queries are flat and lit from the front."""
+    u, v, wi, wo = (
+        np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
+    )
+    return _sample(table, (u, v, *deviations(queries)), wi, wo, count, r2, soft, np.uint64(seed))
 
 
 class _Batch(NamedTuple):
@@ -160,7 +144,8 @@ def _sample_rows(
         fill_points(points, places, values, shared, end - begin, count)
         total = (end - begin) * count
         locate(table, total, points, places)
-        shade_all(table, total, points, places, True)
+        uncover(table.horizon, total, points, places)
+        shade(table, total, points[WEIGHT], points)
         for row in range(begin, end):
             a, s_warp, s_weft, c_warp, c_weft = gather(
                 count, (row - begin) * count, area, diffuse, specular, warpness, weftness

@@ -42,7 +42,6 @@ from pipeline.analytic.horizon_points.horizon_map import (
     TURN_O,
     WARPNESS,
     WEFTNESS,
-    WEIGHT,
     HorizonMap,
 )
 from pipeline.analytic.soft_horizons import above, ramp
@@ -179,16 +178,6 @@ def shade(table: HorizonMap, count: int, weight: Float32, points: Float32) -> No
         faces = _1 if cos_i > _0 else _0
         diffuse[k] = a * lit * faces * _INVERSE_PI * (blend * cos_i + (_1 - blend) * iz_k)
         specular[k] = wide * lit * scattered
-
-
-@kernel
-def shade_all(table: HorizonMap, count: int, points: Float32, places: npt.NDArray[np.int32], shadows: bool) -> None:
-    """Write the shares of `count` located points, without `shadows` all of them visible."""
-    if shadows:
-        uncover(table.horizon, count, points, places)
-    else:
-        points[SEEN, :count], points[BOTH, :count] = _1, _1
-    shade(table, count, points[WEIGHT], points)
 
 
 @fast_kernel

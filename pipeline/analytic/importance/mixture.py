@@ -15,11 +15,7 @@ A single point is sampled exactly, by the direction that a flake mirrors to. `gi
 through S^(1/2) = I - (1 - alpha) t t^T they are the visible half of a sphere, so a cosine-distributed n about
 d = S^(1/2) given makes m = S^(1/2) n, and given mirrored in m is the sample:
 
-    pdf    = D(h) / (4 sigma(given)) over the whole sphere: reflection and transmission at once
-    weight = Lambda_given / (Lambda_given + Lambda_sampled) (1 - exp(-T (Lambda_given + Lambda_sampled))), reflected
-           = Lambda_given T exp(-T min Lambda) phi(T |Lambda_given - Lambda_sampled|), transmitted, phi as in the slab
-
-The weight is f |cos_sampled| / pdf: the chance that light meets a flake of the layer and leaves without a second one.
+    pdf = D(h) / (4 sigma(given)) over the whole sphere: reflection and transmission at once
 """
 
 from __future__ import annotations
@@ -32,7 +28,6 @@ import numpy as np
 from pipeline.analytic.importance.lobes import FAR, HEIGHT, NEAR, SHARE, SQUARE, STRAIGHT, TX, TY, TZ, Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.compiled.decorators import inlined_fast_kernel, kernel
-from pipeline.truth.scattering.slab import density, sigma
 
 
 @kernel
@@ -92,42 +87,6 @@ def sample_flake_scatter(
     x, y, z = 2.0 * facing * mx - wx, 2.0 * facing * my - wy, 2.0 * facing * mz - wz
     scale = 1.0 / math.sqrt(x * x + y * y + z * z)
     return x * scale, y * scale, z * scale
-
-
-@kernel
-def flake_scatter_pdf(
-    wx: float, wy: float, wz: float, sx: float, sy: float, sz: float, tx: float, ty: float, tz: float, alpha: float
-) -> float:
-    """Return the density, in 1/sr, with which `sample_flake_scatter` finds unit s when w is given.
-
-    Its integral over the sphere is 1. At s = -w, where no half vector exists, it is 0.
-    """
-    return density(wx + sx, wy + sy, wz + sz, tx, ty, tz, alpha) / (4.0 * sigma(wx, wy, wz, tx, ty, tz, alpha))
-
-
-@kernel
-def flake_scatter_weight(
-    sigma_given: float, sigma_sampled: float, cos_given: float, cos_sampled: float, thickness: float
-) -> float:
-    """Return f |cos_sampled| / pdf for unit k_s, in [0, 1].
-
-    Parameters
-    ----------
-    sigma_given, sigma_sampled : float
-        Projected flake areas towards both directions.
-    cos_given, cos_sampled : float
-        Their SIGNED cosines to the slab's normal, of one sign for reflection; cos_given is not 0.
-    thickness : float
-        Optical thickness T > 0.
-    """
-    given, sampled = abs(cos_given), abs(cos_sampled)
-    lambda_given, lambda_sampled = sigma_given / given, sigma_sampled / sampled
-    if cos_given * cos_sampled > 0.0:
-        share = sigma_given * sampled / (sigma_given * sampled + sigma_sampled * given)
-        return -share * math.expm1(-thickness * (lambda_given + lambda_sampled))
-    apart = thickness * abs(lambda_given - lambda_sampled)
-    phi = -math.expm1(-apart) / apart if apart > 0.0 else 1.0
-    return min(1.0, lambda_given * thickness * math.exp(-thickness * min(lambda_given, lambda_sampled)) * phi)
 
 
 STRAIGHT_ON: Final = 0.3

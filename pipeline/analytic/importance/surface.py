@@ -66,10 +66,10 @@ def tabulate_surface(fabric: Fabric) -> LobeSurface:
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         uniform=EVEN * longest_period(front),
-        piece_starts=found.piece_starts,
-        pieces=found.pieces,
-        bounds=found.bounds,
-        grid=found.grid.ravel(),
+        piece_starts=found["piece_starts"],
+        pieces=found["pieces"],
+        bounds=found["bounds"],
+        grid=found["grid"].ravel(),
         size=_GRID,
         luminance=np.array(
             [[luminance(getattr(yarn, name)) for yarn in (average.warp, average.weft)] for name in colours], np.float32

@@ -70,6 +70,24 @@ _INVERSE_PI = np.float32(1.0 / math.pi)
 _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
 
 
+class Reading(NamedTuple):
+    """Features and components of N queries.
+
+    Attributes
+    ----------
+    features : float32 (N, FEATURES)
+        For the network.
+    components : float32 (N, 4)
+        By the soft nodes alone.
+    bounds : float32 (N, 4)
+        The same without shadows of the light.
+    """
+
+    features: Float32
+    components: Float32
+    bounds: Float32
+
+
 @fast_kernel
 def _assemble(
     found: Float32,
@@ -79,11 +97,10 @@ def _assemble(
     wo: Float32,
     cloth: Float32,
     twists: Float32,
-    features: Float32,
-    components: Float32,
-    bounds: Float32,
+    reading: Reading,
 ) -> None:
-    """Turn sums into features (N, FEATURES), components (N, 4), and components without shadows (N, 4)."""
+    """Turn sums into what is read of N queries."""
+    features, components, bounds = reading
     for n in range(len(found)):
         bare = found[n, 0, BARE_AREA] + found[n, 1, BARE_AREA] + gaps[n]
         area = max(found[n, 0, AREA] + found[n, 1, AREA] + gaps[n], LEAST_SEEN * bare) + TINY
@@ -124,24 +141,6 @@ def _assemble(
             row[OF_QUERY + k] = cloth[k]
 
 
-class Reading(NamedTuple):
-    """Features and components of N queries.
-
-    Attributes
-    ----------
-    features : float32 (N, FEATURES)
-        For the network.
-    components : float32 (N, 4)
-        By the soft nodes alone.
-    bounds : float32 (N, 4)
-        The same without shadows of the light.
-    """
-
-    features: Float32
-    components: Float32
-    bounds: Float32
-
-
 def cloth_features(table: SoftNodeTable) -> Float32:
     """Return the features that are the same for all queries of a cloth, float32 (FEATURES - OF_QUERY,)."""
     yarn = table.yarn.astype(np.float64)
@@ -156,33 +155,20 @@ def cloth_features(table: SoftNodeTable) -> Float32:
 
 
 def read_queries(table: SoftNodeTable, queries: Queries) -> Reading:
-    """Read N queries, light and viewer in front; cloth is curved only if the table knows it.
-
-    Parameters
-    ----------
-    table : SoftNodeTable
-        The cloth.
-    queries : Queries
-        Footprints of any shape.
-    """
+    """Read N queries, light and viewer in front; cloth is curved only if the table knows it."""
     found, gaps = query_sums(table, queries)
     size = np.sqrt(np.maximum(queries.sigma, SMALLEST) * np.maximum(queries.sigma_minor, SMALLEST))
     wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
     reading = Reading(*(np.empty((len(wi), width), np.float32) for width in (FEATURES, 4, 4)))
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
-    _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, *reading)
+    _assemble(found, gaps, size, wi, wo, cloth_features(table), twists, reading)
     return reading
 
 
 def read_behind(table: SoftNodeTable, queries: Queries) -> Float32:
-    """Return components and transparency of N queries, float32 (N, 5); cloth is curved only if the table knows it.
+    """Return components and transparency of N queries, float32 (N, 5), the viewer in front and the light behind.
 
-    Parameters
-    ----------
-    table : SoftNodeTable
-        A cloth with what light from behind needs.
-    queries : Queries
-        The viewer in front, the light behind, footprints of any shape.
+    The table knows light from behind; cloth is curved only if it knows that, too.
     """
     sums, gaps = query_sums(table, queries)
     bare = sums[:, :, BARE_AREA].sum(axis=1) + gaps

@@ -11,6 +11,7 @@ different pieces there are, the coarser they are, so that a table stays near a m
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -154,11 +155,6 @@ class SoftNodeTable(NamedTuple):
     legendre: int
     narrow: np.float32
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
-
 
 def tabulate(
     fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False
@@ -214,7 +210,11 @@ def tabulate(
             of_nodes[:, indices], _ = _soft_horizons(group, across, along, of_grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
-    axes = _by_axis(groups, rules)
+    # Across a weft is along y.
+    wefts = [group.piece.family == WEFT for group in groups]
+    rules_x, of_x = _different(rule[weft] for rule, weft in zip(rules, wefts, strict=True))
+    rules_y, of_y = _different(rule[not weft] for rule, weft in zip(rules, wefts, strict=True))
+    rows = zip(groups, first_nodes, of_x, of_y, strict=True)
     waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
@@ -234,14 +234,14 @@ def tabulate(
         evenly=_in_blocks(evenly),
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
-        groups=_group_rows(groups, first_nodes, axes),
+        groups=np.array([(first, group.lines, x, y, group.piece.family) for group, first, x, y in rows], np.uint32),
         lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
-        places_x=_filled([rule.places for rule in axes[0].rules], edge=True).ravel(),
-        weights_x=_filled([rule.weights for rule in axes[0].rules], edge=False).ravel(),
-        places_y=_filled([rule.places for rule in axes[1].rules], edge=True).ravel(),
-        weights_y=_filled([rule.weights for rule in axes[1].rules], edge=False).ravel(),
+        places_x=_filled([rule.places for rule in rules_x], edge=True).ravel(),
+        weights_x=_filled([rule.weights for rule in rules_x], edge=False).ravel(),
+        places_y=_filled([rule.places for rule in rules_y], edge=True).ravel(),
+        weights_y=_filled([rule.weights for rule in rules_y], edge=False).ravel(),
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
@@ -263,28 +263,12 @@ def _in_blocks(values: Float64) -> Float32:
     return np.ascontiguousarray(values.reshape(*values.shape[:-1], blocks, BLOCK_NODES), np.float32)
 
 
-class PieceGrids(NamedTuple):
-    """The pieces of a cloth and their grids of horizons alone: columns of `SoftNodeTable` of the same names.
-
-    Attributes
-    ----------
-    piece_starts, pieces : int64 (cells + 1,), (P, 2)
-    bounds : float32 (P, 7)
-    grid : uint8 (grids, AZIMUTHS, size, size)
-    """
-
-    piece_starts: Index
-    pieces: Index
-    bounds: Float32
-    grid: npt.NDArray[np.uint8]
-
-
-def tabulate_pieces(model: ClothSide, size: int) -> PieceGrids:
-    """Return the pieces of one side of a cloth, and grids of `size` cells along each axis."""
+def tabulate_pieces(model: ClothSide, size: int) -> dict[str, Any]:
+    """Return the columns of `SoftNodeTable` about pieces, of one side of a cloth: grids have `size` cells a side."""
     located = _locate(model.front)
     x, y, gap = _grid_places(located.samples, size)
     grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
-    return PieceGrids(**_piece_columns(located), grid=grid)
+    return _piece_columns(located) | {"grid": grid}
 
 
 class _Located(NamedTuple):
@@ -320,33 +304,11 @@ def _piece_columns(located: _Located) -> dict[str, Any]:
     }
 
 
-class _AxisRules(NamedTuple):
-    """Different rules along an axis, and which of them each group has."""
-
-    rules: list[Rule]
-    of_groups: list[int]
-
-
-def _by_axis(groups: list[PieceGroup], rules: list[tuple[Rule, Rule]]) -> tuple[_AxisRules, _AxisRules]:
-    """Return the rules along x and y, given those across and along: across a weft is along y."""
-    pairs = [
-        (along, across) if group.piece.family == WEFT else (across, along)
-        for group, (across, along) in zip(groups, rules, strict=True)
-    ]
-    found = []
-    for own in zip(*pairs, strict=True):
-        different = list({id(rule): rule for rule in own}.values())
-        number = {id(rule): index for index, rule in enumerate(different)}
-        found.append(_AxisRules(different, [number[id(rule)] for rule in own]))
-    return found[0], found[1]
-
-
-def _group_rows(
-    groups: list[PieceGroup], first_nodes: list[int], axes: tuple[_AxisRules, _AxisRules]
-) -> npt.NDArray[np.uint32]:
-    """Return `SoftNodeTable.groups`."""
-    rows = zip(groups, first_nodes, axes[0].of_groups, axes[1].of_groups, strict=True)
-    return np.array([(first, group.lines, x, y, group.piece.family) for group, first, x, y in rows], np.uint32)
+def _different(rules: Iterable[Rule]) -> tuple[list[Rule], list[int]]:
+    """Return the different ones of some rules, and which of them each is; equal rules are one object."""
+    own = list(rules)
+    found = {id(rule): rule for rule in own}
+    return list(found.values()), [list(found).index(id(rule)) for rule in own]
 
 
 def _together(waves: Float32) -> Float32:

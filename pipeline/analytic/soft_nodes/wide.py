@@ -27,8 +27,8 @@ from pipeline.analytic.soft_nodes.shade import (
     write_sums,
 )
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER, faintest
-from pipeline.compiled.arrays import Float32, Index, Mask
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.arrays import Float32, Mask
+from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.compiled.float32 import remaining
 from pipeline.truth.footprint.mixture import COARSE_LINE, line_points
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
@@ -104,22 +104,10 @@ def waves_kept(size: Float32, narrowest: np.float32) -> int:
     return count
 
 
-@fast_kernel
-def wave_weights(
-    waves: Index,
-    nodes: Float32,
-    evenly: Float32,
-    look: SoftQuery,
-    count: int,
-    repeat: Index,
-    turns: Float32,
-    phases: Float32,
-    weight: Float32,
-) -> None:
-    """Write the weights of all nodes as a sum of the first `count` waves, a multiple of TOGETHER.
-
-    `turns` and `phases` are scratch.
-    """
+@inlined_fast_kernel
+def wave_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, count: int) -> None:
+    """Write the weights of all nodes as a sum of the first `count` waves, a multiple of TOGETHER."""
+    waves, repeat, turns, phases, weight = table.waves, table.repeat, scratch.turns, scratch.phases, scratch.weight
     ends, picks = np.float32(repeat[0]), np.float32(repeat[1])
     x, y = np.float32(look.x), np.float32(look.y)
     for axis in range(2):
@@ -144,7 +132,7 @@ def wave_weights(
         # Several waves at a time: sums stay in registers.
         own = weight[b]
         for g in range(count // TOGETHER):
-            part, phase = nodes[b, g], phases[g]
+            part, phase = table.wave_nodes[b, g], phases[g]
             p0, p1, p2, p3, p4, p5, p6, p7 = (
                 phase[0], phase[1], phase[2], phase[3], phase[4], phase[5], phase[6], phase[7]
             )  # fmt: skip
@@ -154,31 +142,25 @@ def wave_weights(
                     + p4 * part[4, k] + p5 * part[5, k] + p6 * part[6, k] + p7 * part[7, k]
                 )  # fmt: skip
         for k in range(BLOCK_NODES):
-            weight[b, k] = max(weight[b, k], _0) * evenly[b, k]
+            weight[b, k] = max(weight[b, k], _0) * table.evenly[b, k]
 
 
-@fast_kernel
-def product_weights(
-    group_starts: npt.NDArray[np.uint32],
-    cell_groups: npt.NDArray[np.uint32],
-    groups: npt.NDArray[np.uint32],
-    density_x: Float32,
-    density_y: Float32,
-    columns: npt.NDArray[np.uint32],
-    rows: npt.NDArray[np.uint32],
-    ends: int,
-    share: np.float32,
-    weight: Float32,
-) -> None:
-    """Add `share` times the weights of all nodes, (lines, COLUMNS): outer products over a group's touched cells."""
-    for pick in rows:
-        for end in columns:
+@inlined_fast_kernel
+def product_weights(table: SoftNodeTable, scratch: Scratch, columns: int, rows: int, share: np.float32) -> None:
+    """Add `share` times the weights of all nodes: outer products over a group's touched cells.
+
+    `columns` and `rows` are the numbers of touched cells along both axes.
+    """
+    ends, groups, weight = table.repeat[0], table.groups, scratch.lines
+    for pick in scratch.rows[:rows]:
+        for end in scratch.columns[:columns]:
             cell = pick * np.uint32(ends) + end
-            for c in range(group_starts[cell], group_starts[cell + np.uint32(1)]):
-                group = groups[cell_groups[np.uint32(c)]]
+            for c in range(table.group_starts[cell], table.group_starts[cell + np.uint32(1)]):
+                group = groups[table.cell_groups[np.uint32(c)]]
                 # Rules follow each other, COLUMNS numbers each.
                 at_x, at_y = group[RULE_X] * np.uint32(COLUMNS), group[RULE_Y] * np.uint32(COLUMNS)
-                across, along = density_x[end, at_x : at_x + COLUMNS], density_y[pick, at_y : at_y + COLUMNS]
+                across = scratch.density_x[end, at_x : at_x + COLUMNS]
+                along = scratch.density_y[pick, at_y : at_y + COLUMNS]
                 if group[GROUP_FAMILY] == WEFT:
                     along, across = across, along
                 start = group[START] // np.uint32(COLUMNS)
@@ -204,7 +186,7 @@ _PRODUCT: Final = 6.0
 @inlined_kernel
 def _mix_densities(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: float) -> None:
     """Write the weights of all nodes as products of densities along both axes, a mixture for a rotated footprint."""
-    ends, rho = table.repeat[0], look.rho
+    rho = look.rho
     blur = np.sqrt(_1 - abs(rho))
     # Beyond `widest` an axis is even; the images of a huge footprint are not to be counted.
     across_x = np.float32(min(max(blur * look.dx, RESOLVED), widest))
@@ -221,10 +203,7 @@ def _mix_densities(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, wide
             table.places_y, table.weights_y, np.float32(look.y + scratch.line_places[point] * line_y), across_y,
             np.float32(REACH), scratch.density_y, scratch.touched_y, scratch.rows,
         )  # fmt: skip
-        product_weights(
-            table.group_starts, table.cell_groups, table.groups, scratch.density_x, scratch.density_y,
-            scratch.columns[:columns], scratch.rows[:rows], ends, scratch.line_shares[point], scratch.lines,
-        )  # fmt: skip
+        product_weights(table, scratch, columns, rows, scratch.line_shares[point])
 
 
 @kernel
@@ -259,10 +238,7 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: f
     if look.narrowest >= table.uniform:
         shares = table.evenly
     elif look.narrowest >= table.waves_from and _waves_pay(table, look, widest):
-        wave_weights(
-            table.waves, table.wave_nodes, table.evenly, look, waves_kept(table.wave_size, look.narrowest),
-            table.repeat, scratch.turns, scratch.phases, scratch.weight,
-        )  # fmt: skip
+        wave_weights(table, scratch, look, waves_kept(table.wave_size, look.narrowest))
     else:
         _mix_densities(table, scratch, look, widest)
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]

@@ -42,13 +42,6 @@ _TINY = np.float32(1e-18)
 _FADED = np.float32(2e-3)  # seen share of the area at which components have faded to a half
 
 
-class TexelWindow(NamedTuple):
-    """Texels around a centre, int64 (CORNERS,), and their weights."""
-
-    texels: Index
-    weights: Float32
-
-
 class Rounds(NamedTuple):
     """N footprints as round ones along a line.
 
@@ -175,7 +168,7 @@ def gap_area(
 def _answer(tables: ClusterTables, queries: Rounds, places: Float64) -> Float32:
     """Return the components of all queries."""
     result = np.zeros((len(queries.u), 4), np.float32)
-    window = TexelWindow(np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32))
+    window = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
     slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
     _answer_rows(tables, queries, places, window, slots, result)
     return result
@@ -184,9 +177,14 @@ def _answer(tables: ClusterTables, queries: Rounds, places: Float64) -> Float32:
 # Not in `_answer`: what allocates counts references to every slice.
 @kernel
 def _answer_rows(
-    tables: ClusterTables, queries: Rounds, places: Float64, window: TexelWindow, slots: Slots, result: Float32
+    tables: ClusterTables,
+    queries: Rounds,
+    places: Float64,
+    window: tuple[Index, Float32],
+    slots: Slots,
+    result: Float32,
 ) -> None:
-    """Write the components of all queries; `window` and `slots` are scratch memory."""
+    """Write the components of all queries; `window` (texels and weights) and `slots` are scratch memory."""
     texels, weights = window
     for n in range(len(queries.u)):
         ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]

@@ -225,11 +225,6 @@ class ClusterTables(NamedTuple):
     yarn: Float32
     thickness: np.float32
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
-
 
 def tabulate(fabric: Fabric, clusters: int) -> ClusterTables:
     """Build the tables of a fabric's front, of `clusters` clusters in all."""

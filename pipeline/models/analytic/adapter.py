@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from operator import attrgetter
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
-from pipeline.compiled.arrays import Float32
+from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.method import Method, refuse_other
 from pipeline.models.options import Gaussian, Options, setting_of
 from pipeline.models.per_fabric import PerFabric
@@ -51,7 +50,7 @@ class Analytic(Generic[Table]):
         k: int | None,
         tables: PerFabric[Table],
         read: Callable[[Table, Queries, int], Float32],
-        stored: Callable[[Table], int] = attrgetter("nbytes"),
+        stored: Callable[[Any], int] = nbytes,
     ) -> None:
         self.name, self.setting = options.name, setting_of(k)
         self._kinds, self._tables, self._read, self._stored = options.kinds, tables, read, stored

@@ -18,7 +18,7 @@ from pipeline.models.per_fabric import PerFabric
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    from pipeline.materials.lookup import MipLevels
+    from pipeline.materials.lookup import MaterialMaps
 
 _Colour = tuple[float, float, float]
 _RED: Final[_Colour] = (1.0, 0.0, 0.0)
@@ -52,26 +52,26 @@ class MapMaterialOptions(AnalyticOptions):
         """Light from behind, and footprints of any shape by taps along their longer axis."""
         return frozenset({"behind", "stretch"})
 
-    def methods(self) -> list[Analytic[MipLevels]]:
+    def methods(self) -> list[Analytic[MaterialMaps]]:
         """Return the one method; its bytes are those of all levels at 8 bits a number, as programs store them."""
         from pipeline.materials.lookup import TEXEL_CHANNELS, answer
 
-        maps = PerFabric(lambda fabric: _maps(fabric, self))
+        tables = PerFabric(lambda fabric: _tables(fabric, self))
         return [
             Analytic(
                 self,
                 None,
-                maps,
-                lambda levels, queries, _: answer(levels, queries),
-                lambda levels: len(levels.texels) * TEXEL_CHANNELS,
+                tables,
+                lambda tables, queries, _: answer(tables, queries),
+                lambda tables: len(tables.maps.texels) * TEXEL_CHANNELS,
             )
         ]
 
 
-def _maps(fabric: Fabric, options: MapMaterialOptions) -> MipLevels:
-    """Return the mip levels of a fabric in unit colours."""
+def _tables(fabric: Fabric, options: MapMaterialOptions) -> MaterialMaps:
+    """Return the maps of a fabric in unit colours."""
     from pipeline.materials.lobes import reflectance
-    from pipeline.materials.lookup import mip_levels
+    from pipeline.materials.lookup import tabulate
     from pipeline.materials.planes import layout, planes
     from pipeline.materials.textures import constants
 
@@ -83,7 +83,7 @@ def _maps(fabric: Fabric, options: MapMaterialOptions) -> MipLevels:
         sheen = constants(white, share).sheen[0] * grazing / grazing.sum()
     painted = _painted(fabric, options.specular, (_RED, _GREEN))
     chosen = layout(painted, options.size)
-    return mip_levels(planes(painted, chosen, share), constants(painted, share), chosen, sheen, options.specular)
+    return tabulate(planes(painted, chosen, share), constants(painted, share), chosen, sheen, options.specular)
 
 
 def _painted(fabric: Fabric, specular: float, colours: tuple[_Colour, _Colour]) -> Fabric:

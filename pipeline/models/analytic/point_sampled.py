@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.compiled.arrays import Float32
+from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import Method
 from pipeline.models.per_fabric import PerFabric
@@ -25,8 +25,8 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    from pipeline.analytic.exact_points import PointSampler  # noqa: F401 - read by the type checker in a base class
-    from pipeline.analytic.horizon_points.sampler import HorizonSampler
+    from pipeline.analytic.horizon_points.horizon_map import HorizonMap
+    from pipeline.truth.cloth import ClothSide  # noqa: F401 - read by the type checker in a base class
 
 Count = Annotated[int, Field(ge=1, le=4096)]
 """A number of random points per query."""
@@ -70,18 +70,18 @@ class PointSampledOptions(AnalyticOptions):
         """Return one method for each number of points."""
         if self.visibility == "exact":
             return [ExactPoints(self, k) for k in self.counts]
-        from pipeline.analytic.horizon_points.sampler import HorizonSampler
+        from pipeline.analytic.horizon_points.sampler import sample_horizons, tabulate
 
         r2, soft = self.sequence == "r2", self.visibility == "soft_horizon"
-        samplers = PerFabric(lambda fabric: HorizonSampler(fabric, self.horizon_nodes, self.azimuths, soft))
+        maps = PerFabric(lambda fabric: tabulate(fabric, self.horizon_nodes, self.azimuths))
 
-        def read(count: int, sampler: HorizonSampler, queries: Queries, seed: int) -> Float32:
-            return sampler.sample(queries, count, r2, seed)
+        def read(count: int, table: HorizonMap, queries: Queries, seed: int) -> Float32:
+            return sample_horizons(table, queries, count, r2, seed, soft)
 
-        return [Analytic(self, k, samplers, partial(read, k)) for k in self.counts]
+        return [Analytic(self, k, maps, partial(read, k)) for k in self.counts]
 
 
-class ExactPoints(Analytic["PointSampler"]):
+class ExactPoints(Analytic["ClothSide"]):
     """Point sampling with exact visibility.
 
     Parameters
@@ -93,16 +93,20 @@ class ExactPoints(Analytic["PointSampler"]):
     """
 
     def __init__(self, options: PointSampledOptions, count: int) -> None:
-        from pipeline.analytic.exact_points import PointSampler
+        from pipeline.analytic.exact_points import sample_points
+        from pipeline.truth.cloth import cloth_side
 
         truth, self._count, self._r2 = TruthOptions(footprint=options.footprint), count, options.sequence == "r2"
         super().__init__(
             options,
             count,
-            PerFabric(lambda fabric: PointSampler(fabric, truth)),
-            lambda sampler, queries, seed: sampler.sample(queries, count, seed, self._r2),
+            PerFabric(lambda fabric: cloth_side(fabric, truth)),
+            lambda cloth, queries, seed: sample_points(cloth, queries, count, seed, self._r2),
+            lambda cloth: nbytes(cloth.front),
         )
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), of the points that `predict` has with this seed."""
-        return self._tables.of(fabric).transparency(looks, self._count, seed, self._r2)
+        from pipeline.analytic.exact_points import sample_transparency
+
+        return sample_transparency(self._tables.of(fabric), looks, self._count, seed, self._r2)

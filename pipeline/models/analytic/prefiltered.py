@@ -31,8 +31,16 @@ class PrefilteredOptions(AnalyticOptions):
 
     def methods(self) -> list[Analytic[PrefilteredMaps]]:
         """Return the one method."""
-        from pipeline.analytic.prefiltered import WIDENINGS, PrefilteredMaps
+        from pipeline.analytic.prefiltered import WIDENINGS, answer, tabulate
 
         widening = WIDENINGS[self.widening]
-        maps = PerFabric(lambda fabric: PrefilteredMaps(fabric, self.texels_per_yarn))
-        return [Analytic(self, None, maps, lambda maps, queries, _: maps.answer(queries, widening))]
+        tables = PerFabric(lambda fabric: tabulate(fabric, self.texels_per_yarn))
+        return [
+            Analytic(
+                self,
+                None,
+                tables,
+                lambda tables, queries, _: answer(tables, queries, widening),
+                lambda tables: tables.maps.texels.nbytes,
+            )
+        ]

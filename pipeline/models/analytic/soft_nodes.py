@@ -9,7 +9,8 @@ tabulated at the first such query.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
+from weakref import WeakValueDictionary
 
 from pydantic import Field
 
@@ -25,6 +26,16 @@ if TYPE_CHECKING:
 
 Level = Literal[1, 2, 4, 8]
 """A level of detail."""
+
+_SHARED: Final[WeakValueDictionary[tuple[int, bool, bool], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
+
+
+def soft_tables(level: int, behind: bool = False, curved: bool = False) -> PerFabric[SoftNodeTable]:
+    """Return the tables of fabrics at a level of detail, which all methods at hand share."""
+    from pipeline.analytic.soft_nodes.nodes import tabulate
+
+    tables = PerFabric(lambda fabric: tabulate(fabric, behind=behind, level=level, curved=curved))
+    return _SHARED.setdefault((level, behind, curved), tables)
 
 
 class SoftNodesOptions(AnalyticOptions):
@@ -64,16 +75,13 @@ class SoftNodes(Analytic["SoftNodeTable"]):
 
     def __init__(self, level: int = 2, name: str = "soft_nodes") -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
-        from pipeline.analytic.soft_nodes.nodes import tabulate
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
             return in_chunks(queries, lambda part: read_queries(table, part).components)
 
-        super().__init__(
-            SoftNodesOptions(name=name), level, PerFabric(lambda fabric: tabulate(fabric, level=level)), read
-        )
-        self._both_sides = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level))
-        self._curved = PerFabric(lambda fabric: tabulate(fabric, behind=True, level=level, curved=True))
+        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level), read)
+        self._both_sides = soft_tables(level, behind=True)
+        self._curved = soft_tables(level, behind=True, curved=True)
 
     def behind(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""

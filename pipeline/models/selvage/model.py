@@ -44,8 +44,8 @@ from pipeline.analytic.soft_nodes.features import (
     read_queries,
 )
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
-from pipeline.compiled.arrays import Float32
-from pipeline.models.analytic.soft_nodes import Level, SoftNodes
+from pipeline.compiled.arrays import Float32, nbytes
+from pipeline.models.analytic.soft_nodes import Level, SoftNodes, soft_tables
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import CHUNK_ROWS, refuse_other, row_by_row
@@ -231,6 +231,7 @@ class Selvage:
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
         self._nodes = SoftNodes(network.options.level, self.name)
+        self._tables = soft_tables(network.options.level)
         self._correction = _Folded([*network.hidden, network.last], network)
         self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
         self._answering = Answering(self._network, self._components)
@@ -338,11 +339,11 @@ class Selvage:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the table and of the network."""
-        return self._cloths.of(fabric).table.nbytes + 4 * sum(weight.numel() for weight in self._network.parameters())
+        return nbytes(self._cloths.of(fabric).table) + 4 * sum(weight.numel() for weight in self._network.parameters())
 
     def _tabulate(self, fabric: Fabric) -> _Cloth:
         """Return a fabric's table, and the biases of the first layers with all that the fabric alone decides."""
-        table = tabulate(fabric, level=self._network.options.level)
+        table = self._tables.of(fabric)
         own = torch.from_numpy(cloth_features(table))
         return _Cloth(table, self._correction.bias(own), self._estimate.bias(own))
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.exact_points import PointSampler
+from pipeline.analytic.exact_points import sample_points, sample_transparency
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -28,17 +29,19 @@ def test_points_converge_to_the_truth():
     fabric = load_fabric("basket")
     queries = _queries((30, 0), (45, 120), sigma=0.7)
     exact = estimate(fabric, queries, EXACT, 1)
-    np.testing.assert_allclose(PointSampler(fabric).sample(queries, 400_000, 1), exact.mean, rtol=0.03)
+    np.testing.assert_allclose(
+        sample_points(cloth_side(fabric, TruthOptions()), queries, 400_000, 1), exact.mean, rtol=0.03
+    )
 
 
 def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
     fabric = load_fabric("gauze")
     looks = _queries((45, 120), (45, 120), sigma=0.7)
     exact = estimate(fabric, looks, EXACT, 1).transparency
-    sampler = PointSampler(fabric)
+    cloth = cloth_side(fabric, TruthOptions())
     assert 0.05 < exact[0] < 0.95
-    np.testing.assert_allclose(sampler.transparency(looks, 400_000, 1), exact, rtol=0.02)
-    assert sampler.transparency(looks, 4, 1) != sampler.transparency(looks, 4, 2)
+    np.testing.assert_allclose(sample_transparency(cloth, looks, 400_000, 1), exact, rtol=0.02)
+    assert sample_transparency(cloth, looks, 4, 1) != sample_transparency(cloth, looks, 4, 2)
 
 
 @pytest.mark.parametrize("sigma", [1e-4, 1e4])
@@ -47,9 +50,9 @@ def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
 def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
     silk = load_fabric("silk_charmeuse")
     yarns = {name: getattr(silk, name).model_copy(update={"roughness": roughness}) for name in ("warp", "weft")}
-    sampler = PointSampler(silk.model_copy(update=yarns))
+    cloth = cloth_side(silk.model_copy(update=yarns), TruthOptions())
     for other in (0.0, 89.9):
         queries = _queries((theta, 13), (other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
-        values = sampler.sample(queries, 1, 0)
+        values = sample_points(cloth, queries, 1, 0)
         assert np.isfinite(values).all()
         assert (values >= 0).all()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, PrefilteredMaps
+from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, answer, tabulate
 from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
@@ -30,7 +30,7 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     x, y = (axis.ravel()[::7].astype(np.float32) for axis in (x, y))
     wi, wo = (np.tile(unit(*w), (len(x), 1)) for w in (wi, wo))
     queries = Queries.round(x, y, np.full(len(x), 1e-4, np.float32), wi, wo)
-    found = PrefilteredMaps(fabric, PER_YARN).answer(queries, NONE)
+    found = answer(tabulate(fabric, PER_YARN), queries, NONE)
 
     area, specular, diffuse = point_shares(fabric, x, y, wi[0], wo[0])
     whole = area.sum(axis=1, keepdims=True)
@@ -42,7 +42,7 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
 
 @pytest.fixture(scope="module")
 def maps():
-    return PrefilteredMaps(load_fabric("denim"), PER_YARN)
+    return tabulate(load_fabric("denim"), PER_YARN)
 
 
 def asked(u, v, sigma, wi=(0.3, -0.4), wo=(0.1, 0.6)):
@@ -52,7 +52,7 @@ def asked(u, v, sigma, wi=(0.3, -0.4), wo=(0.1, 0.6)):
 
 
 def test_each_level_is_the_mean_of_the_one_before(maps):
-    texels, levels = maps.pyramid.texels.astype(np.float64), maps.pyramid.levels
+    texels, levels = maps.maps.texels.astype(np.float64), maps.maps.levels
     whole = texels[: levels[0, 1] * levels[0, 2]].mean(axis=0)
     for first, width, height in levels:
         np.testing.assert_allclose(texels[first : first + width * height].mean(axis=0), whole, atol=1e-6)
@@ -63,17 +63,17 @@ def test_each_level_is_the_mean_of_the_one_before(maps):
 @pytest.mark.parametrize("widening", [NONE, TOKSVIG, LEAN])
 def test_a_wide_footprint_has_no_place_and_the_repeat_repeats(maps, widening):
     places = np.linspace(0.0, 3.0, 7, dtype=np.float32)
-    wide = maps.answer(asked(places, places, 50.0), widening)
+    wide = answer(maps, asked(places, places, 50.0), widening)
     np.testing.assert_allclose(wide, wide[:1].repeat(7, axis=0), rtol=1e-5)
-    ends, picks = maps.pyramid.repeat.astype(np.float32)
-    near, far = (maps.answer(asked(places + k * ends, places - k * picks, 0.2), widening) for k in (0, 64))
+    ends, picks = maps.maps.extent.astype(np.float32)
+    near, far = (answer(maps, asked(places + k * ends, places - k * picks, 0.2), widening) for k in (0, 64))
     np.testing.assert_allclose(far, near, rtol=1e-3, atol=1e-5 * near.max())
 
 
 def test_widening_lowers_highlights_and_leaves_the_diffuse_light(maps):
     """A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness."""
     middle = asked(np.zeros(1), np.zeros(1), 50.0, (0.0, 0.3), (0.0, -0.3))
-    none, toksvig, lean = (maps.answer(middle, widening)[0] for widening in (NONE, TOKSVIG, LEAN))
+    none, toksvig, lean = (answer(maps, middle, widening)[0] for widening in (NONE, TOKSVIG, LEAN))
     np.testing.assert_allclose(toksvig[2:], none[2:], rtol=1e-6)
     np.testing.assert_allclose(lean[2:], none[2:], rtol=1e-6)
     assert toksvig[:2].max() < none[:2].max() and lean[:2].max() < none[:2].max()

@@ -89,7 +89,7 @@ import numpy as np
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.analytic.horizon_points.sampler import HorizonSampler
+from pipeline.analytic.horizon_points.sampler import sample_horizons, tabulate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
@@ -98,7 +98,7 @@ queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "node_table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)[:2]),
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
-    "points": lambda: HorizonSampler(fabric).sample(queries, 16, True, 1),
+    "points": lambda: sample_horizons(tabulate(fabric, 16, 32), queries, 16, True, 1),
 }
 answers = {name: asked[name]() for name in sys.argv[1:]}
 for name in sorted(answers):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.materials.lobes import SHEEN_ROUGHNESS, charlie, even_sky, ggx, reflectance, white_f0
-from pipeline.materials.lookup import answer, mip_levels
+from pipeline.materials.lobes import charlie, even_sky, ggx, reflectance, white_f0
+from pipeline.materials.lookup import answer, tabulate
 from pipeline.materials.planes import Layout, Planes
 from pipeline.materials.textures import Constants
 from pipeline.truth.query import Queries
@@ -38,7 +38,7 @@ def maps_of(pattern, sheen=SHEEN):
         through=plane((0.1, 0.05, 0.0)),
     )
     found = Layout(4, 4, pattern.shape[1], pattern.shape[0])
-    return mip_levels(level, MATERIAL, found, sheen, SPECULAR), normal, fibre
+    return tabulate(level, MATERIAL, found, sheen, SPECULAR), normal, fibre
 
 
 def test_one_material_is_the_sum_of_its_lobes():
@@ -56,11 +56,9 @@ def test_one_material_is_the_sum_of_its_lobes():
     half = local + viewer
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     fresnel = f0.sum() + (1 - f0.sum()) * (1 - half @ viewer) ** 5
-    sheen = (charlie(local, viewer, SHEEN_ROUGHNESS) * cosine)[:, None] * SHEEN
+    sheen = (charlie(local, viewer) * cosine)[:, None] * SHEEN
     angle = even_sky(1 << 14)
-    under = (
-        1 - SHEEN.sum() * math.pi * charlie(angle, np.array([math.sqrt(1 - viewer[2] ** 2), 0, viewer[2]]), 0.5).mean()
-    )
+    under = 1 - SHEEN.sum() * math.pi * charlie(angle, np.array([math.sqrt(1 - viewer[2] ** 2), 0, viewer[2]])).mean()
     specular = (under * lobe[:, None] * f0 / f0.sum() + sheen[:, :2]) / SPECULAR
     base = under * ((1 - fresnel) * cosine)[:, None] * (0.3, 0.2) / math.pi + sheen[:, 2:]
     np.testing.assert_allclose(found, 0.75 * np.concatenate([specular, base], axis=1), rtol=2e-3)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.exact_points import PointSampler
+from pipeline.analytic.exact_points import sample_points
 from pipeline.analytic.horizon_points.horizon_map import SLOTS, horizon_map
-from pipeline.analytic.horizon_points.sampler import HorizonSampler
+from pipeline.analytic.horizon_points.sampler import sample_horizons, tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
@@ -29,9 +29,9 @@ def denim():
 def test_exact_points_err_by_their_order(denim):
     """Independent points by n^-1/2, within three standard errors of the fit; the R2 sequence errs less throughout."""
     fabric, queries, truth = denim
-    sampler = PointSampler(fabric)
+    cloth = cloth_side(fabric, TruthOptions())
     independent, r2 = (
-        [np.sqrt(np.mean((sampler.sample(queries, n, 3, sequence) @ COLOUR - truth) ** 2)) for n in COUNTS]
+        [np.sqrt(np.mean((sample_points(cloth, queries, n, 3, sequence) @ COLOUR - truth) ** 2)) for n in COUNTS]
         for sequence in (False, True)
     )
     assert -0.6 < np.polyfit(np.log(COUNTS), np.log(independent), 1)[0] < -0.4, independent
@@ -43,7 +43,7 @@ def test_a_map_adds_a_bias_that_a_finer_map_lacks(denim):
     fabric, queries, truth = denim
     errors = []
     for grid in (4, 16):
-        answers = HorizonSampler(fabric, grid).sample(queries, 1024, True, 3) @ COLOUR
+        answers = sample_horizons(tabulate(fabric, grid, 32), queries, 1024, True, 3) @ COLOUR
         errors.append(np.sqrt(np.mean((answers - truth) ** 2)) / truth.mean())
     assert errors[1] < 0.5 * errors[0] and errors[1] < 0.03, errors
 

@@ -10,6 +10,7 @@ from pipeline.analytic.horizon_points.horizon_map import (
     SCRATCH_ROWS,
     SINE,
     SPECULAR,
+    STEEPNESS,
     WARPNESS,
     WEFTNESS,
     WEIGHT,
@@ -18,7 +19,7 @@ from pipeline.analytic.horizon_points.horizon_map import (
     horizon_map,
     locate,
 )
-from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade_all
+from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade, uncover
 from pipeline.truth.geometry.heightfield import height_field
 from weaves.fabric import load_fabric
 
@@ -48,14 +49,18 @@ def test_every_point_is_the_point_model(point_shares, fabric, wi, wo):
     ends, picks = fabric.weave.repeat
     field = height_field(fabric)
     table = horizon_map(field, field, 4, 8)
+    # Horizons below every direction: nothing is hidden.
+    table = table._replace(horizon=np.full_like(table.horizon, -2.0))
     random = np.random.default_rng(6)
     points, places = np.zeros((SCRATCH_ROWS, COUNT), np.float32), np.zeros((INTEGERS, COUNT), np.int32)
-    points[X], points[Y], points[WEIGHT] = random.random(COUNT) * ends, random.random(COUNT) * picks, 1.0
+    points[X], points[Y] = random.random(COUNT) * ends, random.random(COUNT) * picks
+    points[WEIGHT], points[STEEPNESS] = 1.0, 1e9
     values, rows = np.zeros((9, 1), np.float32), np.zeros((4, 1), np.int32)
     query_rows(wi, wo, table.azimuths, table.grid**2, values, rows, 0)
     fill_points(points, places, values, rows, 1, COUNT)
     locate(table, COUNT, points, places)
-    shade_all(table, COUNT, points, places, False)
+    uncover(table.horizon, COUNT, points, places)
+    shade(table, COUNT, points[WEIGHT], points)
 
     area, specular, diffuse = point_shares(fabric, points[X], points[Y], wi, wo)
     family = np.where(points[WARPNESS] > 0, 0, np.where(points[WEFTNESS] > 0, 1, 2))

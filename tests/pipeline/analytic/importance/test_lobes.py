@@ -17,7 +17,7 @@ from pipeline.analytic.importance.lobes import (
     find_rows,
     point_places,
 )
-from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows, flake_scatter_pdf
+from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows
 from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
@@ -25,6 +25,7 @@ from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.slab import density, sigma
 from weaves.fabric import load_fabric
 
 COUNT = 400
@@ -65,7 +66,10 @@ def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
         seen_alike += seen == (share > 0.0)
         checked += 1
         wi, alpha = queries.wi[n].astype(float), front.yarn[family, ALPHA]
-        own, mirrored = (flake_scatter_pdf(*wo, *light, *found, alpha) for light in (wi, wi * (1.0, 1.0, -1.0)))
+        own, mirrored = (
+            density(*(wo + light), *found, alpha) / (4.0 * sigma(*wo, *found, alpha))
+            for light in (wi, wi * (1.0, 1.0, -1.0))
+        )
         near = wi[2] > 0.0
         wanted = share * (own + (1.0 - STRAIGHT_ON) * mirrored if near else STRAIGHT_ON * own)
         wanted += lobes.rest[n, NEAR if near else NEAR + 1] * abs(wi[2]) / math.pi

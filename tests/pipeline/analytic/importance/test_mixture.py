@@ -1,4 +1,4 @@
-"""The sampler of one point: chi-square over the sphere, normalisation, and its weight against microflake and slab."""
+"""The sampler of one point: chi-square over the sphere against the density of flakes, and its digits."""
 
 import math
 
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance.mixture import flake_scatter_pdf, flake_scatter_weight, sample_flake_scatter
-from pipeline.compiled.decorators import allocating_kernel
-from pipeline.truth.footprint.sequences import independent_pair, owen_pair
-from pipeline.truth.scattering.slab import density, reflection, sigma, transmission
+from pipeline.analytic.importance.mixture import sample_flake_scatter
+from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.truth.footprint.sequences import independent_pair
+from pipeline.truth.scattering.slab import density, sigma
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
 ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell
@@ -31,12 +31,18 @@ PAIRS = {
 CONFIGURATIONS = [(alpha, pair) for alpha in (0.1, 0.3, 1.0) for pair in PAIRS]
 
 
+@kernel
+def flake_scatter_pdf(wx, wy, wz, sx, sy, sz, tx, ty, tz, alpha):
+    """Return the density D(h) / (4 sigma(w)) of unit s, in 1/sr; 0 at s = -w, where no half vector exists."""
+    return density(wx + sx, wy + sy, wz + sz, tx, ty, tz, alpha) / (4.0 * sigma(wx, wy, wz, tx, ty, tz, alpha))
+
+
 @allocating_kernel
-def _directions(w, t, alpha, key, count, even):
-    """Return `count` sampled directions, from independent or from evenly spread random numbers."""
+def _directions(w, t, alpha, key, count):
+    """Return `count` sampled directions."""
     directions = np.empty((count, 3))
     for k in range(count):
-        first, second = owen_pair(key, k) if even else independent_pair(key, k)
+        first, second = independent_pair(key, k)
         directions[k] = sample_flake_scatter(w[0], w[1], w[2], t[0], t[1], t[2], alpha, first, second)
     return directions
 
@@ -87,7 +93,7 @@ def _check_chi_square(index, count, folder):
     alpha, pair = CONFIGURATIONS[index]
     w, t = (np.array(x) for x in PAIRS[pair])
     expected = count * _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES)
-    counts = _counts(_directions(w, t, alpha, np.uint64(100 + index), count, False))
+    counts = _counts(_directions(w, t, alpha, np.uint64(100 + index), count))
     value = _chi_square(counts, expected)
     least = 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS))
     if value <= least:
@@ -109,7 +115,7 @@ def test_many_directions_pass_a_chi_square_test(index, tmp_path):
 def test_the_chi_square_test_sees_a_roughness_off_by_two_percent():
     w, t = (np.array(x) for x in PAIRS["tilted"])
     expected = 400_000 * _cell_integrals(w, t, 0.306, ROWS, COLUMNS, NODES)
-    assert _chi_square(_counts(_directions(w, t, 0.3, np.uint64(1), 400_000, False)), expected) < 1e-6
+    assert _chi_square(_counts(_directions(w, t, 0.3, np.uint64(1), 400_000)), expected) < 1e-6
 
 
 @pytest.mark.parametrize(("alpha", "pair"), CONFIGURATIONS)
@@ -120,85 +126,6 @@ def test_the_pdf_integrates_to_1(alpha, pair):
     largest = 1 / (4 * math.pi * alpha * sigma(*w, *t, alpha))
     total = _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES).sum()
     assert total == pytest.approx(1.0, abs=10 * area * largest)
-
-
-def _random_configurations(count, seed):
-    """Yield given, tangent, alpha, thickness and the direction that the sampler finds."""
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        w, t = _unit(rng.uniform(0, 89.9), rng.uniform(0, 360)), _unit(rng.uniform(0, 180), rng.uniform(0, 360))
-        alpha, thickness = float(rng.choice([0.01, 0.1, 0.3, 1.0])), 10 ** rng.uniform(-3, 2)
-        yield w, t, alpha, thickness, sample_flake_scatter(*w, *t, alpha, rng.uniform(), rng.uniform())
-
-
-def test_the_weight_is_the_point_model_times_cosine_over_pdf():
-    # The given direction's own sigma over the cosine leads, not the sampled one's: which one, no chi-square test sees.
-    sides = {1: 0, -1: 0}
-    for w, t, alpha, thickness, s in _random_configurations(4000, 3):
-        sigmas, cosines = (sigma(*w, *t, alpha), sigma(*s, *t, alpha)), (abs(w[2]), abs(s[2]))
-        weight = flake_scatter_weight(*sigmas, w[2], s[2], thickness)
-        assert 0.0 <= weight <= 1.0
-        flakes = density(w[0] + s[0], w[1] + s[1], w[2] + s[2], *t, alpha)
-        form = reflection if s[2] > 0 else transmission
-        value = form(flakes, *sigmas, *cosines, thickness) * cosines[1]
-        assert weight * flake_scatter_pdf(*w, *s, *t, alpha) == pytest.approx(value, rel=1e-11, abs=1e-290)
-        sides[1 if s[2] > 0 else -1] += 1
-    assert min(sides.values()) > 1000
-
-
-@pytest.mark.parametrize("sampled", [0.5, -0.5])
-def test_swapping_given_and_sampled_changes_the_weight(sampled):
-    # Thin layer: the weight is the given direction's T sigma / cos, whatever the other one.
-    assert flake_scatter_weight(0.2, 0.9, 0.8, sampled, 1e-9) == pytest.approx(1e-9 * 0.2 / 0.8, rel=1e-8)
-    assert flake_scatter_weight(0.9, 0.2, sampled, 0.8, 1e-9) == pytest.approx(1e-9 * 0.9 / 0.5, rel=1e-8)
-
-
-def test_weights_lie_in_0_to_1_at_the_limits():
-    for cos_sampled in (0.0, 1e-300, -1e-300, 1e-8, -1e-8, 1.0, -1.0):
-        for thickness in (1e-6, 2.0, 1e6):
-            for sigma_given, cos_given in ((0.01, 1.0), (1.0, 1e-3), (0.3, -0.5)):
-                weight = flake_scatter_weight(sigma_given, 0.5, cos_given, cos_sampled, thickness)
-                assert 0.0 <= weight <= 1.0
-
-
-def test_pdf_times_sigma_is_reciprocal():
-    for w, t, alpha, _, s in _random_configurations(500, 5):
-        there = sigma(*w, *t, alpha) * flake_scatter_pdf(*w, *s, *t, alpha)
-        back = sigma(*s, *t, alpha) * flake_scatter_pdf(*s, *w, *t, alpha)
-        assert there == pytest.approx(back, rel=1e-14)
-
-
-@pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
-@pytest.mark.parametrize("pair", ["tilted", "grazing"])
-def test_sampled_energy_is_the_quadrature_of_the_point_model(alpha, pair):
-    # 2^16 Owen points against 480 x 480 midpoints a hemisphere: both are within a few 1e-4 of the truth.
-    (w, t), thickness = PAIRS[pair], 2.0
-    s = _directions(np.array(w), np.array(t), alpha, np.uint64(9), 2**16, True)
-    sigma_w = sigma(*w, *t, alpha)
-    weights = np.array([flake_scatter_weight(sigma_w, sigma(*x, *t, alpha), w[2], x[2], thickness) for x in s])
-    for side in (1.0, -1.0):
-        ours = weights[s[:, 2] * side > 0].sum() / len(s)
-        assert ours == pytest.approx(_energy(w, t, alpha, thickness, side), abs=5e-4)
-
-
-def _energy(w, t, alpha, thickness, side):
-    """Return the energy that the slab scatters once into one hemisphere, by midpoints; textbook matrices, no kernel."""
-    n = 480
-    z, phi = np.meshgrid(side * (np.arange(n) + 0.5) / n, 2 * math.pi * (np.arange(n) + 0.5) / n, indexing="ij")
-    r = np.sqrt(1 - z * z)
-    s = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
-    shape = np.eye(3) - (1 - alpha**2) * np.outer(t, t)
-    h = s + w
-    h /= np.linalg.norm(h, axis=-1, keepdims=True)
-    q = np.einsum("abi,ij,abj->ab", h, np.linalg.inv(shape), h)
-    flakes = 1 / (math.pi * alpha * q * q)
-    near = math.sqrt(np.array(w) @ shape @ w) / w[2]
-    far = np.sqrt(np.einsum("abi,ij,abj->ab", s, shape, s)) / np.abs(z)
-    if side > 0:
-        crossing = -np.expm1(-thickness * (near + far)) / (near + far)
-    else:
-        crossing = (np.exp(-thickness * near) - np.exp(-thickness * far)) / (far - near)
-    return float((flakes * crossing / (4 * w[2])).mean() * 2 * math.pi)
 
 
 @pytest.mark.parametrize("alpha", [0.01, 0.1, 1.0])

@@ -32,10 +32,7 @@ def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
             )
             for written in [(density, touched, found)]
         )
-        product_weights(
-            table.group_starts, table.cell_groups, table.groups, scratch.density_x, scratch.density_y,
-            scratch.columns[:columns], scratch.rows[:rows], table.repeat[0], np.float32(share), scratch.lines,
-        )  # fmt: skip
+        product_weights(table, scratch, columns, rows, np.float32(share))
     return scratch.weight / (2.0 * np.pi * deviation_x * deviation_y)
 
 
@@ -45,9 +42,7 @@ def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
     footprint = (np.float32(n) for n in (deviation_x, deviation_y, correlation))
     above, turn = (np.float32(n) for n in (0, 0, 1, 0, 0, 1)), np.float32(0)
     look = SoftQuery(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn, turn, turn)
-    waves = table.waves, table.wave_nodes, table.evenly
-    count = waves_kept(table.wave_size, narrowest)
-    wave_weights(*waves, look, count, table.repeat, scratch.turns, scratch.phases, scratch.weight)
+    wave_weights(table, scratch, look, waves_kept(table.wave_size, narrowest))
     return scratch.weight
 
 

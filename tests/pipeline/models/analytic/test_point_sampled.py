@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pipeline.analytic.exact_points import PointSampler
+from pipeline.analytic.exact_points import sample_points
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.presets import slow
@@ -27,7 +28,7 @@ def test_it_is_the_truth_package_s_baseline():
     assert method.covers(fabric)
     assert method.bytes_stored(fabric) > 0
     answer = method.predict(fabric, queries, seed=9)
-    np.testing.assert_array_equal(answer, PointSampler(fabric).sample(queries, 4, 9))
+    np.testing.assert_array_equal(answer, sample_points(cloth_side(fabric, TruthOptions()), queries, 4, 9))
     assert not np.array_equal(answer, method.predict(fabric, queries, seed=10))
 
 

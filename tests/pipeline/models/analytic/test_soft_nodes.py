@@ -4,6 +4,7 @@ import pytest
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import SoftNodes, SoftNodesOptions
 from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
@@ -25,7 +26,7 @@ def test_each_level_is_its_sums_in_chunks():
         assert method.covers(fabric)
         table = tabulate(fabric, level=level)
         np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
-        assert method.bytes_stored(fabric) == table.nbytes
+        assert method.bytes_stored(fabric) == nbytes(table)
 
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])

@@ -4,6 +4,7 @@ import torch
 
 from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.method import Method
@@ -120,7 +121,7 @@ def test_a_trained_folder_comes_back(fabrics, learnt):
     (method,) = module.restore(SMALL, [({}, learnt.state_dict())])
     asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 64)
     np.testing.assert_array_equal(method.predict(fabrics[0], asked), Selvage(learnt).predict(fabrics[0], asked))
-    table = tabulate(fabrics[0]).nbytes
+    table = nbytes(tabulate(fabrics[0]))
     assert method.bytes_stored(fabrics[0]) == table + 4 * 2374
     assert learnt.mean.abs().max() > 0
 
