@@ -35,15 +35,11 @@ def test_independent_pixels_have_the_usual_standard_error():
     assert high - low == pytest.approx(2 * 1.96 * spread, rel=0.2)
 
 
-def test_blocks_part_the_mask():
+def test_blocks_part_the_mask_and_equal_values_have_an_interval_of_no_width():
     mask = np.ones((64, 96), dtype=bool)
     mask[:, :16] = False
-    found = blocks(mask, 16)
-    assert np.bincount(found).tolist() == [256] * (4 * 5)
+    assert np.bincount(blocks(mask, 16)).tolist() == [256] * (4 * 5)
     assert np.bincount(blocks(mask[:20, 16:], 16)).tolist() == [25] * (4 * 16)  # a quarter of 20 is 5
-
-
-def test_equal_values_have_an_interval_of_no_width():
     assert block_interval(np.full(DISC.sum(), 0.5), DISC) == (0, 0.5, 0.5)
 
 
@@ -61,6 +57,7 @@ def test_it_is_the_difference_of_both_mean_squared_errors():
     assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
     assert low < difference < high
     assert mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
+    assert mse_difference(a, a, TRUTH, MASK, OPTIONS) == (0.0, 0.0, 0.0)
 
 
 def test_what_both_err_alike_does_not_widen_the_interval():
@@ -82,7 +79,3 @@ def test_noise_of_the_truth_does_not_bias_it():
         mse_difference(a, b, TRUTH + 0.5 * RANDOM.standard_normal(TRUTH.shape), MASK, OPTIONS)[0] for _ in range(20)
     ]
     assert abs(np.mean(noisy) - exact) < 4.0 * np.std(noisy, ddof=1) / np.sqrt(20)
-
-
-def test_equal_pictures_differ_by_nothing():
-    assert mse_difference(TRUTH, TRUTH, TRUTH + HARD, MASK, OPTIONS) == (0.0, 0.0, 0.0)

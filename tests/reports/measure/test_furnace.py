@@ -14,32 +14,34 @@ from reports.measure.furnace import DIRECTIONS, furnace_queries, measure_furnace
 from weaves.fabric import load_fabric
 
 
-class Lambertian:
-    """Answers cos / pi in one component, and a constant in another."""
+class Stub:
+    """Answers by a function of fabric and queries."""
 
-    name, setting = "lambertian", ""
+    name, setting = "stub", ""
+
+    def __init__(self, answer):
+        self.answer = answer
 
     def prepare(self, fabric):
         pass
 
     def predict(self, fabric, queries, seed=0):
-        cosine = queries.wi[:, 2]
-        zero = np.zeros_like(cosine)
-        return np.stack([np.full_like(cosine, 0.1), zero, cosine / math.pi, zero], axis=1).astype(np.float32)
+        return np.asarray(self.answer(fabric, queries), np.float32)
 
 
-class Truth(Lambertian):
-    """Answers by the truth's own table."""
+def lambertian(fabric, queries):
+    """Answer cos / pi in one component, and a constant in another."""
+    cosine = queries.wi[:, 2]
+    return np.stack([0 * cosine + 0.1, 0 * cosine, cosine / math.pi, 0 * cosine], axis=1)
 
-    name = "truth"
 
-    def predict(self, fabric, queries, seed=0):
-        return estimate(fabric, queries, TruthOptions(estimator="node_table"), seed).mean
+def true(fabric, queries):
+    return estimate(fabric, queries, TruthOptions(estimator="node_table"), 0).mean
 
 
 def test_closed_forms():
     """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
-    values = {record.metric: record.value for record in measure_furnace(Lambertian(), load_fabric("denim"))}
+    values = {record.metric: record.value for record in measure_furnace(Stub(lambertian), load_fabric("denim"))}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
 
@@ -52,17 +54,13 @@ def test_every_patch_sees_the_same_lights():
 
 
 def test_the_truth_makes_no_light():
-    for record in measure_furnace(Truth(), load_fabric("polyester_lining")):
+    for record in measure_furnace(Stub(true), load_fabric("polyester_lining")):
         assert 0 < record.value <= 1.005, record.metric
 
 
-class Bright(Lambertian):
-    """A network gone wrong: it answers a thousand times too much, everywhere."""
-
-    name = "bright"
-
-    def predict(self, fabric, queries, seed=0):
-        return np.full((len(queries.u), 4), 1e3, np.float32)
+def bright(fabric, queries):
+    """Answer as a network gone wrong: a thousand times too much, everywhere."""
+    return np.full((len(queries.u), 4), 1e3)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +69,7 @@ class Bright(Lambertian):
 )
 def test_the_brightest_method_returns_at_most_what_arrives(name):
     # The integral is a sum over 256 directions of a smooth lobe: good to 1 %.
-    found = {r.metric: r.value for r in measure_furnace(Bounded(Bright()), load_fabric(name))}
+    found = {r.metric: r.value for r in measure_furnace(Bounded(Stub(bright)), load_fabric(name))}
     assert found["furnace_diffuse"] <= 1.01
     assert found["furnace_specular"] < 0.6
 

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.cores import cores
 from pipeline.truth.query import Queries
-from reports.measure.timing import Contender, affordable, set_threads, synchronise, thread_counts, time_side_by_side
+from reports.measure.timing import Contender, affordable, thread_counts, time_side_by_side
 
 
 def many_queries(rows):
@@ -17,28 +17,26 @@ def many_queries(rows):
 class Clock:
     """A clock that only the methods move."""
 
-    def __init__(self):
-        self.now = 0
+    now = 0
 
     def __call__(self):
         return self.now
 
+    def method(self, calls, label, durations):
+        durations = iter(durations)
 
-def method(clock, calls, label, durations):
-    durations = iter(durations)
+        def predict(fabric, queries):
+            calls.append(label)
+            self.now += next(durations)
 
-    def predict(fabric, queries):
-        calls.append(label)
-        clock.now += next(durations)
-
-    return predict
+        return predict
 
 
 def test_methods_take_turns_after_the_warm_up():
     clock, calls = Clock(), []
     contenders = [
-        Contender(method(clock, calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), many_queries(10)),
-        Contender(method(clock, calls, "b", [10**9] * 4 + [500] * 22), many_queries(100) + many_queries(150)),
+        Contender(clock.method(calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), many_queries(10)),
+        Contender(clock.method(calls, "b", [10**9] * 4 + [500] * 22), many_queries(100) + many_queries(150)),
     ]
     a, b = time_side_by_side(contenders, repeats=11, warm_up=2, clock=clock)
     assert calls == ["a", "b", "b"] * 13
@@ -79,20 +77,15 @@ def test_thread_counts_are_said_once():
     assert thread_counts([4, 2, 4]) == [2, 4]
 
 
-def test_real_time_passes():
+def test_real_time_passes_and_one_thread_is_set_where_libraries_are_loaded():
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
     work = np.random.default_rng(0).random((60, 60))
     slow = Contender(lambda fabric, queries: [work @ work for _ in range(20)], many_queries(1))
     fast = Contender(lambda fabric, queries: None, many_queries(1))
-    timed = time_side_by_side([slow, fast], repeats=20)
-    assert timed[0].quartiles[1] > timed[1].quartiles[1] > 0
-
-
-def test_threads_are_set_where_the_libraries_are_loaded():
-    torch = pytest.importorskip("torch")
-    before = torch.get_num_threads()
     try:
-        set_threads(1)
+        timed = time_side_by_side([slow, fast], repeats=20)
         assert torch.get_num_threads() == 1
     finally:
         torch.set_num_threads(before)
-    synchronise()
+    assert timed[0].quartiles[1] > timed[1].quartiles[1] > 0
