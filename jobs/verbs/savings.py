@@ -205,9 +205,9 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
             pictures.append(out / task.picture(setting))
     if len(pictures) != 2 or frames is None:
         return []
-    first = read_shot(frames).first()
+    shot = read_shot(frames)
     a, b = (read_exr(path).stack(*RGB) for path in pictures)
-    difference = mse_difference(a, b, first.pictures()[0], first.lit[0], recipes[0].bench.scenes.image)
+    difference = mse_difference(a, b, shot.pictures()[0], shot.lit[0], recipes[0].bench.scenes.image)
     return [SceneSaving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
 
 

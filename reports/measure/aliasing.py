@@ -47,12 +47,7 @@ def flicker(
 ) -> float:
     """Return the temporal variance beyond the truth's own, relative to the truth's squared mean.
 
-    Parameters
-    ----------
-    frames, truth : array_like (F, ...)
-        Luminance of the method's frames and of the truth's, same pixels.
-    noise, truth_noise : array_like
-        Standard error of each value of `frames` and of `truth`; 0 where values are exact.
+    Luminance of the same pixels, (F, ...), and the standard error of each value; 0 where values are exact.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
     return (temporal_variance(frames, noise) - temporal_variance(truth, truth_noise)) / scale
@@ -79,29 +74,15 @@ def excess_energy(
 ) -> float:
     """Return the energy beyond half the Nyquist frequency above the truth's, relative to the truth's squared mean.
 
-    Parameters
-    ----------
-    frames, truth : array_like (F, H, W)
-        Luminance of the same rectangle of pixels.
-    noise, truth_noise : array_like
-        Standard error of each value of `frames` and of `truth`.
+    Luminance of the same rectangle of pixels, (F, H, W), and the standard error of each value.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
     return (spectrum(frames, noise).high - spectrum(truth, truth_noise).high) / scale
 
 
 def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> TemporalSpectrum:
-    """Return the power spectrum averaged over frames, less the part of noise.
+    """Return the power spectrum of luminance (F, H, W) averaged over frames, less the part of its standard error.
 
-    Parameters
-    ----------
-    frames : array_like (F, H, W)
-        Luminance.
-    noise : array_like
-        Standard error of each value.
-
-    Notes
-    -----
     Rings are as wide as one step of the shorter side's frequencies. The sum of P over all k, the mean's own k = 0
     included, is <w^2 (L - mean)^2> / <w^2>.
     """

@@ -57,12 +57,7 @@ def block_interval(
 def blocks(mask: Mask, side: int = 16) -> npt.NDArray[np.intp]:
     """Return the number of the block of every pixel of the mask, (N,), without gaps.
 
-    Parameters
-    ----------
-    mask : bool (H, W)
-        Pixels that count.
-    side : int
-        Side of a block, in pixels; at most a quarter of the picture's shorter side is used.
+    `side` is that of a block in pixels; at most a quarter of the picture's shorter side is used.
     """
     side = max(1, min(side, min(mask.shape) // 4))
     y, x = np.nonzero(mask)
@@ -76,17 +71,7 @@ def mse_difference(
     mask: npt.NDArray[np.bool_],
     options: ImageOptions,
 ) -> tuple[float, float, float]:
-    """Return the MSE of b less that of a, and its 95 % interval over blocks of pixels.
-
-    Parameters
-    ----------
-    a, b, truth : array_like (H, W, 3)
-        Linear RGB.
-    mask : bool (H, W)
-        Pixels that count.
-    options : ImageOptions
-        Blocks and resamples.
-    """
+    """Return the MSE of b less that of a, and its 95 % interval over blocks of pixels; pictures are linear RGB."""
     first, second, t = (np.asarray(picture, np.float64)[mask] for picture in (a, b, truth))
     rows = ((second - first) * (second + first - 2.0 * t)).mean(axis=1)
     _, low, high = block_interval(rows, mask, options.block, options.resamples, options.seed)

@@ -108,16 +108,7 @@ def measure_extremes(
     fabrics: Sequence[tuple[Fabric, Role]],
     truth: TruthOptions = EXTREME_TRUTH,
 ) -> list[Record]:
-    """Measure methods at their extremes.
-
-    Parameters
-    ----------
-    families : sequence of sequence of Method
-        Methods, each followed by its lower precisions.
-    fabrics : sequence of (Fabric, role)
-        The cloths; methods answer for those that they cover.
-    truth : TruthOptions
-        Options of the truth that methods are compared with.
+    """Measure methods, each followed by its lower precisions, at their extremes on the cloths that they cover.
 
     Returns
     -------

@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -77,25 +78,9 @@ def time_side_by_side(
     clock: Callable[[], int] = time.perf_counter_ns,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[CallTiming]:
-    """Time methods in turns.
+    """Time methods in turns: so many timed calls of each, after others to warm up.
 
-    Parameters
-    ----------
-    contenders : sequence of Contender
-        Methods with their queries.
-    repeats : int
-        Timed calls of each.
-    warm_up : int
-        Calls of each before that.
-    clock : callable
-        Returns nanoseconds.
-    progress : callable
-        Receives the finished share, between two rounds.
-
-    Returns
-    -------
-    list of CallTiming
-        One a contender, in their order.
+    `clock` returns nanoseconds; `progress` receives the finished share between two rounds.
     """
     set_threads(1)
     elapsed: list[list[int]] = [[] for _ in contenders]
@@ -141,18 +126,10 @@ def affordable(
     while rows < most:
         more = contender.first(2 * rows)
         # The fastest of three: the first call of a size takes new memory, and another program may interrupt one.
-        if 1e-9 * min(_took(more, clock) for _ in range(3)) > longest:
+        if 1e-3 * min(milliseconds(partial(_answer, more), clock) for _ in range(3)) > longest:
             break
         rows *= 2
     return contender.first(rows)
-
-
-def _took(contender: Contender, clock: Callable[[], int]) -> int:
-    """Return the nanoseconds of one call."""
-    start = clock()
-    _answer(contender)
-    synchronise()
-    return clock() - start
 
 
 def thread_counts(requested: Sequence[int]) -> list[int]:
@@ -166,13 +143,13 @@ def quartiles(samples: Sequence[float]) -> tuple[float, float, float]:
     return low, median, high
 
 
-def milliseconds(action: Callable[[], object]) -> float:
+def milliseconds(action: Callable[[], object], clock: Callable[[], int] = time.perf_counter_ns) -> float:
     """Return how long a single action takes, in milliseconds."""
     synchronise()
-    start = time.perf_counter()
+    start = clock()
     action()
     synchronise()
-    return 1e3 * (time.perf_counter() - start)
+    return 1e-6 * (clock() - start)
 
 
 def set_threads(threads: int) -> None:

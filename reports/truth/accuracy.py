@@ -94,17 +94,7 @@ SETTINGS: Final[dict[str, TruthOptions]] = {
 
 
 def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = REFERENCE) -> Iterator[Accuracy]:
-    """Measure every setting on every fabric, single-threaded, on queries of the default distribution.
-
-    Parameters
-    ----------
-    rows : int
-        Queries a fabric.
-    fabrics : sequence of str
-        Presets.
-    reference : int
-        Points of a converged answer, a power of two.
-    """
+    """Measure every setting on so many default queries of every preset; `reference` is a power of two."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
         found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]

@@ -60,17 +60,7 @@ class Bias:
 
 
 def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = _REFERENCE) -> Iterator[Bias]:
-    """Measure the bias of every component on every fabric, single-threaded.
-
-    Parameters
-    ----------
-    rows : int
-        Queries a fabric and side.
-    fabrics : sequence of str
-        Presets.
-    reference : int
-        Points of a reference answer, a power of two.
-    """
+    """Measure every component on so many queries of every preset and side; `reference` is a power of two."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             lit = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))

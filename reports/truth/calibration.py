@@ -138,20 +138,8 @@ def samples(
 
     Queries whose reference is not known to `_PRECISE` of its value are left out: hidden patches, hardly ever others.
 
-    Parameters
-    ----------
-    fabrics : int
-        Random fabrics a class.
-    rows : int
-        Queries a fabric.
-    estimators : sequence of EstimatorName
-        Estimators; queries that one cannot answer are left out.
-    reference : int
-        Fewest points of a reference answer, a power of two; doubtful ones take four times as many.
-    seed : int
-        Seed of fabrics, queries and points.
-    kinds : sequence of str
-        Names of classes.
+    So are those that an estimator cannot answer. `fabrics` are random ones a class, `rows` queries a fabric, and
+    `reference` fewest points of a reference answer, a power of two; doubtful ones take four times as many.
     """
     precise = TruthOptions(
         estimator="owen", relative_error=0.001, absolute_error=1e-6, min_count=reference, max_count=4 * reference

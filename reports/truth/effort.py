@@ -41,15 +41,7 @@ class Effort:
 
 
 def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Effort]:
-    """Measure how `auto` at `RELATIVE_ERROR` answers queries of the default distribution, single-threaded.
-
-    Parameters
-    ----------
-    rows : int
-        Queries a fabric.
-    fabrics : sequence of str
-        Presets.
-    """
+    """Measure how `auto` at `RELATIVE_ERROR` answers so many default queries of every preset."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         options = TruthOptions(relative_error=RELATIVE_ERROR, max_count=1 << 14)
         answers = uncalibrated(fabric, queries, options, _SEED)

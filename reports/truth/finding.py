@@ -79,19 +79,15 @@ def judge(
     signed: bool = False,
     absolute: bool = False,
 ) -> Finding:
-    """Compare values with their reference.
+    """Compare values with their reference; other parameters are fields of `Finding`.
 
     Parameters
     ----------
-    expression, corner, arithmetic, listed
-        As in `Finding`.
     inputs : mapping
         Name and values (N,) or (3, N) of what the N corners differ in.
-    value, reference : float (N,) or (N, k)
-        What was computed, and what it should be; objects of 50 digits are welcome. Of k numbers the length of the
-        error vector over that of the reference counts.
-    naive : float, like `value`
-        The textbook's form.
+    value, reference, naive : float (N,) or (N, k)
+        What was computed, what it should be, and the textbook's form; objects of 50 digits are welcome. Of k numbers
+        the length of the error vector over that of the reference counts.
     floor : float
         Size below which the reference counts as this large.
     signed, absolute : bool

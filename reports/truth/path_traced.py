@@ -77,20 +77,16 @@ def measure(
     reference: tuple[str, int] = (REFERENCE, _REFERENCE_SAMPLES),
     frames: int = _FRAMES,
 ) -> Iterator[Traced]:
-    """Measure every method in every scene.
+    """Measure every method in every scene; error and time are means over frames with different random numbers.
 
     Parameters
     ----------
-    scenes : sequence of str
-        Names of scenes.
     size : int
         Side of a frame in pixels.
     samples : mapping
         Numbers of samples a pixel, by method; the last method is `OTHER`.
     reference : (str, int)
         The method of the reference frames, and its samples.
-    frames : int
-        Frames with different random numbers; error and time are their means.
     """
     for name in scenes:
         truths = [_Scene(name, reference[0], size).frame(reference[1], 1000 + k)[0] for k in range(2)]

@@ -24,7 +24,7 @@ from pipeline.truth.node_table.kernels import Direction, FlakeLayer, Normals, Ta
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering import slab
-from reports.truth.finding import DOUBLE, ILL, Finding, judge
+from reports.truth.finding import DOUBLE, ILL, RECORDS, Finding, failures, judge
 from reports.truth.formulas import (
     Array,
     density,
@@ -41,8 +41,11 @@ from reports.truth.formulas import (
     torus_normal,
 )
 from weaves.draft import Matrix
+from weaves.errors import WorkFailed
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn
+
+__all__ = ["RECORDS", "measure"]
 
 DIGITS: Final = 50
 BENDS: Final = (0.01, 0.1, 1.0, 10.0, 40.0, 80.0)
@@ -98,10 +101,14 @@ class Expression(NamedTuple):
     signed: bool = False  # values may be negative
 
 
-def stability() -> list[Finding]:
-    """Compute every expression over its corners; the same findings every time."""
+def measure() -> list[Finding]:
+    """Compute every expression over its corners; the same findings every time, WorkFailed if one exceeds its limit."""
     findings = [finding for expression in expressions() for finding in judged(expression)]
-    return findings + places() + footprints()
+    findings += places() + footprints()
+    if wrong := failures(findings):
+        first, more = wrong[0], f"; {len(wrong) - 1} more do not hold" if len(wrong) > 1 else ""
+        raise WorkFailed(f"{first.expression} in {first.arithmetic}, {first.corner}: {first.fault} at {first.at}{more}")
+    return findings
 
 
 def judged(expression: Expression) -> list[Finding]:

@@ -76,15 +76,7 @@ class Rate:
 
 
 def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate]:
-    """Measure everything, one rate after the other; single-threaded but where two threads are compared.
-
-    Parameters
-    ----------
-    rows : int
-        Queries of each timed call.
-    fabrics : sequence of str
-        Presets whose patch queries are timed.
-    """
+    """Measure everything with `rows` queries a call; single-threaded but where two threads are compared."""
     set_threads(1)
     yield from _points()
     for name in fabrics:

@@ -113,16 +113,10 @@ def image_errors(
     options: ImageOptions = _DEFAULTS,
     floor: Mapping[Metric, float] | None = None,
 ) -> ImageErrors:
-    """Measure a picture against the truth's.
+    """Measure a picture against the truth's, linear RGB (H, W, 3), with the latter's standard error.
 
-    Parameters
-    ----------
-    picture, truth, standard_error : array_like (H, W, 3)
-        Linear RGB of the method and of the truth, and the latter's standard error.
-    mask : array_like (H, W)
-        True where there is lit cloth: the pixels that count. What the others hold does not matter.
-    floor : mapping, optional
-        Result of `noise_floor` for this truth; it takes half of the time if it is not given.
+    The mask (H, W) is True where there is lit cloth; what other pixels hold does not matter. `floor` is the result of
+    `noise_floor` for this truth; it takes half of the time if it is not given.
 
     Raises
     ------

@@ -132,13 +132,13 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
     Each cloth is timed on as many of its queries as one call can answer in `LONGEST`, at least `FEWEST`. The time of
     all its queries is in proportion, so that a small cloth with slow queries gets its true weight.
     """
-    first = shot.first()
-    if not (able := [method for method in methods if first.covered_by(method)]):
+    if not (able := [method for method in methods if shot.covered_by(method)]):
         return []
     mixed = np.random.default_rng(seed)
     contenders = []
     # In a random order, so that the first ones are a fair sample of the frame.
-    subjects = [(cloth.fabric, cloth.queries.take(mixed.permutation(len(cloth.frame)))) for cloth in first.cloths]
+    first = [(cloth.fabric, np.flatnonzero(cloth.frame == 0), cloth.queries) for cloth in shot.cloths]
+    subjects = [(fabric, queries.take(rows[mixed.permutation(len(rows))])) for fabric, rows, queries in first]
     for method in able:
         for fabric, queries in subjects:
             method.prepare(fabric)

@@ -84,30 +84,16 @@ class ClothQueries:
         squared = np.square(self.standard_error.astype(np.float64))
         return np.asarray(self.weight * np.sqrt(coloured(squared, np.square(self.colours))))
 
-    def of_frame(self, frame: int) -> ClothQueries:
-        """Return the queries of one frame."""
-        rows = np.flatnonzero(self.frame == frame)
-        parts = (getattr(self, name)[rows] for name in (*_COLUMNS, "colours"))
-        return ClothQueries(self.fabric, self.queries.take(rows), *parts)
-
 
 @dataclass(frozen=True)
 class Shot:
-    """A scene's frames.
-
-    Attributes
-    ----------
-    name : str
-        Name of the scene.
-    base : float32 (F, H, W, 3)
-        Linear RGB without the light that the cloth scatters.
-    cloths : list of ClothQueries
-        In the order of the scene.
-    """
+    """A scene's frames."""
 
     name: str
     base: npt.NDArray[np.float32]
+    """Linear RGB without the light that the cloth scatters, (F, H, W, 3)."""
     cloths: list[ClothQueries]
+    """In the order of the scene."""
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:
@@ -133,10 +119,6 @@ class Shot:
         for cloth in self.cloths:
             np.add.at(flat, (cloth.frame, cloth.pixel), np.square(cloth.noise()))
         return np.sqrt(squared)
-
-    def first(self) -> Shot:
-        """Return the first frame alone."""
-        return Shot(self.name, self.base[:1], [cloth.of_frame(0) for cloth in self.cloths])
 
     def covered_by(self, method: Method) -> bool:
         """Return whether a method answers for every cloth."""

@@ -54,7 +54,7 @@ def test_a_picture_is_the_frame_of_the_benchmark(render, tmp_path):
     """
     options = ShotOptions(size=(32, 24), frames=3, options=SceneOptions(environment_directions=4), frame_truth=COARSE)
     shoot("dinner_table", options, tmp_path / "shot.npz")
-    shot = read_shot(tmp_path / "shot.npz").first()
+    shot = read_shot(tmp_path / "shot.npz")
     pictures = shot.pictures(shot.answers(named_method("soft_nodes", "render", "--method"), 0))
     code, text, _ = render("dinner_table", "--method", "soft_nodes", "--out", "a.exr", *SMALL)
     assert code == 0 and re.fullmatch(r"a\.exr: 32 x 24, \d+ s; \d+% of the queries by the fallback\n", text)
