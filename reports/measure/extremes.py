@@ -73,21 +73,12 @@ class ExtremeInputs(NamedTuple):
 
     queries: Queries
     """Queries of all footprints, angles and places."""
+    far: Queries
+    """The same footprints a million yarns away."""
     size: npt.NDArray[np.float64]
     """Footprint of each, in repeats."""
     grazing: npt.NDArray[np.bool_]
     """True if light or viewer graze."""
-    repeat: tuple[int, int]
-    """Extent of the fabric's repeat, in yarn spacings."""
-
-    @property
-    def far(self) -> Queries:
-        """The same footprints a million yarns away."""
-        return self.queries._replace(u=self._moved(self.queries.u, 0), v=self._moved(self.queries.v, 1))
-
-    def _moved(self, place: npt.NDArray[np.float32], axis: int) -> npt.NDArray[np.float32]:
-        period = self.repeat[axis]
-        return (place.astype(np.float64) + period * (FAR // period - 1)).astype(np.float32)
 
 
 def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
@@ -97,10 +88,13 @@ def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
     places = random.integers(0, np.array(repeat) * _SIXTEENTH, (_PLACES, 2)) / _SIXTEENTH
     rows = list(itertools.product(FOOTPRINTS, ANGLES, ANGLES, places.tolist()))
     size, light, viewer = (np.array([row[k] for row in rows], np.float64) for k in range(3))
-    u, v = np.array([row[3] for row in rows], np.float32).T
+    centre, period = np.array([row[3] for row in rows]).T, np.array(repeat)[:, None]
+    near, away = centre.astype(np.float32), (centre + period * (FAR // period - 1)).astype(np.float32)
     sigma = (size * math.sqrt(repeat[0] * repeat[1])).astype(np.float32)
     wi, wo = (_direction(theta, phi) for theta, phi in zip((light, viewer), _AZIMUTHS, strict=True))
-    return ExtremeInputs(Queries.round(u, v, sigma, wi, wo), size, np.maximum(light, viewer) == GRAZING, repeat)
+    queries = Queries.round(near[0], near[1], sigma, wi, wo)
+    far = queries._replace(u=away[0], v=away[1])
+    return ExtremeInputs(queries, far, size, np.maximum(light, viewer) == GRAZING)
 
 
 def measure_extremes(

@@ -131,18 +131,14 @@ class _Estimate(NamedTuple):
 
 def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
-    found: dict[str, list[_Estimate]] = {sampler: [] for sampler in SETTINGS}
-    for subject in subjects:
-        for sampler, estimate in _estimates(subject).items():
-            found[sampler].append(estimate)
+    parts = list(map(_estimates, subjects))
+    found = {sampler: [part[sampler] for part in parts] for sampler in SETTINGS}
     base, base_time = math.nan, math.nan
     for sampler in SETTINGS:
         values = np.concatenate([one.values for one in found[sampler]])
         variance = float(values.var(axis=1, ddof=1).mean())
-        draw_time, whole = (
-            1e9 * sum(seconds) / values.size
-            for seconds in zip(*((one.draw_seconds, one.seconds) for one in found[sampler]), strict=True)
-        )
+        draw_time = 1e9 * sum(one.draw_seconds for one in found[sampler]) / values.size
+        whole = 1e9 * sum(one.seconds for one in found[sampler]) / values.size
         if sampler == "cosine":
             base, base_time = variance, whole
         saved = base / variance
