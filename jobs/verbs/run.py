@@ -75,7 +75,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
         _print_work(chosen, {task.id: ledger.seconds(task) for task in summary.ran})
     if "report" in stages and ledger.state(page) == "done":
         print_lines("")
-        print_methods([out / path for path in page.records])
+        _print_methods([out / path for path in page.records])
         print_lines("", f"the page: {(out / page.products[0]).resolve()}")
     if summary.failed:
         first, *others = summary.failed
@@ -104,7 +104,7 @@ def _print_work(tasks: Sequence[Task], ran: Mapping[str, float]) -> None:
     print_table(("stage", "tasks", "done now", "work"), rows)
 
 
-def print_methods(records: Sequence[Path]) -> None:
+def _print_methods(records: Sequence[Path]) -> None:
     """Print a benchmark condensed to one row a method, from the files of its Records.
 
     Bytes are left to the page, so that a line fits a terminal of 80 columns.

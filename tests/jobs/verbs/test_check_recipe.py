@@ -45,7 +45,7 @@ def run(whole, tmp_path, monkeypatch, capsys):
     """Return a copy of that folder, and the command line on it: code and both outputs."""
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     monkeypatch.setattr("jobs.verbs.run.execute", made_up.execute)
-    monkeypatch.setattr("jobs.verbs.run.print_methods", lambda records: None)
+    monkeypatch.setattr("jobs.verbs.run._print_methods", lambda records: None)
 
     def run(*more):
         code = main(["check", str(tmp_path / "tiny.toml"), "--out", str(tmp_path / "out"), *more])
