@@ -22,6 +22,7 @@ from contextlib import contextmanager, nullcontext
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -42,6 +43,7 @@ RUNTIME_TOLERANCE: Final = 1e-4
 
 _STREAM = 0x0A57  # of the queries that modules are compiled and compared on
 _COMPARED = 512
+_LOADING = Lock()  # torch exports and compiles one module at a time; the benchmark prepares methods on all cores
 _MODULES = 1024  # that torch may compile in one process; beyond 8 it would fall back to eager, silently
 
 
@@ -260,7 +262,8 @@ class RunBy(Around):
             return part, self._programs[key][1]
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, _STREAM, 0, _COMPARED)
         inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
-        program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
+        with _LOADING:
+            program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
         if self._runtime in EXACT:
             self._compare(fabric, part, program, queries)
         # The module is kept beside its program: an identity is another object's once its own is gone.
