@@ -24,7 +24,7 @@ from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.validation import read_toml
 
 if TYPE_CHECKING:
-    from pipeline.truth.checks.invariants import CheckResult
+    from pipeline.truth.invariants import CheckResult
 
 WHERE = "check"
 
@@ -104,7 +104,7 @@ def check_dataset(folder: Path) -> list[str]:
 
 def check_fabric(fabric: Fabric) -> None:
     """Test a fabric's ground truth against physical invariants and print a table; WorkFailed if one does not hold."""
-    from pipeline.truth.checks.invariants import INVARIANTS
+    from pipeline.truth.invariants import INVARIANTS
 
     results = [result for invariant in tracked(INVARIANTS, "checking") for result in invariant(fabric)]
     rows = [(one.name, _measured(one), _should_be(one), _holds(one), one.note) for one in results]

@@ -66,10 +66,7 @@ def auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: Tru
 def node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever their error.
 
-    Raises
-    ------
-    BadInput
-        If the table does not know a query.
+    BadInput if the table does not know a query.
     """
     known, wide = FINE.knows(cloth, columns), _wide(columns)
     if not known.all():
@@ -108,25 +105,10 @@ ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
 
 
 def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0) -> Answers:
-    """Answer queries about a fabric.
+    """Answer queries about a fabric; viewer and light may be on either side of the cloth.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    queries : Queries
-        N queries; viewer and light may be on either side of the cloth.
-    options : TruthOptions
-        Estimator, requested error, and the choices of the model.
-    seed : int
-        Name of the random numbers, 0 <= seed < 2^64.
-    start : int
-        Index of the first query in its stream: a query's numbers depend on `seed` and this index alone.
-
-    Raises
-    ------
-    BadInput
-        If a query has no answer; see `pipeline.truth.query.faults`.
+    A query's random numbers depend on `seed`, 0 <= seed < 2^64, and on its index in its stream alone; `start` is that
+    of the first. BadInput if a query has no answer (`pipeline.truth.query.faults`).
     """
     validate(queries)
     raw = uncalibrated(fabric, queries, options, seed, start)

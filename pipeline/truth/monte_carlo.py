@@ -16,11 +16,13 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
+from pipeline.compiled.normal import normal_quantile
 from pipeline.truth.calibration import SAMPLED, squared_norm
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, Raw, WideQueries
-from pipeline.truth.footprint.place import place_pair
+from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN, Axis, place
 from pipeline.truth.footprint.sequences import derive, independent_pair, owen_pair, r2_pair
 from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.geometry.march import wrap
 from pipeline.truth.options import Limits
 from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.scattering.point import Directions, directions_of, point_share
@@ -33,14 +35,8 @@ _CERTAIN: Final = 0.001
 def conceal(share: float, doubt: float, mean: Float64, error: Float64) -> bool:
     """Write the answer 0 for a patch that counts as hidden; where this is not certain, raise the error.
 
-    Returns whether the decision may be wrong: such a patch is worth more points.
-
-    Parameters
-    ----------
-    share, doubt : float
-        Visible share of the patch's projected area, and its standard error.
-    mean, error : float64 (5,)
-        The answer of a patch that is not hidden.
+    `share` and `doubt` are the visible share of the patch's projected area and its standard error. Returns whether the
+    decision may be wrong: such a patch is worth more points.
     """
     concealed = share < HIDDEN_SHARE
     # Probability that the true share is on the other side of the limit, its error taken to be normal.
@@ -61,24 +57,38 @@ HIDDEN_PATIENCE: Final = 16
 INDEPENDENT, R2, OWEN = range(3)
 
 
+_EVEN: Final = 1.0
+"""Both axes of a Gaussian of so many repeats cover the repeat evenly, to 4e-16."""
+
+
+@inlined_kernel
+def place_in(
+    ends: float, picks: float, columns: WideQueries, row: int, shape: int, first: float, second: float
+) -> tuple[float, float, float]:
+    """Return the point of a repeat that two numbers in (0, 1) name in the footprint of a query, and its weight."""
+    u, v, sigma, sigma_minor = columns.u[row], columns.v[row], columns.sigma[row], columns.sigma_minor[row]
+    angle = columns.angle[row]
+    if angle == 0.0 or (shape == GAUSSIAN and sigma == sigma_minor):
+        x, weight_x = place(Axis(shape, u, sigma, ends), first)
+        y, weight_y = place(Axis(shape, v, sigma_minor, picks), second)
+        return x, y, weight_x * weight_y
+    if shape == GAUSSIAN:
+        if min(sigma, sigma_minor) >= _EVEN * max(ends, picks):
+            return wrap(u + first * ends, ends), wrap(v + second * picks, picks), 1.0
+        a, b = sigma * normal_quantile(first), sigma_minor * normal_quantile(second)
+    else:
+        a, b = BOX_SIDE * sigma * (first - 0.5), BOX_SIDE * sigma_minor * (second - 0.5)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return wrap(u + a * cosine - b * sine, ends), wrap(v + a * sine + b * cosine, picks), 1.0
+
+
 @inlined_kernel
 def place_point(
     columns: WideQueries, row: int, cloth: ClothSide, first: float, second: float
 ) -> tuple[float, float, float]:
-    """Return the point that two numbers in (0, 1) name in the footprint of a query, and its weight."""
+    """Return the same for the repeat of the cloth."""
     picks, ends = cloth.front.top.shape
-    return place_pair(
-        cloth.shape,
-        columns.u[row],
-        columns.v[row],
-        columns.sigma[row],
-        columns.sigma_minor[row],
-        columns.angle[row],
-        float(ends),
-        float(picks),
-        first,
-        second,
-    )
+    return place_in(float(ends), float(picks), columns, row, cloth.shape, first, second)
 
 
 @inlined_kernel
@@ -142,12 +152,7 @@ def visible_share(sums: Float64, whole: float) -> tuple[float, float]:
 
 @allocating_kernel
 def sample_rows(
-    cloth: ClothSide,
-    columns: WideQueries,
-    index: Index,
-    method: int,
-    limits: Limits,
-    seed: np.uint64,
+    cloth: ClothSide, columns: WideQueries, index: Index, method: int, limits: Limits, seed: np.uint64
 ) -> Raw:
     """Answer every row by points that are INDEPENDENT, R2 or OWEN; a function of (seed, index) names those of a row."""
     rows = len(index)

@@ -60,12 +60,7 @@ class Queries(NamedTuple):
 
     @classmethod
     def round(
-        cls,
-        u: npt.ArrayLike,
-        v: npt.ArrayLike,
-        sigma: npt.ArrayLike,
-        wi: npt.ArrayLike,
-        wo: npt.ArrayLike,
+        cls, u: npt.ArrayLike, v: npt.ArrayLike, sigma: npt.ArrayLike, wi: npt.ArrayLike, wo: npt.ArrayLike
     ) -> Queries:
         """Return queries about round footprints of a flat cloth, from arrays (N,) and directions (N, 3).
 

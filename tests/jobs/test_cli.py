@@ -9,8 +9,8 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import columns_of, write_columns
-from pipeline.truth.checks import invariants
-from pipeline.truth.checks.invariants import exact, worst
+from pipeline.truth import invariants
+from pipeline.truth.invariants import exact, worst
 from pipeline.truth.query import Answers
 from reports.images.exr import read_exr
 from weaves.errors import BadInput, WorkFailed

@@ -67,15 +67,8 @@ _WIDEST: Final = np.float32(1e4)  # yarn spacings: even along that axis, and pla
 def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Float32, Float32, Float32]:
     """Return the deviations of N footprints along x and y and the correlation of both, each float32 (N,).
 
-    Axes count as 1e4 yarn spacings at most. Correlations are 0 or such as a `COARSE_LINE` resolves: an ellipse thinner
-    than that is taken wider.
-
-    Parameters
-    ----------
-    queries : Queries
-        Footprints of any kind.
-    least : float32
-        Deviation that both axes of a footprint have at least, in yarn spacings.
+    Axes count as `least` yarn spacings at least and as 1e4 at most. Correlations are 0 or such as a `COARSE_LINE`
+    resolves: an ellipse thinner than that is taken wider.
     """
     major, minor = (np.clip(side, least, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
     if (major == minor).all():

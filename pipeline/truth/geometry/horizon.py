@@ -122,22 +122,9 @@ def _slope_of_strip(
 def horizon(
     field: HeightField, x: float, y: float, z: float, side: int, dx: float, dy: float, curvature: float = 0.0
 ) -> float:  # fmt: skip
-    """Return the slope above which the point (x, y, z) is visible in the azimuth (dx, dy), its own float left out.
+    """Return the slope above which a point is visible in the unit azimuth (dx, dy), its own float left out.
 
-    It is >= 0 over a flat base.
-
-    Parameters
-    ----------
-    field : HeightField
-        The repeat.
-    x, y, z : float
-        The point, 0 <= x < ends, 0 <= y < picks.
-    side : int
-        TOP for a point on the yarn on top; else UNDER.
-    dx, dy : float
-        Unit azimuth.
-    curvature : float
-        Of the base along the azimuth, >= 0.
+    The point is as in `visible`; the base has the `curvature` along the azimuth. Over a flat base the slope is >= 0.
     """
     towards = level_ray(dx, dy, curvature)
     cell = first_cell(x, y, towards)

@@ -99,17 +99,7 @@ def has_gaps(field: HeightField) -> bool:
 
 @kernel
 def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Return whether a ray that enters the boundary above the point (x, y) of the repeat, sinking, hits any yarn.
-
-    Parameters
-    ----------
-    front, back : HeightField
-        The repeat and its back reflected in the fabric plane.
-    x, y : float
-        The point, 0 <= x < ends, 0 <= y < picks.
-    towards : Ray
-        The camera ray, z < 0.
-    """
+    """Return whether a ray, z < 0, that enters the boundary above the point (x, y) of the repeat hits any yarn."""
     if visible(front, x, y, front.highest, UNDER, towards):
         return False
     return not (has_gaps(front) and _passes(front, back, x, y, towards))
@@ -166,31 +156,12 @@ def _opacity_rows(
 def opacity(
     fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
 ) -> tuple[Float32, Float32]:
-    """Return the share of a footprint's camera rays that hit any yarn before they leave the boundary.
+    """Return the share of a footprint's camera rays that hit any yarn before they leave the boundary, and its error.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    queries : Queries
-        N queries. `wi` plays no part, and `wo` may have any sign: with wo.z <= 0 a ray leaves the boundary where it
-        enters, which is an opacity of 0.
-    options : TruthOptions
-        Its footprint and counts; `relative_error` is taken of full opacity. Always from `owen` points, with shadows.
-    seed : int
-        Name of the random numbers, 0 <= seed < 2^64.
-    start : int
-        Index of the first query in its stream: a query's numbers depend on `seed` and this index alone.
-
-    Returns
-    -------
-    mean, standard_error : float32 (N,)
-        Opacity in [0, 1], and its standard error: 0 only where the answer is known without sampling.
-
-    Raises
-    ------
-    BadInput
-        If a query has no answer; see `pipeline.truth.query.faults`.
+    Both are float32 (N,); the standard error is 0 only where the answer is known without sampling. Always from `owen`
+    points, with shadows; `relative_error` is taken of full opacity. `wi` plays no part; `wo` may have any sign: with
+    wo.z <= 0 a ray leaves the boundary where it enters, which is an opacity of 0. Seed, start and errors are as in
+    `pipeline.truth.estimator.estimate`.
     """
     # Viewers at or beyond the horizon are no fault here, so they are lifted above it for the check.
     lifted = queries.wo.copy()
@@ -232,26 +203,9 @@ def grazing_cosine(
     a crest, which touches the boundary. Gaps count as filled to the height of the lowest yarn, so that a ray that would
     pass through one has a cosine too.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    u, v : float arrays, broadcast with the others
-        Point where the ray enters the boundary, any, in yarn spacings.
-    azimuth : float array
-        Angle from x to the viewer's direction in the fabric plane, radians; the ray runs the other way.
-    curvature : float array
-        Curvature kappa along the ray, 1/yarn spacings, 0 <= kappa <= 1.
-
-    Returns
-    -------
-    float64 array
-        Cosines in [0, 1), of the broadcast shape.
-
-    Raises
-    ------
-    BadInput
-        If a value is not finite or a curvature out of range.
+    The ray enters the boundary at (u, v), any place in yarn spacings, from the viewer's `azimuth`, the angle from x in
+    radians, and kappa along it is `curvature`, 1/yarn spacings, 0 <= kappa <= 1. All are broadcast; cosines are in
+    [0, 1). BadInput if a value is not finite or a curvature out of range.
     """
     columns = np.broadcast_arrays(*(np.asarray(column, np.float64) for column in (u, v, azimuth, curvature)))
     for name, column in zip(("u", "v", "azimuth", "curvature"), columns, strict=True):

@@ -96,16 +96,7 @@ def _strip_blocks(
 def visible(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> bool:
     """Return whether the point (x, y, z) sees a direction; a point on the cloth needs one above its tangent plane.
 
-    Parameters
-    ----------
-    field : HeightField
-        The repeat.
-    x, y, z : float
-        The point, not below the surface, 0 <= x < ends, 0 <= y < picks.
-    side : int
-        TOP for a point on the yarn on top; else UNDER.
-    towards : Ray
-        The direction.
+    The point is not below the surface, 0 <= x < ends, 0 <= y < picks; `side` is TOP if it is on the yarn on top.
     """
     rise, bend = towards.rise, towards.bend
     if rise == math.inf:

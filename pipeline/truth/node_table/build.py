@@ -81,25 +81,10 @@ class ExactNodes(NamedTuple):
     uniform: float
 
 
-def tabulate(
-    front: HeightField,
-    back: HeightField,
-    behind: bool,
-    nodes: int,
-    azimuths: int,
-) -> ExactNodes:
-    """Build the table of one side of a cloth.
+def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int, azimuths: int) -> ExactNodes:
+    """Build the table of one side of a cloth, with so many `nodes` per yarn spacing, across and along.
 
-    Parameters
-    ----------
-    front, back : HeightField
-        The side that is seen and the other one, reflected in the fabric plane.
-    behind : bool
-        Whether there may be light from behind; cloth with gaps has horizons at its back in any case.
-    nodes : int
-        Nodes per yarn spacing, across and along.
-    azimuths : int
-        Directions in which horizons are known.
+    `behind` says whether there may be light from behind; cloth with gaps has horizons at its back in any case.
     """
     picks, ends = front.top.shape
     alike = orbits(front)

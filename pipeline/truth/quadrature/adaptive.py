@@ -56,26 +56,12 @@ _WORST: Final = 0.0625  # parts with this share of the worst one's squared error
 
 @allocating_kernel
 def integrate_rows(
-    cloth: ClothSide,
-    columns: WideQueries,
-    different: Mask,
-    limits: Limits,
-    split: int,
-    first: int,
-    last: int,
+    cloth: ClothSide, columns: WideQueries, different: Mask, limits: Limits, split: int, first: int, last: int
 ) -> tuple[Float64, Float64, Index, Mask]:
     """Answer every row: means, errors, points, and whether it is barely visible; footprints lie along x and y.
 
-    Parameters
-    ----------
-    cloth, columns : ClothSide, WideQueries
-        The cloth and the queries.
-    different : Mask (picks, ends)
-        The cells that represent all others under a footprint that covers the repeat evenly: the first of each orbit.
-    split : int
-        Level from which on lines are cut at shadow edges.
-    first, last : int
-        First and greatest level, first < last.
+    `different` has the cells that represent all others under a footprint that covers the repeat evenly: the first of
+    each orbit. From level `split` on, lines are cut at shadow edges; `first` < `last` are the levels of rules.
     """
     rows = len(columns.u)
     means, errors = np.zeros((rows, AREA_SUM)), np.zeros((rows, AREA_SUM))
@@ -211,21 +197,10 @@ def _estimate_errors(
 
 
 def quadrature_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
-    """Answer every row: means and error bounds (N, 5), and points used.
+    """Answer every row; the points of the two first rules may exceed `max_count`.
 
     Rotated footprints are no product in x and y. Of patches that are almost hidden, rules may step over all that is
     visible. Both are sampled as `owen` does, and only they depend on `seed`.
-
-    Parameters
-    ----------
-    cloth, columns : ClothSide, WideQueries
-        The cloth and the queries.
-    index : int (N,)
-        Name of each row.
-    options : TruthOptions
-        Requested error, and counts; the points of the two first rules may exceed `max_count`.
-    seed : int
-        Name of the random numbers.
     """
     quarter = np.sin(2.0 * columns.angle)
     aligned = (np.abs(quarter) < 1e-6) | ((cloth.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))

@@ -73,18 +73,7 @@ def directions_of(ix: float, iy: float, iz: float, ox: float, oy: float, oz: flo
 def point_share(
     front: HeightField, back: HeightField, x: float, y: float, directions: Directions, choices: Choices
 ) -> tuple[int, float, float, float, float]:
-    """Return the shares of the point (x, y) of the repeat in the numerators and the denominator.
-
-    Parameters
-    ----------
-    front, back : HeightField
-        The repeat and its back reflected in the fabric plane.
-    x, y : float
-        Position in it, 0 <= x < ends, 0 <= y < picks.
-    directions : Directions
-        The directions.
-    choices : Choices
-        Options of the model.
+    """Return the shares of a point, 0 <= x < ends, 0 <= y < picks, in the numerators and the denominator.
 
     Returns
     -------

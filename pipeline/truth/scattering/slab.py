@@ -51,16 +51,8 @@ def density(vx: float, vy: float, vz: float, tx: float, ty: float, tz: float, al
 def reflection(flakes: float, sigma_i: float, sigma_o: float, cos_i: float, cos_o: float, thickness: float) -> float:
     """Return f_r without the incident cosine, for unit k_s, in 1/sr.
 
-    Parameters
-    ----------
-    flakes : float
-        The flake density D at the half vector.
-    sigma_i, sigma_o : float
-        Projected flake areas towards light and viewer.
-    cos_i, cos_o : float
-        Cosines to the slab's normal, > 0.
-    thickness : float
-        Optical thickness T > 0.
+    `flakes` is the flake density D at the half vector, the sigmas are the projected areas of the flakes towards light
+    and viewer, and the cosines, > 0, are to the slab's normal.
     """
     depth = thickness * (sigma_i / cos_i + sigma_o / cos_o)
     # expm1 keeps thin layers: 1 - exp(-depth) loses every digit at T = .001.

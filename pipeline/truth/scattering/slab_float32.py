@@ -29,18 +29,9 @@ def reflection(
     cos_o: np.float32,
     thickness: np.float32,
 ) -> np.float32:
-    """Return f_r cos_i cos_o for unit k_s, in 1/sr; 0 where a cosine is 0.
+    """Return f_r cos_i cos_o for unit k_s, in 1/sr; 0 where a cosine, >= 0, is 0.
 
-    Parameters
-    ----------
-    flakes, spread : float32
-        Numerator and denominator of a quarter of the flake density at the half vector.
-    sigma_i, sigma_o : float32
-        Projected flake areas towards light and viewer.
-    cos_i, cos_o : float32
-        Cosines to the slab's normal, >= 0.
-    thickness : float32
-        Optical thickness T > 0.
+    `flakes` and `spread` are numerator and denominator of a quarter of the flake density at the half vector.
     """
     crossed = sigma_i * cos_o + sigma_o * cos_i
     # One division serves 1 / (cos_i cos_o) and 1 / (spread crossed).

@@ -19,11 +19,10 @@ import numpy as np
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
-from pipeline.truth.footprint.place import place_pair
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, WARP
 from pipeline.truth.geometry.march import wrap
-from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions
+from pipeline.truth.monte_carlo import RANDOMISATIONS, place_in, query_directions
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import Queries, validate
 from pipeline.truth.scattering.point import point_share
@@ -80,12 +79,7 @@ def component_colours(
     """Return the colours of the components of queries about a fabric.
 
     Points are doubled until the standard error of the patch BSDF's colour is `options.relative_error` of its size.
-    Parameters are those of `pipeline.truth.estimator.estimate`; the estimator of the options does not matter.
-
-    Raises
-    ------
-    BadInput
-        If a query has no answer; see `pipeline.truth.query.faults`.
+    Parameters and errors are those of `pipeline.truth.estimator.estimate`; the estimator of the options plays no part.
     """
     validate(queries)
     rows = len(queries.u)
@@ -150,27 +144,16 @@ def _add_points(
     picks, ends = cloth.front.top.shape
     for k in range(first, last):
         a, b = owen_pair(randomisation, k)
-        x, y, weight = place_pair(
-            cloth.shape,
-            columns.u[row],
-            columns.v[row],
-            columns.sigma[row],
-            columns.sigma_minor[row],
-            columns.angle[row],
-            float(threads.ends),
-            float(threads.picks),
-            a,
-            b,
-        )
+        x, y, weight = place_in(float(threads.ends), float(threads.picks), columns, row, cloth.shape, a, b)
+        own_x, own_y = wrap(x, float(ends)), wrap(y, float(picks))
         family, seen, specular, diffuse, _ = point_share(
-            cloth.front, cloth.back, wrap(x, float(ends)), wrap(y, float(picks)), directions, cloth.choices
+            cloth.front, cloth.back, own_x, own_y, directions, cloth.choices
         )
         area[0] += weight * seen
         if family == GAP:
             continue
-        thread = (
-            threads.warp[int(x) % len(threads.warp)] if family == WARP else threads.weft[int(y) % len(threads.weft)]
-        )
+        sequence, number = (threads.warp, int(x)) if family == WARP else (threads.weft, int(y))
+        thread = sequence[number % len(sequence)]
         plain[family] += weight * specular
         plain[2 + family] += weight * diffuse
         for c in range(3):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.truth.checks import invariants
-from pipeline.truth.checks.invariants import SIGNIFICANCE, exact, quotient, worst
+from pipeline.truth import invariants
 from pipeline.truth.estimator import estimate
+from pipeline.truth.invariants import SIGNIFICANCE, exact, quotient, worst
 from tests.presets import PRESETS
 from weaves.fabric import load_fabric
 

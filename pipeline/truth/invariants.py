@@ -7,7 +7,6 @@ pass if Student's t of the worst stays below the quantile of `SIGNIFICANCE`, wit
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from itertools import product
@@ -137,32 +136,18 @@ def point_reciprocity(fabric: Fabric) -> list[CheckResult]:
     point = surface_at(fabric, rng.random(rows) * ends, rng.random(rows) * picks)
     apart = {"reflection": 0.0, "transmission": 0.0}
     for k in np.flatnonzero(point.yarn != NO_YARN):
-        t, alpha = point.tangent[k], (fabric.warp, fabric.weft)[point.yarn[k]].roughness
+        fibre = *point.tangent[k], (fabric.warp, fabric.weft)[point.yarn[k]].roughness
         cos_i, cos_o = float(wi[k] @ point.normal[k]), float(wo[k] @ point.normal[k])
         name, slab = ("reflection", reflection) if cos_i * cos_o > 0.0 else ("transmission", transmission)
         there, back = (
-            _scattered(slab, *ends_of_path, t, alpha, fabric.optical_thickness)
-            for ends_of_path in ((wi[k], wo[k], cos_i, cos_o), (wo[k], wi[k], cos_o, cos_i))
+            slab(density(*(i + o), *fibre), sigma(*i, *fibre), sigma(*o, *fibre), *cosines, fabric.optical_thickness)
+            for i, o, cosines in (
+                (wi[k], wo[k], (abs(cos_i), abs(cos_o))),
+                (wo[k], wi[k], (abs(cos_o), abs(cos_i))),
+            )
         )
         apart[name] = max(apart[name], largest(quotient(there, back) - 1.0))
     return [exact(f"reciprocity of a point, {name}", value, 0.0, 0.0) for name, value in apart.items()]
-
-
-def _scattered(
-    slab: Callable[..., float],
-    i: Float64,
-    o: Float64,
-    cos_i: float,
-    cos_o: float,
-    t: Float64,
-    alpha: float,
-    thickness: float,
-) -> float:
-    """Return one point's f(i, o) for unit k_s."""
-    v = i + o
-    flakes = density(v[0], v[1], v[2], t[0], t[1], t[2], alpha)
-    sigma_i, sigma_o = (sigma(w[0], w[1], w[2], t[0], t[1], t[2], alpha) for w in (i, o))
-    return slab(flakes, sigma_i, sigma_o, abs(cos_i), abs(cos_o), thickness)
 
 
 def patch_reciprocity(fabric: Fabric) -> list[CheckResult]:
@@ -275,7 +260,7 @@ def projected_area(fabric: Fabric) -> list[CheckResult]:
     """
     rng = np.random.default_rng(_SEED + 5)
     found = []
-    for theta, turn in ((0.0, 0.0), *itertools.product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
+    for theta, turn in ((0.0, 0.0), *product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
         wo = _turned(np.full(RANDOMISATIONS, theta), np.full(RANDOMISATIONS, turn))
         queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _repeat_sigma(fabric), rng)
         projected, visible = (
@@ -302,17 +287,12 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
     queries = _queries(fabric, _directions(rng, rows, 70.0), _directions(rng, rows, 70.0), 1.0, rng)
     cloth, columns = cloth_side(fabric, TruthOptions()), columns_of(queries)
     mean, error, whole = np.zeros((rows, 5)), np.zeros((rows, 5)), np.zeros(rows)
-    colours = np.array(
-        [
-            *(np.mean(yarn.specular_rgb) for yarn in (fabric.warp, fabric.weft)),
-            *(np.mean(yarn.diffuse_rgb) for yarn in (fabric.warp, fabric.weft)),
-        ]
-    )
+    warp, weft = fabric.warp, fabric.weft
+    colours = np.mean([warp.specular_rgb, weft.specular_rgb, warp.diffuse_rgb, weft.diffuse_rgb], axis=1)
     side = max(4, round(_LATTICE / math.sqrt(ends * picks)))
     for row in range(rows):
-        whole[row] = _lattice(
-            cloth, columns, row, side, rng.random((RANDOMISATIONS, 2)), colours, mean[row], error[row]
-        )
+        shifts = rng.random((RANDOMISATIONS, 2))
+        whole[row] = _lattice(cloth, columns, row, side, shifts, colours, mean[row], error[row])
     found = []
     for seed, (name, footprint, size) in enumerate(
         (
@@ -322,8 +302,8 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
             ("Gaussian of 1000 repeats", "gaussian", 1000.0),
         )
     ):
-        sizes = (np.full(rows, size * n, np.float32) for n in (ends, picks))
-        resized = queries._replace(**dict(zip(("sigma", "sigma_minor"), sizes, strict=True)))
+        sigma_x, sigma_y = (np.full(rows, size * n, np.float32) for n in (ends, picks))
+        resized = queries._replace(sigma=sigma_x, sigma_minor=sigma_y)
         answers = estimate(fabric, resized, _fixed(16_384, footprint=footprint), seed)
         seen = mean[:, :4] > 1e-7
         scale = mean[:, :4][seen]

@@ -1,1 +1,0 @@
-"""Checks of physical invariants on any fabric: invariants."""
