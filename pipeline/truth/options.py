@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Final, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from weaves.validation import Frozen
 
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
+
+REPLACED_ESTIMATORS: Final = {"jittered": "r2"}
+"""Estimators of earlier versions, and those to take in their place."""
 
 TABLE_CELLS: Final = 96
 """Most different cells of a cloth that the estimator `node_table` knows; larger tables take too long to build."""
@@ -52,6 +55,13 @@ class TruthOptions(Frozen):
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
     variation: None = None
     """All yarns of a family are alike. Part of the identity of shards and of the physics on model cards."""
+
+    @field_validator("estimator", mode="before")
+    @classmethod
+    def _named_anew(cls, name: object) -> object:
+        if isinstance(name, str) and name in REPLACED_ESTIMATORS:
+            raise ValueError(f"this estimator is gone: take {REPLACED_ESTIMATORS[name]!r}")
+        return name
 
     @model_validator(mode="after")
     def _powers_of_two(self) -> TruthOptions:

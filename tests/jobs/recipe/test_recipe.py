@@ -88,6 +88,7 @@ def test_a_recipe_of_ones_own(files):
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
         ('model = "woven"', "", ["models.0.model is missing"]),
         ('model = "woven"', 'model = "gauss_nodes"', ["models.0.model = 'gauss_nodes'", "gone: take 'soft_nodes'"]),
+        ("relative_error = 0.05", 'estimator = "jittered"', ["truth.estimator = 'jittered'", "gone: take 'r2'"]),
         ("hidden = 32", "hiden = 32", ["models.0.hiden = 32", "did you mean 'hidden'"]),
         ("steps = 10", "stepps = 10", ["models.0.training.stepps = 10", "did you mean 'steps'"]),
         ("counts = [1, 2]", "[models.training]", ["models.2", "nothing to train"]),
