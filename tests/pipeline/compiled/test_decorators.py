@@ -155,70 +155,40 @@ def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies):
     assert [answers(process) for process in together] == [cold, cold]
 
 
-WEAK = """
+CACHED = """
+import os
 import re
-import numpy as np
-from pipeline.truth import small
-
-small.twice(np.ones(61, np.float32))
-(code,) = small.twice.inspect_asm().values()
-print("call" in code and "smooth" in code, *re.findall(r"[.]weak\\s+(\\S+)", code))
-"""
-
-
-def test_a_kernel_runs_its_own_copies_of_what_it_calls(copies):
-    """A weak function is one that the linker replaces by whatever of its name came into the process first."""
-    assert answers(start(copies[0], WEAK)).split() == ["True"]
-
-
-NAMES = """
+import sys
+from pathlib import Path
 import numpy as np
 from pipeline.compiled.decorators import announced
 from pipeline.truth import small
 
-names = []
-with announced(names.append):
-    small.fast(np.ones(61, np.float32))
-small.plain(np.ones(61, np.float32))
-print(*sorted({name.rpartition("-")[0].rpartition(".")[2] for name in names}))
-"""
-
-
-def test_each_kernel_is_announced_when_it_is_compiled(copies):
-    assert answers(start(copies[0], NAMES)).split() == ["fast", "inverse_length", "shared"]
-
-
-FORKED = """
-import os
-import numpy as np
-from pipeline.truth import small
-
-child = os.fork()
-value = small.fast(np.ones(61, np.float32))
-if child == 0:
+x, names = np.ones(61, np.float32), []
+if (child := os.fork()) == 0:
+    small.plain(x)
     os._exit(0)
-print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), value)
-"""
-
-
-def test_a_forked_process_compiles_kernels_too(copies):
-    assert answers(start(copies[0], FORKED)).split()[0] == "0"
-
-
-COMPILED = """
-from pathlib import Path
-import numpy as np
-from pipeline.truth import small
-
-small.fast(np.ones(61, np.float32))
+print("child", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+with announced(names.append):
+    small.fast(x)
+print(*sorted({name.rpartition("-")[0].rpartition(".")[2] for name in names}))
+small.twice(x)
+(code,) = small.twice.inspect_asm().values()
+print("call" in code and "smooth" in code, *re.findall(r"[.]weak\\s+(\\S+)", code))
 print(*sorted(f"{path.name}:{path.stat().st_mtime_ns}" for path in Path(sys.argv[1]).rglob("*.nbc")))
 """
 
 
-def test_copies_of_the_tree_share_compiled_kernels(copies, tmp_path, monkeypatch):
+def test_copies_of_the_tree_and_forks_share_kernels_that_run_their_own_copies(copies, tmp_path, monkeypatch):
+    """Each kernel is announced when it is compiled; a child of a fork compiles too.
+
+    A weak function is one that the linker replaces by whatever of its name came into the process first.
+    """
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    first, second = (answers(start(copy, f"import sys\n{COMPILED}", str(tmp_path / "kernels"))) for copy in copies[:2])
-    assert first == second and len(first.split()) == 3
+    first, second = (answers(start(copy, CACHED, str(tmp_path / "kernels"))) for copy in copies[:2])
+    *lines, compiled = first.splitlines()
+    assert lines == ["child 0", "fast inverse_length shared", "True"]
+    assert second.splitlines()[-1] == compiled and len(compiled.split()) == 6
     assert not list(copies[0].rglob("*.nbc"))
 
 

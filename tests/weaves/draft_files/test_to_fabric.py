@@ -1,5 +1,7 @@
 """Fabrics from drafts: repeats, colours, sizes, assumptions, and what is no cloth."""
 
+import re
+
 import pytest
 
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
@@ -39,18 +41,13 @@ def test_a_twill_with_its_size_and_the_yarns_of_denim(imported, tmp_path):
 def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
     """One of a public archive: the structure is a plain weave, the colours repeat after all 214 threads."""
     colours = [1 + (thread * thread // 7) % 9 for thread in range(214)]
-    found = imported(
-        wif(
-            COLOR_TABLE=numbered([f"{25 * k},{255 - 20 * k},80" for k in range(10)]),
-            WARP="Threads=214\nSpacing=.2\nThickness=.23\nUnits=centimeters",
-            WEFT="Threads=214\nSpacing=.2\nThickness=.23\nUnits=centimeters",
-            WARP_COLORS=numbered(colours),
-            WEFT_COLORS=numbered(colours[::-1]),
-            THREADING=numbered([1, 2] * 107),
-            TIEUP="1=1\n2=2",
-            TREADLING=numbered([1, 2] * 107),
-        )
-    )
+    yarns, threads = "Threads=214\nSpacing=.2\nThickness=.23\nUnits=centimeters", numbered([1, 2] * 107)
+    text = wif(
+        COLOR_TABLE=numbered([f"{25 * k},{255 - 20 * k},80" for k in range(10)]), WARP=yarns, WEFT=yarns,
+        WARP_COLORS=numbered(colours), WEFT_COLORS=numbered(colours[::-1]),
+        THREADING=threads, TIEUP="1=1\n2=2", TREADLING=threads,
+    )  # fmt: skip
+    found = imported(text)
     fabric = found.fabric
     assert fabric.weave.rows() == [".#", "#."]
     assert fabric.colours is not None and len(fabric.colours.palette) == 9
@@ -65,18 +62,14 @@ def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
 @pytest.mark.slow
 def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
     """4,096 ends and picks in 256 colours without a run of two."""
-    threads = range(4096)
-    found = imported(
-        wif(
-            COLOR_TABLE=numbered([f"{k},{255 - k},{k * 7 % 256}" for k in range(256)]),
-            WARP="Threads=4096\nColor=1",
-            WEFT="Threads=4096\nColor=2",
-            WARP_COLORS=numbered([1 + (t * (t // 2 + 1)) % 255 + t % 2 for t in threads]),
-            WEFT_COLORS=numbered([1 + t * t // 3 * 2 % 254 + t % 2 for t in threads]),
-            THREADING=numbered([t % 4 + 1 for t in threads]),
-            TREADLING=numbered([t % 4 + 1 for t in threads]),
-        )
-    )
+    threads, four = range(4096), numbered([1, 2, 3, 4] * 1024)
+    text = wif(
+        COLOR_TABLE=numbered([f"{k},{255 - k},{k * 7 % 256}" for k in range(256)]),
+        WARP="Threads=4096\nColor=1", WEFT="Threads=4096\nColor=2",
+        WARP_COLORS=numbered([1 + (t * (t // 2 + 1)) % 255 + t % 2 for t in threads]),
+        WEFT_COLORS=numbered([1 + t * t // 3 * 2 % 254 + t % 2 for t in threads]), THREADING=four, TREADLING=four,
+    )  # fmt: skip
+    found = imported(text)
     assert len(found.fabric.colours.threads("ends")) == len(found.fabric.colours.threads("picks")) == 4096
     (tmp_path / "large.toml").write_text(found.fabric.to_toml(), encoding="utf-8", newline="")
     assert load_fabric(tmp_path / "large.toml") == found.fabric
@@ -108,23 +101,20 @@ def test_a_bright_colour_leaves_no_light_to_go_through(imported):
 
 
 def test_a_last_repeat_that_is_not_whole_is_left_out(imported):
-    text = wif(
-        WARP="Threads=131\nColor=1", THREADING=numbered([end % 4 + 1 for end in range(131)]), WEFT="Threads=8\nColor=2"
-    )
-    found = imported(text)
+    found = imported(wif(WARP="Threads=131\nColor=1", THREADING=numbered([end % 4 + 1 for end in range(131)])))
     assert found.fabric.weave.rows() == BALANCED_ROWS
     assert "The last 3 ends do not fill a repeat and are left out." in found.assumed
 
 
 def test_layers_that_lie_loose_are_said(imported):
     # Ends 1 and 3 weave with picks 1 and 3, ends 2 and 4 with picks 2 and 4, the first layer on top.
-    text = wif(
-        THREADING=numbered([1, 2, 3, 4]), TIEUP="1=1\n2=1,3,2\n3=3\n4=1,3,4", TREADLING=numbered([1, 2, 3, 4]),
-        WARP="Threads=4\nColor=1", WEFT="Threads=4\nColor=2",
-    )  # fmt: skip
-    found = imported(text)
+    found = imported(wif(TIEUP="1=1\n2=1,3,2\n3=3\n4=1,3,4"))
     assert not found.fabric.weave.hangs_together()
     assert any("loose" in sentence for sentence in found.assumed)
+
+
+UNEVEN = numbered([end * end * end % 4 + 1 for end in range(200)] + [1, 2, 3, 4])
+MANY = numbered([f"{k % 256},{k // 256},0" for k in range(300)])
 
 
 @pytest.mark.parametrize(
@@ -134,27 +124,14 @@ def test_layers_that_lie_loose_are_said(imported):
         ({"TREADLING": numbered([1, 2, 3, 4, 1, 2, 3])}, "pick 8 of [TREADLING]"),
         ({"TIEUP": "1=1,2\n2=2,3\n3=3,4\n4=0"}, "pick 4 of [TREADLING]"),
         ({"TIEUP": "1=1,2,3,4\n2=2,3\n3=3,4"}, "pick 1 of [TREADLING]"),
-        (
-            {
-                "THREADING": numbered([end * end * end % 4 + 1 for end in range(200)] + [1, 2, 3, 4]),
-                "WARP": "Threads=211\nColor=1",
-            },
-            "[THREADING] repeats after 211 ends",
-        ),
-        (
-            {
-                "COLOR_TABLE": numbered([f"{k % 256},{k // 256},0" for k in range(300)]),
-                "WARP_COLORS": numbered(range(1, 301)),
-                "THREADING": numbered([1, 2, 3, 4] * 75),
-            },
-            "[COLOR TABLE]",
-        ),
+        ({"THREADING": UNEVEN, "WARP": "Threads=211\nColor=1"}, "[THREADING] repeats after 211 ends"),
+        ({"COLOR_TABLE": MANY, "WARP_COLORS": numbered(range(1, 301)), "THREADING": numbered([1, 2, 3, 4] * 75)},
+         "[COLOR TABLE]"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_cloth_is_refused(imported, change, named):
-    with pytest.raises(BadInput) as refused:
+    with pytest.raises(BadInput, match=re.escape(named)):
         imported(wif(**change))
-    assert named in str(refused.value)
 
 
 def test_a_number_of_a_yarn_that_is_not_allowed_is_refused(imported):
