@@ -33,14 +33,8 @@ def test_floats_agree_with_a_walk_along_the_yarns(matrix):
         warp = run_by_walking(list(matrix[:, end]), pick)
         weft = run_by_walking(list(matrix[pick]), end)
         top, under = (warp, weft) if matrix[pick, end] else (weft, warp)
-        assert found.top[pick, end] == (0 if matrix[pick, end] else 1)
-        assert (found.top_length[pick, end], found.top_offset[pick, end]) == top
-        assert (found.under_length[pick, end], found.under_offset[pick, end]) == under
-
-
-def test_floats_of_a_3_1_twill_are_centred():
-    found = cells(Twill(over=3, under=1).build())
-    assert set(found.top_offset[found.top == 0]) == {-1.0, 0.0, 1.0}
+        expected = (int(not matrix[pick, end]), *top[::-1], *under[::-1])
+        assert tuple(column[pick, end] for column in found) == expected
 
 
 @given(matrices)

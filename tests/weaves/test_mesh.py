@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.presets import PRESETS
+from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 from weaves.mesh import repeat_mesh
 from weaves.surface import GAP, surface_at
@@ -14,8 +15,8 @@ from weaves.surface import GAP, surface_at
 WIDTHS = [(1.0, 1.0), (0.7, 0.7), (1.0, 0.4), (0.55, 0.9)]
 
 
-def _cloth(name, widths=(1.0, 1.0), warp=None, weft=None):
-    fabric = load_fabric(name)
+def _cloth(cloth, widths=(1.0, 1.0), warp=None, weft=None):
+    fabric = load_fabric(cloth) if isinstance(cloth, str) else cloth
     changes = {"warp": {"width": widths[0], **(warp or {})}, "weft": {"width": widths[1], **(weft or {})}}
     return fabric.model_copy(update={y: getattr(fabric, y).model_copy(update=own) for y, own in changes.items()})
 
@@ -181,11 +182,10 @@ def test_copies_are_the_repeat_moved():
     fabric = _cloth("denim", (0.8, 0.8))
     ends, picks = fabric.weave.repeat
     one, six = repeat_mesh(fabric, 4), repeat_mesh(fabric, 4, (3, 2))
+    places = np.array([(i * ends, j * picks, 0) for j in range(2) for i in range(3)])
     for single, copies in zip(one, six, strict=True):
-        corners = copies.vertices[copies.faces].reshape(6, *single.vertices[single.faces].shape)
-        places = [(i * ends, j * picks, 0) for j in range(2) for i in range(3)]
-        for corner, place in zip(corners, places, strict=True):
-            np.testing.assert_allclose(corner, single.vertices[single.faces] + place)
+        expected = single.vertices[single.faces] + places[:, None, None]
+        np.testing.assert_allclose(copies.vertices[copies.faces].reshape(expected.shape), expected)
 
 
 @pytest.mark.parametrize("steps", [2, 7, 64])
@@ -197,20 +197,10 @@ def test_triangles_are_never_degenerate(steps):
 
 
 def test_a_draft_of_one_yarn_on_top_has_its_mesh():
-    fabric = load_fabric("denim")
     for row in ("#", "."):
-        draft = type(fabric).model_validate(
-            {**fabric.model_dump(), "draft": {"family": "matrix", "rows": (row,)}, "name": "one"}
-        )
-        full = repeat_mesh(draft, 8)
+        fabric = load_fabric("denim").model_copy(update={"draft": Matrix(rows=(row,))})
+        full = repeat_mesh(fabric, 8)
         assert len(full.warp.faces if row == "#" else full.weft.faces) and not len(full.walls.faces)
-        narrow = _both_widths(draft, 0.5)
-        mesh = repeat_mesh(narrow, 8)
+        mesh = repeat_mesh(_cloth(fabric, (0.5, 0.5)), 8)
         assert sum(_areas(part)[0][:, 2].sum() for part in mesh[:2]) == pytest.approx(0.75)
         np.testing.assert_allclose(sum(_areas(part)[0].sum(axis=0) for part in mesh)[:2], 0, atol=1e-9)
-
-
-def _both_widths(fabric, width):
-    return fabric.model_copy(
-        update={y: getattr(fabric, y).model_copy(update={"width": width}) for y in ("warp", "weft")}
-    )

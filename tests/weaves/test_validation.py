@@ -4,12 +4,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weaves.errors import BadInput
+from weaves.errors import MOST_LETTERS, BadInput
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import Population
 from weaves.validation import read_toml, validated
 
 GOOD = load_fabric("twill_4_4").model_dump(mode="json")
+LOOM = {"family": "loom", "tie_up": [[1, 0]], "treadling": [1]}
 
 KNOWN = [*GOOD, *GOOD["warp"], *GOOD["draft"], "rows", "move", "satin", "loom", "wavelengths", "values", "#ffffff"]
 words = st.one_of(st.text(max_size=8), st.sampled_from(KNOWN))
@@ -57,10 +58,7 @@ def with_draft(**draft):
         (with_draft(ends=5), "draft.family is missing: it is required"),
         (with_draft(family="twill", over=2), "draft.under is missing: it is required"),
         (with_draft(family="matrix", rows=["#.", "#"]), "draft.rows = '#': rows of equal length"),
-        (
-            with_draft(family="loom", threading=[3], tie_up=[[1, 0]], treadling=[1]),
-            "draft.threading = [3]: numbers from 1 to 2 are needed",
-        ),
+        (with_draft(**LOOM, threading=[3]), "draft.threading = [3]: numbers from 1 to 2 are needed"),
         (with_warp(diffuse="red"), "warp.diffuse = 'red': a colour is three numbers"),
         (with_warp(diffuse=[0.1, 0.2]), "warp.diffuse = [0.1, 0.2]: a colour is three numbers"),
         (with_warp(diffuse=[0.1, 0.2, 7]), "warp.diffuse.2 = 7: Input should be less than or equal to 1"),
@@ -68,45 +66,40 @@ def with_draft(**draft):
             with_warp(diffuse={"wavelengths": [400, 500], "value": [0, 1]}),
             "warp.diffuse.value = [0, 1]: unknown key; did you mean 'values'? known: values, wavelengths (and 1 more)",
         ),
+        ({**GOOD, "yarns_per_cm": [float("nan"), 20.0]}, "yarns_per_cm.0 = nan: Input should be a finite number"),
+        ({}, "name is missing: it is required (and 3 more)"),
     ],
 )
 def test_sentence(change, sentence):
     assert refusal(change).startswith(f"cloth.toml: {sentence}")
 
 
-def test_missing_keys_are_counted():
-    assert refusal({}) == "cloth.toml: name is missing: it is required (and 3 more)"
-
-
 def test_other_models_complain_in_the_same_words():
-    assert refusal({"twill": {"bend": [3, 99]}}, Population) == (
-        "cloth.toml: twill.bend = [3, 99]: Input should be less than or equal to 85"
-    )
+    assert "twill.bend = [3, 99]: Input should be less" in refusal({"twill": {"bend": [3, 99]}}, Population)
     assert "did you mean 'bend'" in refusal({"twill": {"ben": [3, 9]}}, Population)
     assert "called twill 4/4" in refusal({"exclude": ["twil 4/4"]}, Population)
 
 
-def is_one_short_line(sentence):
-    return sentence.isprintable() and len(sentence) < 1500
+def accepted(call, *arguments):
+    """Return the result of a call, or None if it refuses its arguments in one short line."""
+    try:
+        return call(*arguments)
+    except BadInput as refused:
+        assert str(refused).isprintable() and len(str(refused)) <= MOST_LETTERS
 
 
 @settings(deadline=None, max_examples=300)
 @given(st.dictionaries(words, trees, max_size=5))
 def test_any_table_is_a_fabric_or_one_sentence(tree):
-    try:
-        validated(Fabric, tree, "cloth.toml")
-    except BadInput as refused:
-        assert is_one_short_line(str(refused))
+    accepted(validated, Fabric, tree, "cloth.toml")
 
 
 @settings(deadline=None, max_examples=300)
 @given(st.sampled_from([None, "warp", "draft", "weft"]), words, trees)
 def test_any_single_change_of_a_good_fabric_is_a_fabric_or_one_sentence(table, key, tree):
     changed = {**GOOD, key: tree} if table is None else {**GOOD, table: {**GOOD[table], key: tree}}
-    try:
-        assert validated(Fabric, changed, "cloth.toml").weave.repeat
-    except BadInput as refused:
-        assert is_one_short_line(str(refused))
+    if fabric := accepted(validated, Fabric, changed, "cloth.toml"):
+        assert fabric.weave.repeat
 
 
 @settings(deadline=None, max_examples=200)
@@ -114,11 +107,7 @@ def test_any_single_change_of_a_good_fabric_is_a_fabric_or_one_sentence(table, k
 def test_any_text_is_toml_or_one_sentence(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("any") / "cloth.toml"
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
-    try:
-        read_toml(path)
-    except BadInput as refused:
-        assert is_one_short_line(str(refused))
-        assert "cloth.toml" in str(refused)
+    accepted(read_toml, path)
 
 
 @settings(deadline=None, max_examples=200)
@@ -128,46 +117,36 @@ def test_a_fabric_file_with_one_wrong_byte_is_a_fabric_or_one_sentence(tmp_path_
     content[place % len(content)] = byte
     path = tmp_path_factory.mktemp("byte") / "cloth.toml"
     path.write_bytes(content)
-    try:
-        load_fabric(path)
-    except BadInput as refused:
-        assert is_one_short_line(str(refused))
+    accepted(load_fabric, path)
 
 
 @settings(deadline=None)
 @given(st.text())
 def test_any_name_is_a_preset_or_one_sentence(name):
-    try:
-        assert load_fabric(name).name in preset_names()
-    except BadInput as refused:
-        assert is_one_short_line(str(refused))
-
-
-def test_broken_toml_names_file_and_line(tmp_path):
-    path = tmp_path / "torn.toml"
-    path.write_text('name = "x"\n[warp\n')
-    with pytest.raises(BadInput, match=r"torn\.toml: broken TOML: .*at line 2"):
-        load_fabric(path)
+    if fabric := accepted(load_fabric, name):
+        assert fabric.name in preset_names()
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
-    [(b"\xff\xfe", "not UTF-8"), (b"a = " + b"[" * 5000, "nested too deeply"), (b"a = 1" + b"0" * 5000, "broken TOML")],
+    ("content", "words"),
+    [
+        (b'name = "x"\n[warp\n', r"torn\.toml: broken TOML: .*at line 2"),
+        (b"\xff\xfe", "not UTF-8"),
+        (b"a = " + b"[" * 5000, "nested too deeply"),
+        (b"a = 1" + b"0" * 5000, "broken TOML"),
+    ],
 )
-def test_hostile_files_are_refused(tmp_path, content, said):
-    path = tmp_path / "hostile.toml"
-    path.write_bytes(content)
-    with pytest.raises(BadInput, match=said):
-        read_toml(path)
+def test_broken_files_are_refused(tmp_path, content, words):
+    (tmp_path / "torn.toml").write_bytes(content)
+    with pytest.raises(BadInput, match=words):
+        load_fabric(tmp_path / "torn.toml")
 
 
-def test_missing_file_and_folder_are_refused(tmp_path):
-    with pytest.raises(BadInput, match="no such file"):
-        load_fabric(str(tmp_path / "none.toml"))
-    with pytest.raises(BadInput, match="Is a directory"):
-        load_fabric(tmp_path)
-
-
-def test_unknown_preset_names_the_nearest():
-    with pytest.raises(BadInput, match="did you mean 'denim'"):
-        load_fabric("denmi")
+def test_what_is_no_fabric_is_refused(tmp_path):
+    for name, words in (
+        (str(tmp_path / "none.toml"), "no such file"),
+        (tmp_path, "Is a directory"),
+        ("denmi", "did you mean 'denim'"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            load_fabric(name)
