@@ -48,10 +48,8 @@ def test_distributions(directions):
     uniforms = [queries.u / 4, queries.v / 3, np.log(queries.sigma / 0.1) / math.log(100)]
     for w in (queries.wi, queries.wo):
         z = w[:, 2].astype(float)
-        uniforms += [np.arctan2(w[:, 1], w[:, 0]) / (2 * math.pi) + 0.5]
-        uniforms += [
-            (1 - z * z) / sine**2 if directions == "projected_disc" else (1 - z) / (1 - math.sqrt(1 - sine**2))
-        ]
+        share = (1 - z * z) / sine**2 if directions == "projected_disc" else (1 - z) / (1 - math.sqrt(1 - sine**2))
+        uniforms += [np.arctan2(w[:, 1], w[:, 0]) / (2 * math.pi) + 0.5, share]
         np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0, atol=1e-6)
     worst = min(stats.kstest(values, "uniform").pvalue for values in uniforms)
     assert worst > 1 - (1 - LEVEL) ** (1 / len(uniforms))

@@ -24,14 +24,8 @@ def test_the_script_reads_a_shard_without_this_package(tmp_path):
     generate_shard(ShardTask(fabric=fabric, split="test", start=0, rows=50, seed=1, truth=truth), shard)
     digest = file_sha256(shard)
     entry = ShardEntry(file=shard.name, fabric="denim", split="test", start=0, rows=50, sha256=digest)
-    manifest = Manifest(
-        name="tiny",
-        fingerprint="0123456789abcdef",
-        roles={"seen": ["denim"], "population": [], "unseen": []},
-        fabrics={"denim": fabric},
-        about={},
-        shards=[entry],
-    )
+    facts = {"name": "tiny", "fingerprint": "0123456789abcdef", "roles": {"seen": ["denim"]}, "about": {}}
+    manifest = Manifest(fabrics={"denim": fabric}, shards=[entry], **facts)
     (shard.parent / FILE).write_text(manifest.model_dump_json(), encoding="utf-8")
 
     asked = [sys.executable, "-I", "read_shard.py", "data", "denim", "test"]

@@ -3,33 +3,21 @@
 import numpy as np
 import pytest
 
-from pipeline.shards.silhouettes import SilhouetteRows
 from pipeline.truth.geometry.opacity import grazing_cosine, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.shards.extra import GRAZING, OPACITY
 from weaves.fabric import load_fabric
 
-SMALL = SilhouetteRows(
-    kind="opacity",
-    rows=512,
-    points=32,
-    sigma=(0.5, 8.0),
-    largest_curvature=0.5,
-    anywhere=0.1,
-    footprint="gaussian",
-    seed=0,
-)
-GRAZING = SMALL.model_copy(update={"kind": "grazing_cosine", "points": 1024})
 DENIM = load_fabric("denim")
 
 
 def test_opacities_are_the_truths():
-    column = SMALL.answer(DENIM, 0, 512)
+    column = OPACITY.answer(DENIM, 0, 512)
     wo = np.stack([column[f"wo_{axis}"] for axis in "xyz"], axis=-1)
     queries = Queries.round(column["u"], column["v"], column["sigma"], wo, wo)
-    exact, error = opacity(
-        DENIM, queries._replace(curvature=column["curvature"]), TruthOptions(min_count=256, max_count=256), seed=9
-    )
+    exactly = TruthOptions(min_count=256, max_count=256)
+    exact, error = opacity(DENIM, queries._replace(curvature=column["curvature"]), exactly, seed=9)
     doubt = np.sqrt(np.square(error) + 0.25 / 32)
     assert (np.abs(column["opacity"] - exact) < 4 * doubt + 1e-6).mean() > 0.99
     assert ((exact > 0.02) & (exact < 0.98)).mean() > 0.25
@@ -40,10 +28,8 @@ def test_opacities_are_the_truths():
 def test_grazing_rows_are_mean_and_variance_of_cosines(footprint):
     column = GRAZING.model_copy(update={"footprint": footprint}).answer(DENIM, 0, 64)
     column = {name: values.astype(np.float64) for name, values in column.items()}
-    random = np.random.default_rng(2)
-    unit = (
-        random.standard_normal((2, 64, 64)) if footprint == "gaussian" else random.uniform(-1, 1, (2, 64, 64)) * 3**0.5
-    )
+    random, shape = np.random.default_rng(2), (2, 64, 64)
+    unit = random.standard_normal(shape) if footprint == "gaussian" else random.uniform(-1, 1, shape) * 3**0.5
     u, v, sigma, kappa = (column[name][:, None] for name in ("u", "v", "sigma", "curvature"))
     azimuth = np.arctan2(column["wo_y"], column["wo_x"])[:, None]
     cosines = grazing_cosine(DENIM, u + sigma * unit[0], v + sigma * unit[1], azimuth, kappa) / np.sqrt(kappa)
@@ -53,7 +39,7 @@ def test_grazing_rows_are_mean_and_variance_of_cosines(footprint):
     assert column["grazing_variance"].mean() == pytest.approx(cosines.var(axis=1).mean(), rel=0.2)
 
 
-@pytest.mark.parametrize("rows", [SMALL, GRAZING.model_copy(update={"points": 64})])
+@pytest.mark.parametrize("rows", [OPACITY, GRAZING.model_copy(update={"points": 64})])
 def test_rows_are_the_same_in_any_cut(rows):
     whole, first, rest = (rows.answer(DENIM, *cut) for cut in ((0, 40), (0, 7), (7, 33)))
     for name, column in whole.items():
@@ -61,6 +47,8 @@ def test_rows_are_the_same_in_any_cut(rows):
 
 
 def test_fabrics_and_seeds_draw_other_queries():
-    basket, other = load_fabric("basket"), SMALL.model_copy(update={"seed": 1})
-    drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in ((SMALL, DENIM), (SMALL, basket), (other, DENIM))]
+    basket, other = load_fabric("basket"), OPACITY.model_copy(update={"seed": 1})
+    drawn = [
+        rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in ((OPACITY, DENIM), (OPACITY, basket), (other, DENIM))
+    ]
     assert len(np.unique(np.concatenate(drawn))) == 48
