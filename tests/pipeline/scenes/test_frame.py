@@ -85,19 +85,17 @@ def test_a_plane_agrees_with_its_rays():
     assert (gbuffer.curvature == 0).all()
 
     # The covariance of the ellipse is pixel_sigma^2 J J^T, whatever its axes are called.
-    axes = np.stack([np.cos(gbuffer.angle), np.sin(gbuffer.angle)], axis=-1)
-    across = np.stack([-axes[:, 1], axes[:, 0]], axis=-1)
-    found = sum(
-        (s**2)[:, None, None] * a[:, :, None] * a[:, None, :]
-        for s, a in ((gbuffer.sigma, axes), (gbuffer.sigma_minor, across))
-    )
+    cosine, sine = np.cos(gbuffer.angle), np.sin(gbuffer.angle)
+    axes = np.stack([cosine, -sine, sine, cosine], axis=-1).reshape(-1, 2, 2)
+    axes *= np.stack([gbuffer.sigma, gbuffer.sigma_minor], axis=-1)[:, None]
+    ours = axes @ np.swapaxes(axes, 1, 2)
     centre, h = uv(x, y), 1e-3
     step = np.stack([uv(x + 1, y) - centre, uv(x, y + 1) - centre], axis=-1)
     slope = np.stack([uv(x + h, y) - uv(x - h, y), uv(x, y + h) - uv(x, y - h)], axis=-1) / (2 * h)
     for jacobian, allowed in ((step, 1e-3), (slope, 0.07)):
         expected = 0.25 * jacobian @ np.swapaxes(jacobian, 1, 2)
         size = np.abs(expected).max(axis=(1, 2))
-        assert (np.abs(found - expected).max(axis=(1, 2)) / size).max() < allowed
+        assert (np.abs(ours - expected).max(axis=(1, 2)) / size).max() < allowed
     assert (gbuffer.sigma >= gbuffer.sigma_minor).all()
 
 
@@ -220,30 +218,29 @@ def test_frames_move_the_camera_to_the_right():
     assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
 
 
+@pytest.fixture
+def in_variants():
+    """Return a shipped scene's G-buffers in Mitsuba's scalar and in its LLVM variant."""
+    if not llvm_works():
+        pytest.skip("no LLVM that Mitsuba can use")
+    options = SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"})
+    return lambda name: [render(load(SHIPPED[name], o), size=SIZE).gbuffers for o in options]
+
+
 @pytest.mark.external
-@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
-def test_variants_agree():
-    one, other = (
-        render(load(SHIPPED["sphere"], o), size=SIZE).gbuffers["silk_charmeuse"]
-        for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
-    )
-    assert (one.pixel == other.pixel).all()
+def test_variants_agree(in_variants):
+    ours, other = (gbuffers["silk_charmeuse"] for gbuffers in in_variants("sphere"))
+    assert (ours.pixel == other.pixel).all()
     for name in ("u", "v", "sigma", "sigma_minor", "wo", "curvature"):
-        a, b = getattr(one, name), getattr(other, name)
         # Places on the edge of two triangles may fall to either.
-        assert np.isclose(a, b, rtol=1e-3, atol=1e-4).mean() > 0.99, name
-    assert abs(len(one.place) - len(other.place)) < 0.002 * len(one.place)
+        assert np.isclose(getattr(ours, name), getattr(other, name), rtol=1e-3, atol=1e-4).mean() > 0.99, name
+    assert abs(len(ours.place) - len(other.place)) < 0.002 * len(ours.place)
 
 
 @pytest.mark.external
-@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
-def test_variants_agree_on_who_wears_what_and_on_the_lamp():
+def test_variants_agree_on_who_wears_what_and_on_the_lamp(in_variants):
     """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""
-    one, other = (
-        render(load(SHIPPED["dinner_table"], o), size=SIZE)
-        for o in (SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"}))
-    )
-    for key, gbuffer in one.gbuffers.items():
-        assert (gbuffer.mask == other.gbuffers[key].mask).mean() > 0.999 and gbuffer.mask.any(), key
-        total = [found.gbuffers[key].irradiance.sum(axis=0) for found in (one, other)]
-        np.testing.assert_allclose(*total, rtol=2e-3)
+    scalar, vector = in_variants("dinner_table")
+    for key, ours in scalar.items():
+        assert (ours.mask == vector[key].mask).mean() > 0.999 and ours.mask.any(), key
+        np.testing.assert_allclose(ours.irradiance.sum(axis=0), vector[key].irradiance.sum(axis=0), rtol=2e-3)

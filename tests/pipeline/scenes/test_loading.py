@@ -76,37 +76,30 @@ def test_an_xml_scene_is_worn_and_lit(tmp_path):
     assert loaded.cloths["denim"][1].name == "denim"
 
 
-@pytest.mark.parametrize("source", ["file", "package"])
+FRESH = """
+import sys
+from pathlib import Path
+from pipeline.scenes.catalogue import load_scene
+from pipeline.scenes.frame import render
+from pipeline.scenes.loading import load
+from pipeline.scenes.options import SceneOptions
+loaded = load(load_scene(sys.argv[1]), SceneOptions(variant="scalar_rgb", environment_directions=4))
+print(len(render(loaded, size=(16, 12)).gbuffers))
+"""
+
+
+@pytest.mark.parametrize("source", ["scene.xml", "sphere"])
 def test_plugins_beside_a_scene_or_in_the_current_folder_are_not_loaded(source, tmp_path, monkeypatch):
     """A file that is no library: Mitsuba would stop at it if it tried, and would run the code of a real one."""
     (tmp_path / "plugins").mkdir()
-    for name in (
-        "diffuse",
-        "sphere",
-        "rectangle",
-        "hdrfilm",
-        "perspective",
-        "scene",
-        "directional",
-        "stratified",
-        "aov",
-    ):
+    used = ("diffuse", "sphere", "rectangle", "hdrfilm", "perspective", "scene", "directional", "stratified", "aov")
+    for name in used:
         (tmp_path / "plugins" / f"{name}.so").write_bytes(b"no library")
     monkeypatch.chdir(tmp_path)
     written(tmp_path, BALL + SUN + CAMERA)
-    code = (
-        "import sys; from pipeline.scenes.catalogue import load_scene; from pipeline.scenes.loading import load;"
-        "from pipeline.scenes.options import SceneOptions; from pathlib import Path;"
-        "from pipeline.scenes.frame import render;"
-        "scene = load_scene(Path('scene.xml')) if sys.argv[1] == 'file' else load_scene('sphere');"
-        "loaded = load(scene, SceneOptions(variant='scalar_rgb', environment_directions=4));"
-        "print(len(render(loaded).gbuffers) if sys.argv[1] == 'file' else len(loaded.cloths))"
-    )
     # In a fresh process: this one has loaded Mitsuba's own plugins already.
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", code, source], capture_output=True, text=True, env=environment, check=False
-    )
+    command, environment = [sys.executable, "-c", FRESH, source], os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["1"]
 
@@ -142,18 +135,13 @@ def test_a_camera_inside_the_cloth_is_refused(x, inside, tmp_path):
         assert len(render(loaded).gbuffers["denim"].pixel)
 
 
-def test_shear_is_refused_where_it_is_asked_to_be(tmp_path):
-    body = TRIANGLE.replace("f 1 2 3", "vt 0 0\nvt 1 0.5\nvt 0 1\nf 1/1 2/2 3/3")
+def test_uv_that_do_not_vary_are_refused_and_shear_where_that_is_an_option(tmp_path):
     path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
-    (tmp_path / "bare.obj").write_text(body)
+    (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1"))
+    assert "needs uv coordinates" in refused(lambda: load(load_scene(path), OPTIONS))
+    (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nvt 1 0.5\nvt 0 1\nf 1/1 2/2 3/3"))
     loaded = load(load_scene(path), OPTIONS)
     assert len(render(loaded).gbuffers["denim"].pixel)
     strict = OPTIONS.model_copy(update={"largest_shear": 10.0})
     sentence = refused(lambda: render(load(load_scene(path), strict)))
     assert f"sheared by {np.degrees(np.arctan(0.5)):.1f} degrees" in sentence
-
-
-def test_uv_that_do_not_vary_are_refused(tmp_path):
-    path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
-    (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1"))
-    assert "needs uv coordinates" in refused(lambda: load(load_scene(path), OPTIONS))

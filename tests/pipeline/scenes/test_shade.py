@@ -9,18 +9,21 @@ from weaves.fabric import Fabric, load_fabric
 
 
 def lit(side):
-    """Return four queries that are lit from one side."""
-    ones = np.ones(4)
-    return Queries.round(ones, ones, ones, np.tile([0.6, 0, 0.8 * side], (4, 1)), np.tile([0, 0, 1.0], (4, 1)))
+    """Return queries that are lit from these sides."""
+    ones, none = np.ones_like(side), np.zeros_like(side)
+    wi, wo = np.stack([0.6 * ones, none, 0.8 * side], axis=-1), np.stack([none, none, ones], axis=-1)
+    return Queries.round(ones, ones, ones, wi, wo)
 
 
 def test_shade_applies_each_colour_to_its_component():
-    """One component at a time gives back its own colour; an asymmetric fabric sees warp and weft swapped."""
-    fabric = load_fabric("denim")
-    rgb = shade(fabric, np.eye(4), lit(1.0))
-    expected = [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb]
-    assert rgb == pytest.approx(np.array(expected))
-    assert colours(fabric) == pytest.approx(np.array(expected))
+    """One component at a time gives back its own colour, transmitted light that of transmission."""
+    denim = load_fabric("denim")
+    fabric = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
+    yarns, sides = (fabric.warp, fabric.weft), ("diffuse_rgb", "diffuse_transmission_rgb")
+    expected = [[getattr(yarn, name) for name in ("specular_rgb", side) for yarn in yarns] for side in sides]
+    rgb = shade(fabric, np.tile(np.eye(4), (2, 1)), lit(np.repeat([1.0, -1.0], 4)))
+    assert rgb.reshape(2, 4, 3) == pytest.approx(np.array(expected))
+    assert np.array([colours(fabric), colours(fabric, transmitted=True)]) == pytest.approx(np.array(expected))
     assert fabric.warp.diffuse_rgb != fabric.weft.diffuse_rgb
 
 
@@ -28,19 +31,10 @@ def test_compose_scales_by_the_irradiance_and_leaves_the_rest():
     gbuffer = view("sphere", 40, 40, options=ViewOptions(irradiance=2.0, sphere_light=(75.0, 0.0)))
     rgb = np.arange(3 * len(gbuffer.u), dtype=np.float64).reshape(-1, 3)
     picture = compose(gbuffer, rgb, background=0.5)
-    assert picture.shape == (40, 40, 3)
-    assert picture.dtype == np.float32
+    assert picture.shape == (40, 40, 3) and picture.dtype == np.float32
     assert picture[gbuffer.lit] == pytest.approx(2.0 * rgb)
     assert (picture[gbuffer.mask & ~gbuffer.lit] == 0).all()
     assert (picture[~gbuffer.mask] == 0.5).all()
-
-
-def test_transmitted_light_takes_the_transmission_colours():
-    denim = load_fabric("denim")
-    curtain = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
-    rgb = shade(curtain, np.eye(4), lit(-1.0))
-    assert rgb[3] == pytest.approx([0.1, 0.2, 0.3]) and (rgb[2] == 0).all()
-    assert rgb[:2] == pytest.approx(shade(denim, np.eye(4), lit(1.0))[:2])
 
 
 def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
@@ -50,7 +44,7 @@ def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
     fabric = Fabric.model_validate(load_fabric("denim").model_dump() | {"colours": order})
     places = np.array([1.0, 3.0, 5.0, 2.0])
     size = np.array([0.1, 0.1, 0.1, 50.0])
-    queries = lit(1.0)._replace(u=places, sigma=size, sigma_minor=size)
+    queries = lit(np.ones(4))._replace(u=places, sigma=size, sigma_minor=size)
     rgb = shade(fabric, np.tile([0.0, 0.0, 1.0, 0.0], (4, 1)), queries)
     assert rgb[:, 0] == pytest.approx([1.0, 0.0, 1.0, 0.5], abs=1e-3)
     assert colours(fabric)[2] == pytest.approx([0.5] * 3)

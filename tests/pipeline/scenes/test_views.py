@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,12 @@ def spread(gbuffer, column):
     return picture
 
 
+def derivative(gbuffer):
+    """Return d(u, v)/d(pixel) of the inner pixels, from central differences."""
+    uv = spread(gbuffer, np.stack([gbuffer.u, gbuffer.v], -1))
+    return 0.5 * np.stack([uv[1:-1, 2:] - uv[1:-1, :-2], uv[2:, 1:-1] - uv[:-2, 1:-1]], axis=-1)
+
+
 @pytest.mark.parametrize("scene", ["sphere", "plane"])
 def test_directions_are_unit_and_in_front(scene):
     gbuffer = view(scene, 64, 48)
@@ -27,19 +34,12 @@ def test_directions_are_unit_and_in_front(scene):
     assert not (gbuffer.lit & ~gbuffer.mask).any()
 
 
-def test_sphere_has_the_asked_scale_at_its_centre():
-    """At the centre surface and picture are parallel: neighbouring pixels are 1/6 yarn apart, sigma = 1/12."""
+def test_the_centre_of_the_sphere():
+    """Surface and picture are parallel there: pixels are 1/6 yarn apart, rows count downwards; wi is the light."""
     gbuffer = view("sphere", 129, 129, options=FLAT)
-    u, v, sigma = (spread(gbuffer, column) for column in (gbuffer.u, gbuffer.v, gbuffer.sigma))
-    assert u[64, 65] - u[64, 63] == pytest.approx(2 / 6, rel=1e-3)
-    assert v[63, 64] - v[65, 64] == pytest.approx(2 / 6, rel=1e-3)  # rows count downwards, v upwards
-    assert sigma[64, 64] == pytest.approx(0.5 / 6, rel=1e-3)
-
-
-def test_sphere_light_and_view_at_the_centre():
-    """There the local frame is the camera's: wo = z, wi = the light; swapping them is seen."""
-    gbuffer = view("sphere", 65, 65, options=FLAT)
-    wi, wo = spread(gbuffer, gbuffer.wi)[32, 32], spread(gbuffer, gbuffer.wo)[32, 32]
+    assert derivative(gbuffer)[63, 63] == pytest.approx(np.diag([1 / 6, -1 / 6]), rel=1e-3, abs=1e-6)
+    sigma, wi, wo = (spread(gbuffer, column)[64, 64] for column in (gbuffer.sigma, gbuffer.wi, gbuffer.wo))
+    assert sigma == pytest.approx(0.5 / 6, rel=1e-3)
     polar, azimuth = np.radians(FLAT.sphere_light)
     expected = [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
     assert wo == pytest.approx([0, 0, 1], abs=1e-12)
@@ -64,10 +64,7 @@ def test_footprint_is_the_finite_difference_of_the_coordinates(scene, footprint)
     Differences over two pixels bend away from the derivative by the square of the pixel: 3 % allowed at this size.
     """
     gbuffer = view(scene, 160, 120, options=ViewOptions(footprint=footprint, largest_sigma=1e6))
-    uv, sigma = spread(gbuffer, np.stack([gbuffer.u, gbuffer.v], -1)), spread(gbuffer, gbuffer.sigma)
-    right = 0.5 * (uv[1:-1, 2:] - uv[1:-1, :-2])
-    down = 0.5 * (uv[2:, 1:-1] - uv[:-2, 1:-1])
-    jacobian = np.stack([right, down], axis=-1)
+    sigma, jacobian = spread(gbuffer, gbuffer.sigma), derivative(gbuffer)
     inner = np.isfinite(jacobian).all(axis=(2, 3))
     inner &= spread(gbuffer, gbuffer.wo[:, 2])[1:-1, 1:-1] > 0.35
     singular = np.linalg.svd(jacobian[inner], compute_uv=False)
@@ -82,13 +79,8 @@ def test_sphere_is_conformal():
     Seen through the geometry alone: |du| and |dv| of equal steps on the surface, and their right angle.
     """
     gbuffer = view("sphere", 200, 200, options=ViewOptions(turn=17.0))
-    uv, wo = spread(gbuffer, np.stack([gbuffer.u, gbuffer.v], -1)), spread(gbuffer, gbuffer.wo)
-    right = 0.5 * (uv[1:-1, 2:] - uv[1:-1, :-2])
-    down = 0.5 * (uv[2:, 1:-1] - uv[:-2, 1:-1])
-    jacobian = np.stack([right, down], axis=-1)
-    inner = np.isfinite(jacobian).all(axis=(2, 3))
-    cosine = wo[1:-1, 1:-1, 2]
-    inner &= cosine > 0.3
+    jacobian, cosine = derivative(gbuffer), spread(gbuffer, gbuffer.wo)[1:-1, 1:-1, 2]
+    inner = np.isfinite(jacobian).all(axis=(2, 3)) & (cosine > 0.3)
     singular = np.linalg.svd(jacobian[inner], compute_uv=False)
     # Of a conformal map only the projection is left: the axes of a pixel differ by the cosine of the view.
     assert singular[:, 1] / singular[:, 0] == pytest.approx(cosine[inner], rel=0.04)
@@ -141,16 +133,11 @@ def test_queries_are_reduced_in_float64_first():
     assert np.abs(gbuffer.v).max() > 1e5
     queries = gbuffer.queries((3, 8))
     assert queries.u.dtype == queries.wi.dtype == np.float32
-    assert ((queries.u >= 0) & (queries.u < 3)).all()
-    assert ((queries.v >= 0) & (queries.v < 8)).all()
+    assert queries.u.min() >= 0 and queries.u.max() < 3 and queries.v.min() >= 0 and queries.v.max() < 8
     difference = np.abs(queries.v - np.mod(gbuffer.v, 8))
     assert np.minimum(difference, 8 - difference).max() < 1e-6
-
-
-def test_what_rounds_up_to_the_repeat_becomes_its_start():
-    gbuffer = view("sphere", 16, 16)
-    edge = gbuffer.__class__(**{**gbuffer.__dict__, "u": np.full_like(gbuffer.u, -1e-12)})
-    assert (edge.queries((4, 4)).u == 0).all()
+    # What rounds up to the repeat becomes its start.
+    assert (replace(gbuffer, u=np.full_like(gbuffer.u, -1e-12)).queries((4, 4)).u == 0).all()
 
 
 def test_unlit_pixels_are_cloth_without_queries():
