@@ -17,11 +17,11 @@ NAMES = {
     "elliptic": "auto",
     "oblique": "rotated",
     "placed": "nodes placed in the footprint",
+    "stand_in": "fallback",
+    "left_to": "fallback",
+    "not_its_own": "fallback_share",
 }
 """Words that are no part of any name, and the term to use."""
-
-PHRASES = {"stand_in": "fallback", "left_to": "fallback", "not_its_own": "fallback_share"}
-"""Parts of names of several words, and the term to use."""
 
 OPENINGS = re.compile(r"(What|Say|Says|Tell|Tells|Whether)\b")
 """Openings of docstrings that are neither a noun nor an imperative of the field; bools open with "True if"."""
@@ -47,12 +47,9 @@ def names(source: Source) -> set[str]:
 
 def wrong_names(name: str) -> Iterator[str]:
     """Yield what is wrong with a name."""
-    parts = name.strip("_").split("_")
-    for word in {*parts, *(part.removesuffix("s") for part in parts)} & NAMES.keys():
-        yield f"the name {name}: use {NAMES[word]}"
-    for phrase in PHRASES:
-        if phrase in name:
-            yield f"the name {name}: use {PHRASES[phrase]}"
+    for word, term in NAMES.items():
+        if f"_{word}_" in f"_{name}_" or f"_{word}s_" in f"_{name}_":
+            yield f"the name {name}: use {term}"
 
 
 def wrong_prose(text: str) -> Iterator[str]:

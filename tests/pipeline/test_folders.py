@@ -52,35 +52,33 @@ def test_the_listing_may_have_a_content_of_its_own(tmp_path):
     assert json.loads((tmp_path / LISTING).read_text())["size"] == 2.0
 
 
-def damage(folder, case):
-    """Change a folder so that nothing may be written there; return the path that is named."""
-    path = folder / {"listing": LISTING, "no_listing": LISTING, "escape": LISTING}.get(case, "a")
-    if case == "changed":
-        path.write_text("mine")
-    elif case == "link":
-        path.unlink()
-        path.symlink_to(folder / "b")
-    elif case == "folder":
-        path.unlink()
-        path.mkdir()
-    elif case == "foreign":
-        (path := folder / "d").write_text("mine")
-    elif case == "foreign_above":
-        (path := folder / "new").symlink_to(folder / ".git")
-    elif case == "listing":
-        path.write_text(path.read_text().replace("{", '{"note": 1, ', 1))
-    elif case == "no_listing":
-        path.write_text("mine")
-    elif case == "escape":
-        path.write_text(path.read_text().replace('"a"', '"../a"'))
-    return path
+def rewritten(path, old, new):
+    path.write_text(path.read_text().replace(old, new, 1))
 
 
-@pytest.mark.parametrize(
-    "case", ["changed", "link", "folder", "foreign", "foreign_above", "listing", "no_listing", "escape"]
-)
+def replaced_by_link(path, target):
+    path.unlink(missing_ok=True)
+    path.symlink_to(target)
+
+
+DAMAGE = {
+    "a": lambda path: path.write_text("mine"),
+    "a, a link": lambda path: replaced_by_link(path, path.parent / "b"),
+    "a, a folder": lambda path: (path.unlink(), path.mkdir()),
+    "d": lambda path: path.write_text("mine"),
+    "new": lambda path: replaced_by_link(path, path.parent / ".git"),
+    LISTING: lambda path: rewritten(path, "{", '{"note": 1, '),
+    f"{LISTING}, none": lambda path: path.write_text("mine"),
+    f"{LISTING}, escaping": lambda path: rewritten(path, '"a"', '"../a"'),
+}
+"""Changes of a folder after which nothing may be written there, by the path that is named."""
+
+
+@pytest.mark.parametrize("case", DAMAGE)
 def test_what_is_not_its_own_is_refused_by_name_before_anything_is_touched(folder, case):
-    path, before = damage(folder, case), content(folder)
+    path = folder / case.partition(",")[0]
+    DAMAGE[case](path)
+    before = content(folder)
     with pytest.raises(BadInput) as refused:
         write(folder, a="2", d="2", new__d="2")
     assert path.name in str(refused.value) and "\n" not in str(refused.value)
@@ -116,10 +114,14 @@ with own_files(Path(sys.argv[1]), "list.json") as new:
 """
 
 
-@pytest.mark.parametrize("moves", [0, 1, 3, 5], ids=["no_journal", "journal", "two_files", "no_listing"])
-def test_a_run_after_a_kill_knows_the_files_of_both(folder, moves):
+def killed(folder, moves):
     done = subprocess.run([sys.executable, "-c", KILLED, str(folder), str(moves)], check=False)
     assert done.returncode == 9
+
+
+@pytest.mark.parametrize("moves", [0, 1, 3, 5], ids=["no_journal", "journal", "two_files", "no_listing"])
+def test_a_run_after_a_kill_knows_the_files_of_both(folder, moves):
+    killed(folder, moves)
     write(folder, b="2")
     left = content(folder)
     del left[LISTING]
@@ -127,7 +129,7 @@ def test_a_run_after_a_kill_knows_the_files_of_both(folder, moves):
 
 
 def test_after_a_kill_a_changed_file_is_refused_too(folder):
-    subprocess.run([sys.executable, "-c", KILLED, str(folder), "3"], check=False)
+    killed(folder, 3)
     assert (folder / "a").read_text() == (folder / "x").read_text() == "killed"
     (folder / "x").write_text("mine")
     before = content(folder)

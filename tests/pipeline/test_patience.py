@@ -7,10 +7,6 @@ import pytest
 from pipeline import patience
 
 
-class PassingError(Exception):
-    pass
-
-
 class LastingError(Exception):
     pass
 
@@ -46,7 +42,7 @@ def ask(request, kind="answered"):
     return asyncio.run(patience.patiently(request, lambda error: "final" if isinstance(error, LastingError) else kind))
 
 
-def failing(times, error=PassingError):
+def failing(times, error=ConnectionError):
     """Return a request that fails so many times, and the list of its calls."""
     calls = []
 

@@ -26,10 +26,8 @@ def required(options, count=4000, margin=1.25):
     curvature=st.sampled_from([(0.0, 0.0), (0.01, 0.1)]),
 )
 def test_the_domain_holds_what_was_asked_and_little_else(low, factor, angle, behind, curvature):
-    options = QueryOptions(
-        sigma=(low, low * factor), max_angle=angle, behind=behind, curvature=curvature, directions="hemisphere"
-    )
-    found = required(options).queries()
+    shape = {"behind": behind, "curvature": curvature, "directions": "hemisphere"}
+    found = required(QueryOptions(sigma=(low, low * factor), max_angle=angle, **shape)).queries()
     assert found.sigma[0] <= low * 1.01 and found.sigma[1] >= low * factor * 0.99
     assert found.sigma[0] >= low / 1.26 and found.sigma[1] <= low * factor * 1.26
     assert angle - 1.0 <= found.max_angle <= max(angle + 1.0, angle + 0.26 * (90 - angle))
@@ -38,16 +36,12 @@ def test_the_domain_holds_what_was_asked_and_little_else(low, factor, angle, beh
     assert (found.curvature == (0.0, 0.0)) == (curvature == (0.0, 0.0))
 
 
-def test_stretched_footprints_keep_their_ratio_and_their_area():
-    found = required(QueryOptions(sigma=(0.5, 0.5), stretch=4.0))
-    assert 3.9 <= found.stretch <= 4.0 * 1.26
-    assert found.sigma[0] == pytest.approx(0.4, rel=1e-3) and found.sigma[1] == pytest.approx(0.625, rel=1e-3)
-
-
-def test_what_a_model_does_not_know_is_not_asked_of_it():
-    found = required(QueryOptions(behind=0.5, stretch=4.0, curvature=(0.01, 0.1)))
-    assert found.queries(frozenset()).plain
-    assert found.queries(frozenset({"behind"})).behind > 0.4
+def test_stretched_footprints_keep_their_ratio_and_area_and_what_a_model_does_not_know_is_not_asked_of_it():
+    shaped = required(QueryOptions(sigma=(0.5, 0.5), stretch=4.0, behind=0.5, curvature=(0.01, 0.1)))
+    assert 3.9 <= shaped.stretch <= 4.0 * 1.26
+    assert shaped.sigma == pytest.approx((0.4, 0.625), rel=1e-3)
+    assert shaped.queries(frozenset()).plain
+    assert shaped.queries(frozenset({"behind"})).behind > 0.4
 
 
 def test_classes_of_size_sum_to_one():

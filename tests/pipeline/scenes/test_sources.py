@@ -20,16 +20,12 @@ XML = """<scene version="3.0.0">
 </scene>"""
 
 
-def test_cloths_of_an_xml_file_are_those_of_its_bsdfs(tmp_path):
+def test_cloths_of_an_xml_file_are_those_of_its_bsdfs_and_files_those_that_are_there(tmp_path):
     (tmp_path / "sofa.xml").write_text(XML)
     (tmp_path / "sofa.toml").write_text('name = "sofa"\nsource = "sofa.xml"\n[cloths.seat]\nfabric = "satin_8"\n')
-    assert worn(load_scene(tmp_path / "sofa.toml")) == {"seat": "satin_8", "denim": "denim"}
-    assert worn(load_scene(tmp_path / "sofa.xml")) == {"denim": "denim", "seat": "seat"}
-
-
-def test_files_that_are_there_are_part_of_a_scene(tmp_path):
-    (tmp_path / "sofa.xml").write_text(XML)
     scene = load_scene(tmp_path / "sofa.xml")
+    assert worn(load_scene(tmp_path / "sofa.toml")) == {"seat": "satin_8", "denim": "denim"}
+    assert worn(scene) == {"denim": "denim", "seat": "seat"}
     assert files(scene) == [tmp_path / "sofa.xml"]
     (tmp_path / "sheet.ply").write_bytes(b"ply")
     assert files(scene) == [tmp_path / "sofa.xml", tmp_path / "sheet.ply"]
@@ -41,7 +37,6 @@ SHAPE = '<shape type="obj"><string name="filename" value="{}"/></shape>'
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("<scene", "broken XML"),
         ("", "broken XML"),
         ("<a>" * 40_000 + "</a>" * 40_000, "nested too deeply"),
         ("<scene>" + "<a/>" * 200_000 + "</scene>", "too many elements"),
@@ -49,11 +44,9 @@ SHAPE = '<shape type="obj"><string name="filename" value="{}"/></shape>'
         ('<scene><path value="/etc"/></scene>', "path = '/etc'"),
         (f"<scene>{SHAPE.format('$x')}</scene>", "filename = '$x'"),
         ('<scene><string name="$n" value="pipe"/></scene>', "without parameters"),
-        (f"<scene>{SHAPE.format('pipe')}</scene>", "is a pipe"),
         (f"<scene>{SHAPE.format('/dev/zero')}</scene>", "is a device"),
         (f"<scene>{SHAPE.format('.')}</scene>", "is a folder"),
         ('<scene><spectrum name="a" filename="pipe"/></scene>', "is a pipe"),
-        ('<scene><include filename="pipe"/></scene>', "is a pipe"),
         ('<scene><include filename="part.xml"/></scene>', "is a pipe"),
     ],
 )
