@@ -79,17 +79,7 @@ def luminance(rgb: Rgb) -> float:
 
 @lru_cache(maxsize=1024)
 def linear_rgb(colour: Rgb | str | Spectrum) -> Rgb:
-    """Convert a colour to linear sRGB.
-
-    Parameters
-    ----------
-    colour : three floats, str, or Spectrum
-        As `Colour` allows.
-
-    Returns
-    -------
-    three floats in [0, 1]
-    """
+    """Convert a colour, as `Colour` allows it, to linear sRGB, each channel from 0 to 1."""
     if isinstance(colour, tuple):
         return colour
     import colour as science
@@ -117,18 +107,10 @@ def encoded(rgb: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def delta_e(rgb: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return the colour difference CIEDE2000 of linear sRGB colours.
+    """Return the colour differences CIEDE2000 (...) of linear sRGB colours (..., 3) of a display with white (1, 1, 1).
 
-    Parameters
-    ----------
-    rgb, reference : array_like (..., 3)
-        Light of a display whose white is (1, 1, 1).
-
-    Returns
-    -------
-    float64 (...)
-        By way of XYZ (Rec. 709 primaries) and L*a*b* under D65, all parametric factors 1; about 1 is just noticeable
-        [Sharma2005CIEDE2000].
+    By way of XYZ (Rec. 709 primaries) and L*a*b* under D65, all parametric factors 1; about 1 is just noticeable
+    [Sharma2005CIEDE2000].
     """
     import colour as science
 

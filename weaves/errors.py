@@ -101,17 +101,7 @@ def printable(text: str) -> str:
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the known name that was probably meant, as the end of a sentence.
 
-    Parameters
-    ----------
-    word : str
-        The name found.
-    known : iterable of str
-        Names that are allowed.
-
-    Returns
-    -------
-    str
-        ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near.
+    That is ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near.
     """
     names = sorted(known)
     close = difflib.get_close_matches(word[:_WORD], names, n=1, cutoff=0.5)

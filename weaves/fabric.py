@@ -13,14 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tomli_w
-from pydantic import (
-    AfterValidator,
-    Field,
-    SerializerFunctionWrapHandler,
-    Strict,
-    model_serializer,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
 
 from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.draft import Draft, Loom, Matrix
@@ -148,17 +141,9 @@ def preset_names() -> list[str]:
 
 
 def load_fabric(name_or_path: str | Path) -> Fabric:
-    """Read a fabric.
+    """Read a preset by its name, or a TOML file by its path, which ends in ``.toml``.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name of a preset, or path of a TOML file (ending in ``.toml``).
-
-    Raises
-    ------
-    BadInput
-        If there is no such preset or file, or it does not describe a fabric.
+    BadInput if there is no such preset or file, or it does not describe a fabric.
 
     Examples
     --------
@@ -169,12 +154,8 @@ def load_fabric(name_or_path: str | Path) -> Fabric:
         path = Path(name_or_path)
         return validated(Fabric, read_toml(path), str(path))
     if name_or_path not in (known := preset_names()):
-        raise BadInput(
-            "fabric",
-            "name",
-            name_or_path,
-            f"a path ending in .toml or a preset is needed; {nearest(name_or_path, known)}",
-        )
+        allowed = f"a path ending in .toml or a preset is needed; {nearest(name_or_path, known)}"
+        raise BadInput("fabric", "name", name_or_path, allowed)
     path = PRESETS / f"{name_or_path}.toml"
     return validated(Fabric, read_toml(path), f"preset {name_or_path}")
 

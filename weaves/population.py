@@ -21,14 +21,7 @@ from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    Field,
-    StrictBool,
-    StrictInt,
-    ValidationError,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, StrictBool, StrictInt, ValidationError, model_validator
 
 from weaves.draft import Draft, Family, Matrix, cells
 from weaves.errors import BadInput
@@ -137,20 +130,7 @@ class Population(Frozen):
 
 
 def population_fabrics(population: Population, names: str = "random_{index:03d}") -> list[Fabric]:
-    """Draw the fabrics of a population.
-
-    Parameters
-    ----------
-    population : Population
-        Number, seed and ranges.
-    names : str
-        Format of the names, of `index` and `family`.
-
-    Returns
-    -------
-    list of Fabric
-        `population.count` fabrics.
-    """
+    """Draw the fabrics of a population; `names` is the format of their names, of `index` and `family`."""
     allowed = _allowed(population.families, population.exclude)
     return [_draw(population, allowed, index, names) for index in range(population.count)]
 

@@ -30,23 +30,10 @@ MOST_KEYS: Final = 256
 
 
 def read_bytes(path: Path, most: int, needed: str) -> bytes:
-    """Return the content of a regular file.
+    """Return the content of a regular file of at most so many bytes; links are followed.
 
-    Parameters
-    ----------
-    path : Path
-        The file; links are followed.
-    most : int
-        Most bytes that are read.
-    needed : str
-        Kind of file, with its article, for messages: ``"a TOML file"``.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none, so that the caller can say what would make it.
-    BadInput
-        If it is no regular file, larger, or cannot be read.
+    `needed` is the kind of file, with its article, for messages: ``"a TOML file"``. FileNotFoundError if there is none,
+    so that the caller can say what would make it; BadInput if it is no regular file, larger, or cannot be read.
     """
     where = str(path)
     if not isinstance(path, Path):  # of object storage, which has files only
@@ -83,21 +70,9 @@ def read_text(path: Path, most: int, needed: str) -> str:
 
 
 def read_json(path: Path, most: int, needed: str, wide: Mapping[str, int] = MappingProxyType({})) -> Any:
-    """Return the content of a JSON file, parsed.
+    """Return the content of a JSON file, parsed; `wide` has the most keys of objects at some keys, else `MOST_KEYS`.
 
-    Parameters
-    ----------
-    path, most, needed
-        As for `read_bytes`.
-    wide : mapping
-        Most keys of the objects at some keys, in place of `MOST_KEYS`.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    BadInput
-        As `read_bytes`, and if it is no JSON, has more than `MOST_VALUES` values or an object with too many keys.
+    Errors as `read_bytes`; BadInput also if it is no JSON, has more than `MOST_VALUES` values or too wide an object.
     """
     where, content = str(path), read_bytes(path, most, needed)
     if (commas := content.count(b",")) > MOST_VALUES:
@@ -119,13 +94,7 @@ def read_json(path: Path, most: int, needed: str, wide: Mapping[str, int] = Mapp
 
 
 def refuse_irregular(path: Path, needed: str) -> None:
-    """Refuse a path that is there and no regular file; for files that a library opens by their name.
-
-    Raises
-    ------
-    BadInput
-        If it is a folder, a pipe, a socket or a device.
-    """
+    """Refuse a path that is there and no regular file; for files that a library opens by their name."""
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):

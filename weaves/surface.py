@@ -59,17 +59,8 @@ class ClothSurface(NamedTuple):
 def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurface:
     """Evaluate the surface at points seen from above.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    x, y : float arrays, broadcast together
-        Points in yarn spacings, finite, anywhere: the repeat goes on without end.
-
-    Returns
-    -------
-    ClothSurface
-        Arrays of the broadcast shape; formulas in the module's docstring.
+    `x` and `y`, arrays that are broadcast together, are in yarn spacings, finite, and may be anywhere: the repeat goes
+    on without end.
     """
     draft = cells(fabric.weave)
     picks, ends = draft.top.shape
@@ -100,17 +91,7 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurfa
 def surface_maps(fabric: Fabric, texels_per_yarn: int) -> ClothSurface:
     """Evaluate the surface at the texel centres of one repeat.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    texels_per_yarn : int
-        Texels per yarn spacing, >= 1.
-
-    Returns
-    -------
-    ClothSurface
-        Arrays (picks * texels_per_yarn, ends * texels_per_yarn): rows along y, pick 0 in row 0.
+    Its arrays are (picks * texels_per_yarn, ends * texels_per_yarn): rows along y, pick 0 in row 0.
     """
     ends, picks = fabric.weave.repeat
     x = (np.arange(ends * texels_per_yarn) + 0.5) / texels_per_yarn
@@ -119,16 +100,9 @@ def surface_maps(fabric: Fabric, texels_per_yarn: int) -> ClothSurface:
 
 
 def curvature(yarn: Yarn, length: npt.ArrayLike) -> Floats:
-    """Return 1/R = 2 sin u_max / L of floats, and 0 for those drawn flat.
+    """Return 1/R = 2 sin u_max / L of floats, whose lengths L may be infinite, and 0 for those drawn flat.
 
     Flat floats never change side, or are too short for their width: w sin u_max >= L.
-
-    Parameters
-    ----------
-    yarn : Yarn
-        The yarn that floats.
-    length : float array
-        Lengths in yarn spacings, may be infinite.
     """
     length = np.asarray(length, np.float64)
     sine = np.sin(np.radians(yarn.bend))

@@ -35,13 +35,7 @@ class Frozen(BaseModel):
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises
-    ------
-    BadInput
-        If the file is missing, no regular file, larger than `MOST_TEXT`, not UTF-8, or as `parse_toml`.
-    """
+    """Read a TOML file; BadInput if it is missing, irregular, larger than `MOST_TEXT`, no UTF-8, or as `parse_toml`."""
     try:
         text = read_text(path, MOST_TEXT, "a TOML file")
     except FileNotFoundError as error:
@@ -52,10 +46,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Return the content of a TOML text of bounded length.
 
-    Raises
-    ------
-    BadInput
-        If it is no TOML (naming the line), nested more deeply than `MOST_DEPTH`, or has integers beyond 64 bits.
+    BadInput if it is no TOML (naming the line), nested more deeply than `MOST_DEPTH`, or has integers beyond 64 bits.
     """
     allowed = f"at most {MOST_DEPTH} levels are allowed"
     if _LONG_KEY.search(text):
@@ -78,22 +69,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
-    """Build `model` from `data`.
-
-    Parameters
-    ----------
-    model : type of pydantic model
-        Class of the result.
-    data : mapping
-        Content of the file.
-    where : str
-        The file, for messages.
-
-    Raises
-    ------
-    BadInput
-        For the first error; the sentence counts the others.
-    """
+    """Build a model from the content of the file `where`; BadInput for the first error, which counts the others."""
     try:
         return model.model_validate(data)
     except ValidationError as error:

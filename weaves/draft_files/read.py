@@ -10,7 +10,7 @@ import io
 import math
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
@@ -66,15 +66,8 @@ class DraftFile:
 def read_draft(path: Path) -> DraftFile:
     """Read a draft file.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its suffix says the format.
-
-    Raises
-    ------
-    BadInput
-        If the suffix is unknown, the file cannot be read, is larger than `MOST_WIF_BYTES`, or describes no draft.
+    Its suffix says the format. BadInput if that is unknown, or the file cannot be read, is larger than
+    `MOST_WIF_BYTES`, or describes no draft.
     """
     where = str(path)
     if (reader := READERS.get(path.suffix.lower())) is None:
@@ -111,12 +104,11 @@ def _read_twa(content: bytes, where: str) -> PatternData:
 
 
 def _read_dtx(content: bytes, where: str) -> PatternData:
-    text = decoded(content)
-    if not text.lstrip("\ufeff \r\n\t").startswith("@@"):
+    text = decoded(content).lstrip("\ufeff \r\n\t")
+    if not text.startswith("@@"):
         raise BadInput(where, "", "has no section @@StartDTX", "a draft of FiberWorks is needed")
     if len(text) > MOST_USED:
         raise BadInput(where, "", f"has {len(text):,} letters", f"at most {MOST_USED:,} are allowed")
-    text = text.lstrip("\ufeff \r\n\t")
     sections = _called(lambda: dtx_reader.read_dtx_sections(io.StringIO(text)), where, "a FiberWorks draft")
     for name, process in dtx_reader.section_dispatcher.items():
         if name in sections:
@@ -192,13 +184,15 @@ def _draft_file(pattern: PatternData, path: Path, remarks: list[str]) -> DraftFi
             raise BadInput(where, f"{section} Threads", count, f"a number from 1 to {MOST_THREADS} is needed")
     if not pattern.liftplan:  # the reader leaves out treadles that lift nothing, and fails on them then
         pattern.tieup |= {used: set() for pressed in lifts.values() for used in pressed - pattern.tieup.keys()}
-    table = _table(pattern, where)
+    least, most = pattern.color_range or (0, 255)
+    shares = {index: [(level - least) / (most - least) for level in rgb] for index, rgb in pattern.color_table.items()}
+    table = {index: "#" + "".join(f"{round(255 * share):02x}" for share in rgb) for index, rgb in shares.items()}
     return DraftFile(
         title=one_line(pattern.name if pattern.name not in ("", "?", where) else path.stem, 100),
         program=one_line(f"{pattern.source_program} {pattern.source_version}".replace("?", "").strip(), 60),
         warp_over=_woven(pattern.threading, make_liftplan(pattern), ends, picks, where) ^ (not pattern.is_rising_shed),
-        ends=_threads(pattern, "warp", ends, table, remarks, where),
-        picks=_threads(pattern, "weft", picks, table, remarks, where),
+        ends=_threads(pattern, "warp", ends, table, remarks),
+        picks=_threads(pattern, "weft", picks, table, remarks),
         remarks=tuple(remarks),
     )
 
@@ -220,28 +214,10 @@ def _woven(
     return up
 
 
-def _table(pattern: PatternData, where: str) -> dict[int, str]:
-    """Return the colours of a file in 8 bits."""
-    least, most = pattern.color_range or (0, 255)
-    colours_by_number = {}
-    for index, levels in pattern.color_table.items():
-        shares = [(level - least) / (most - least) for level in levels]
-        if not all(0 <= share <= 1 for share in shares):
-            raise BadInput(where, f"[COLOR TABLE] {index}", levels, f"numbers from {least} to {most} are needed")
-        colours_by_number[index] = "#" + "".join(f"{round(255 * share):02x}" for share in shares)
-    return colours_by_number
-
-
-def _threads(
-    pattern: PatternData, axis: str, count: int, table: Mapping[int, str], remarks: list[str], where: str
-) -> DraftThreads:
+def _threads(pattern: PatternData, axis: str, count: int, table: Mapping[int, str], remarks: list[str]) -> DraftThreads:
     """Return the colours and lengths of the threads of the ``"warp"`` or ``"weft"``."""
     yarns = getattr(pattern, axis)
     named = getattr(pattern, f"{axis}_colors")
-    indices = [named.get(thread, yarns.color) for thread in range(1, count + 1)]
-    if wrong := [index for index in indices if index not in table]:
-        allowed = f"[COLOR TABLE] has the colours 1 to {len(table)}"
-        raise BadInput(where, f"[{axis.upper()} COLORS]", wrong[0], allowed)
     spacing, thickness = (
         _mean(getattr(yarns, key), getattr(pattern, f"{axis}_{key}"), count) for key in ("spacing", "thickness")
     )
@@ -254,7 +230,7 @@ def _threads(
         stated = f"the unit {yarns.units!r}" if yarns.units else "no unit"
         remarks.append(one_line(f"[{axis.upper()}] Spacing has {stated}: known are {', '.join(CENTIMETRES)}", 160))
     return DraftThreads(
-        colours=tuple(table[index] for index in indices),
+        colours=tuple(table[named.get(thread, yarns.color)] for thread in range(1, count + 1)),
         width=thickness / spacing if spacing and thickness else None,
         per_cm=per_cm,
     )
@@ -264,6 +240,5 @@ def _mean(default: float | None, own: Mapping[int, float], count: int) -> float 
     """Return the mean length over the threads; None if there is none, or it is no positive number."""
     if default is None:
         return None
-    lengths: Iterable[float] = (own.get(thread, default) for thread in range(1, count + 1))
-    mean = math.fsum(lengths) / count
+    mean = math.fsum(own.get(thread, default) for thread in range(1, count + 1)) / count
     return mean if math.isfinite(mean) and mean > 0 else None

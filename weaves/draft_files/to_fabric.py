@@ -50,24 +50,11 @@ def fabric_of(
 ) -> Imported:
     """Return the fabric of a draft file.
 
-    Parameters
-    ----------
-    draft : DraftFile
-        The file, read.
-    like : Fabric
-        Fabric whose yarns give what the file does not state.
-    name : str
-        Name of the new fabric.
-    where : str
-        The file, for messages.
-    given : mapping of mappings
-        Numbers of the yarns ``"warp"`` and ``"weft"`` that replace those of `like` and of the file.
+    The yarns of the fabric `like` give what the file, which messages call `where`, does not state. The numbers `given`
+    for the yarns ``"warp"`` and ``"weft"`` replace those of `like` and of the file.
 
-    Raises
-    ------
-    BadInput
-        If the smallest repeat is larger than `LARGEST_REPEAT`, a yarn never changes side, more than `MOST_COLOURS`
-        colours are used, or a given number is not allowed.
+    BadInput if the smallest repeat is larger than `LARGEST_REPEAT`, a yarn never changes side, more than `MOST_COLOURS`
+    colours are used, or a given number is not allowed.
     """
     read: list[str] = []
     assumed = list(draft.remarks)

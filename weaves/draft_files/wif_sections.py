@@ -119,15 +119,8 @@ def section_name(field: str) -> str:
 def wif_pattern(text: str, where: str) -> PatternData:
     """Return what a WIF text says; `where` names the file in messages.
 
-    Raises
-    ------
-    BadInput
-        If there is no section [WIF], a section is missing, damaged or contradicts another, or a limit is exceeded.
-
-    Warns
-    -----
-    UserWarning
-        If something cannot be used.
+    BadInput if there is no section [WIF], a section is missing, damaged or contradicts another, or a limit is
+    exceeded. A UserWarning if something cannot be used.
     """
     try:
         wif = _Wif.model_validate(_sections(text, where))
@@ -137,13 +130,12 @@ def wif_pattern(text: str, where: str) -> PatternData:
         key = " ".join([section_name(str(section)), *(str(key) for key in keys[:1])])
         raise BadInput(where, key, first["input"], first["msg"]) from error
     _refuse_missing(wif, where)
-    for axis in ("warp", "weft"):
-        _complete(wif, axis, where)
+    yarns = {axis: _yarns_of(wif, axis, where) for axis in ("warp", "weft")}
     # The reader takes the number of tied treadles for the last of them.
     wif.weaving.treadles = max([wif.weaving.treadles or 0, *wif.tieup])
     if not wif.liftplan and (most := max(max(used) for used in wif.treadling.values())) > wif.weaving.treadles:
         raise BadInput(where, "", f"[TREADLING] uses treadle {most}", f"[TIEUP] ends at {wif.weaving.treadles}")
-    return _pattern(wif, where)
+    return _pattern(wif, yarns, where)
 
 
 def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
@@ -162,12 +154,8 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
             kept += [f"[{name.replace(' ', '_')}]"] * inside
         elif inside and line:
             if len(line) > MOST_LINE_LETTERS:
-                raise BadInput(
-                    where,
-                    "",
-                    f"{section_name(name)} has a line of {len(line):,} letters",
-                    f"at most {MOST_LINE_LETTERS:,}",
-                )
+                long = f"{section_name(name)} has a line of {len(line):,} letters"
+                raise BadInput(where, "", long, f"at most {MOST_LINE_LETTERS:,}")
             kept.append(line)
     if not begun:
         raise BadInput(where, "", "has no section [WIF]", "a draft in the Weaving Information File format is needed")
@@ -179,9 +167,8 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
     except ParsingError as error:
         number, line = error.errors[0][0], kept[error.errors[0][0] - 1]
         section = next(entry for entry in reversed(kept[:number]) if entry.startswith("["))
-        raise BadInput(
-            where, "", f"{section_name(section[1:-1])} has the line {line}", "a line is KEY=VALUE"
-        ) from error
+        wrong = f"{section_name(section[1:-1])} has the line {line}"
+        raise BadInput(where, "", wrong, "a line is KEY=VALUE") from error
     return {name: dict(parser[name]) for name in parser.sections()}
 
 
@@ -201,18 +188,16 @@ def _refuse_missing(wif: _Wif, where: str) -> None:
     least, most = wif.color_palette.range
     if least >= most:
         raise BadInput(where, "[COLOR PALETTE] Range", (least, most), "the first number must be less than the second")
-    if list(wif.color_table) != sorted(wif.color_table) or max(wif.color_table) > len(wif.color_table):
-        wif.color_table = dict(sorted(wif.color_table.items()))
-        if missing := set(range(1, max(wif.color_table))) - set(wif.color_table):
-            raise BadInput(where, "", f"[COLOR TABLE] has no colour {min(missing)}", "colours 1, 2, 3, … are needed")
+    if missing := set(range(1, max(wif.color_table))) - set(wif.color_table):
+        raise BadInput(where, "", f"[COLOR TABLE] has no colour {min(missing)}", "colours 1, 2, 3, … are needed")
     for index, levels in wif.color_table.items():
         if not all(least <= level <= most for level in levels):
             allowed = f"numbers from {least} to {most}, the range of [COLOR PALETTE], are needed"
             raise BadInput(where, f"[COLOR TABLE] {index}", levels, allowed)
 
 
-def _complete(wif: _Wif, axis: str, where: str) -> None:
-    """Check the colours of the threads of an axis, and give it the defaults without which the reader drops lengths."""
+def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
+    """Return the numbers of an axis, its colours checked, with the defaults without which lengths are dropped."""
     yarns: _Yarns = getattr(wif, axis)
     colours: dict[int, int] = getattr(wif, f"{axis}_colors")
     known = f"[COLOR TABLE] has the colours 1 to {len(wif.color_table)}"
@@ -220,31 +205,31 @@ def _complete(wif: _Wif, axis: str, where: str) -> None:
         if colour > len(wif.color_table):
             raise BadInput(where, f"{section_name(f'{axis}_colors')} {thread}", colour, known)
     sets = wif.threading if axis == "warp" else wif.liftplan or wif.treadling
-    yarns.threads = max([yarns.threads or 0, *sets])
+    threads = max([yarns.threads or 0, *sets])
     section, default = section_name(axis), yarns.color[0] if yarns.color else 0
     if not 1 <= default <= len(wif.color_table):
         # Most programs state no default where each thread has a colour of its own.
         if not colours or set(colours) != set(range(1, len(colours) + 1)):
             stated = f"Color = {default}" if yarns.color else "no Color"
-            without = min(set(range(1, yarns.threads + 1)) - set(colours))
+            without = min(set(range(1, threads + 1)) - set(colours))
             raise BadInput(where, "", f"{section} has {stated}", f"{known}; thread {without} has no colour of its own")
         default = colours[1]
-        if len(colours) < yarns.threads:
-            threads = f"threads from {len(colours) + 1} on"
-            warnings.warn(f"{section} states no Color: {threads} have that of thread 1.", stacklevel=1)
-    yarns.color = (default,)
+        if len(colours) < threads:
+            others = f"threads from {len(colours) + 1} on"
+            warnings.warn(f"{section} states no Color: {others} have that of thread 1.", stacklevel=1)
     for key in ("spacing", "thickness"):
         lengths: dict[int, float] = getattr(wif, f"{axis}_{key}")
         if lengths and getattr(yarns, key) is None:
-            if len(lengths) >= yarns.threads:
+            if len(lengths) >= threads:
                 setattr(yarns, key, next(iter(lengths.values())))
             else:
                 single = section_name(f"{axis}_{key}")
                 warnings.warn(f"{section} states no {key.title()}: {single} is not used.", stacklevel=1)
                 lengths.clear()
+    return WarpWeftData(threads, default, None, yarns.spacing, yarns.thickness, yarns.units)
 
 
-def _pattern(wif: _Wif, where: str) -> PatternData:
+def _pattern(wif: _Wif, yarns: dict[str, WarpWeftData], where: str) -> PatternData:
     """Return the sections as the data of dtx-to-wif."""
     sets: dict[str, Any] = {
         name: {thread: set(numbers) for thread, numbers in getattr(wif, name).items()}
@@ -252,7 +237,7 @@ def _pattern(wif: _Wif, where: str) -> PatternData:
     }
     lengths: dict[str, Any] = {
         f"{axis}_{kind}": getattr(wif, f"{axis}_{kind}")
-        for axis in ("warp", "weft")
+        for axis in yarns
         for kind in ("colors", "spacing", "thickness")
     }
     return PatternData(
@@ -264,13 +249,7 @@ def _pattern(wif: _Wif, where: str) -> PatternData:
         source_version=wif.wif.source_version or "?",
         num_shafts=wif.weaving.shafts or 0,
         num_treadles=wif.weaving.treadles or 0,
-        warp=_yarns_of(wif.warp),
-        weft=_yarns_of(wif.weft),
+        **yarns,
         **sets,
         **lengths,
     )
-
-
-def _yarns_of(yarns: _Yarns) -> WarpWeftData:
-    color = yarns.color[0] if yarns.color else None
-    return WarpWeftData(yarns.threads or 0, color, None, yarns.spacing, yarns.thickness, yarns.units)

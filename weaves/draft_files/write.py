@@ -26,12 +26,7 @@ def wif_text(fabric: Fabric) -> str:
 
     Ends that rise together are on one shaft, picks that lift the same shafts have one treadle; both are numbered as
     they appear. The file has as many ends and picks as the repeats of structure and colours fill. Spacing and thickness
-    are written if the fabric has `yarns_per_cm`.
-
-    Raises
-    ------
-    BadInput
-        If more than `MOST_THREADS` ends or picks would be needed.
+    are written if the fabric has `yarns_per_cm`. BadInput if more than `MOST_THREADS` ends or picks would be needed.
     """
     over = fabric.weave.warp_over
     threading, _ = numbered([line.tobytes() for line in over.T.copy()])
