@@ -22,18 +22,10 @@ from weaves.validation import read_toml, validated
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
-    """Find a scene.
+    """Find a scene that comes with the package by its name, or one of an XML or TOML file by its path.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name of a scene that comes with the package, or path of an XML or TOML file. An XML file's fabrics are presets
-        with the default number of yarns, and its camera stands still.
-
-    Raises
-    ------
-    BadInput
-        If there is none, or the TOML file does not describe one.
+    An XML file's fabrics are presets with the default number of yarns, and its camera stands still. BadInput if there
+    is no such scene, or the TOML file does not describe one.
     """
     if str(name_or_path) in SHIPPED:
         return SHIPPED[str(name_or_path)]
@@ -42,10 +34,13 @@ def load_scene(name_or_path: str | Path) -> Scene:
         table = read_toml(path)
         if isinstance(table.get("source"), str):
             table["source"] = path.parent / table["source"]
-        scene = _with_fabrics(validated(Scene, table, str(path)), path.parent)
+        scene = validated(Scene, table, str(path))
         if isinstance(scene.source, Path) and not scene.source.is_file():
             raise BadInput(str(path), "source", str(scene.source), "does not exist; a Mitsuba XML is needed")
-        return scene
+        # Files of fabrics lie beside it, wherever it is read from.
+        own = {key: cloth for key, cloth in scene.cloths.items() if cloth.fabric.endswith(".toml")}
+        own = {key: cloth.model_copy(update={"fabric": str(path.parent / cloth.fabric)}) for key, cloth in own.items()}
+        return scene.model_copy(update={"cloths": scene.cloths | own})
     if path.suffix == ".xml":
         if not path.is_file():
             raise BadInput("scene", "name", str(path), "does not exist; a Mitsuba XML is needed")
@@ -53,14 +48,3 @@ def load_scene(name_or_path: str | Path) -> Scene:
         return Scene(name=name, source=path)
     allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "
     raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED))
-
-
-def _with_fabrics(scene: Scene, folder: Path) -> Scene:
-    """Return a scene whose fabrics' files lie beside it, wherever it is read from."""
-    cloths = {
-        key: cloth.model_copy(update={"fabric": str(folder / cloth.fabric)})
-        if cloth.fabric.endswith(".toml")
-        else cloth
-        for key, cloth in scene.cloths.items()
-    }
-    return scene.model_copy(update={"cloths": cloths})

@@ -45,9 +45,7 @@ _AOVS: Final = {
     "shape_index": 1,
 }
 """AOVs rendered by Mitsuba, and the number of channels of each."""
-_AOVS_BESIDE: Final = {
-    name: _AOVS.get(name, 3) for name in ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
-}
+_AOVS_BESIDE: Final = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
 _LEAST_SIGMA = 1e-6
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
@@ -68,23 +66,10 @@ class SceneFrame(NamedTuple):
 def render(
     loaded: Loaded, frame: float = 0.0, size: tuple[int, int] | None = None, window: FilmWindow | None = None
 ) -> SceneFrame:
-    """Return what every pixel of a frame shows.
+    """Return what every pixel of a frame shows; frame 0 is the first.
 
-    Parameters
-    ----------
-    loaded : Loaded
-        The scene.
-    frame : float
-        Which one; 0 is the first.
-    size : (int, int), optional
-        Width and height in pixels; the film's unless given.
-    window : FilmWindow, optional
-        The part of it that is rendered, H by W pixels; all unless given.
-
-    Raises
-    ------
-    BadInput
-        If the camera is inside the cloth, or the cloth's uv coordinates are sheared beyond `largest_shear`.
+    `size` is width and height in pixels, the film's unless given; `window` the part that is rendered, H by W pixels.
+    BadInput if the camera is inside the cloth, or the cloth's uv coordinates are sheared beyond `largest_shear`.
     """
     camera = loaded.camera.at(loaded.scene, frame)
     size = size or camera.size
@@ -104,12 +89,7 @@ def render(
 
 
 def _gbuffer(
-    loaded: Loaded,
-    key: str,
-    cloth: Cloth,
-    camera: Camera,
-    mask: npt.NDArray[np.bool_],
-    aovs: dict[str, Floats],
+    loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: npt.NDArray[np.bool_], aovs: dict[str, Floats]
 ) -> GBuffer:
     """Return the G-buffer of one cloth, whose pixels are `mask`."""
     options = loaded.options
@@ -129,21 +109,9 @@ def _gbuffer(
     if options.curvature == "at_point" and front.any():
         seen = Places(*(column[front] for column in places))
         curvature[front] = curvature_of(loaded, seen, wo[front])
-    place, wi, irradiance = _lit(loaded, places)
-    return GBuffer(
-        mask,
-        pixel,
-        places.uv[:, 0],
-        places.uv[:, 1],
-        sigma[:, 0],
-        sigma[:, 1],
-        np.arctan2(axes[:, 1, 0], axes[:, 0, 0]),
-        curvature,
-        wo,
-        place,
-        wi,
-        irradiance,
-    )
+    (u, v), (sigma_major, sigma_minor) = places.uv.T, sigma.T
+    angle = np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
+    return GBuffer(mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *_lit(loaded, places))
 
 
 def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:

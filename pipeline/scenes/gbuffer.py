@@ -78,16 +78,9 @@ class GBuffer:
 
     def looks(self, repeat: tuple[int, int]) -> Queries:
         """Return one query a place, lit from the viewer: for transparency and opacity, which no light changes."""
-        wo = self.wo.astype(np.float32)
-        rest = (self.sigma_minor, self.angle, self.curvature)
-        return Queries(
-            reduced(self.u, repeat[0]),
-            reduced(self.v, repeat[1]),
-            self.sigma.astype(np.float32),
-            wo,
-            wo,
-            *(column.astype(np.float32) for column in rest),
-        )
+        u, v = reduced(self.u, repeat[0]), reduced(self.v, repeat[1])
+        columns = (self.sigma, self.wo, self.wo, self.sigma_minor, self.angle, self.curvature)
+        return Queries(u, v, *(column.astype(np.float32) for column in columns))
 
 
 def reduced(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,24 +34,16 @@ class FilmWindow(NamedTuple):
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole, or parallel rays; it looks along the third column of `to_world`.
-
-    Attributes
-    ----------
-    to_world : float64 (4, 4)
-        From the camera's axes, left, up and forward, to the world.
-    parallel : bool
-        Whether its rays are.
-    settings : dict
-        The rest, as Mitsuba reads it.
-    size : tuple of int
-        Width and height of its film in pixels.
-    """
+    """A pinhole, or parallel rays; it looks along the third column of `to_world`."""
 
     to_world: Floats
+    """From the camera's axes, left, up and forward, to the world, (4, 4)."""
     parallel: bool
+    """True if its rays are."""
     settings: dict[str, Any]
+    """The rest, as Mitsuba reads it."""
     size: tuple[int, int]
+    """Width and height of its film in pixels."""
 
     def at(self, scene: Scene, frame: float) -> Camera:
         """Return the camera of a frame."""
@@ -58,7 +51,7 @@ class Camera:
         moved = self.to_world.copy()
         axes = moved[:3, :3] / np.linalg.norm(moved[:3, :3], axis=0)
         moved[:3, 3] += axes @ [-right, up, forward]
-        return Camera(moved, self.parallel, self.settings, self.size)
+        return replace(self, to_world=moved)
 
     def to_viewer(self, position: Floats) -> Floats:
         """Return the unit vectors from positions to the viewer, (N, 3)."""
@@ -94,60 +87,47 @@ class Camera:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A scene in Mitsuba.
-
-    Attributes
-    ----------
-    scene, options : Scene, SceneOptions
-        What was loaded, and how it becomes queries.
-    mi, world, dressed, behind : Any
-        The module mitsuba, its scene, the scene's cloth alone, and the scene without its cloth.
-    cloths : dict
-        The cloth of each key, and its fabric.
-    worn : dict
-        For every key the numbers of the shapes that wear it (`pipeline.scenes.rays.shape_numbers`).
-    lights : list of Light
-        What shines.
-    camera : Camera
-        That of frame 0.
-    """
+    """A scene in Mitsuba."""
 
     scene: Scene
     options: SceneOptions
     mi: Any
+    """The module mitsuba."""
     world: Any
+    """Its scene."""
     dressed: Any
+    """The scene's cloth alone."""
     behind: Any
+    """The scene without its cloth."""
     cloths: dict[str, tuple[Cloth, Fabric]]
+    """The cloth of each key, and its fabric."""
     worn: dict[str, list[int]]
+    """For every key the numbers of the shapes that wear it (`pipeline.scenes.rays.shape_numbers`)."""
     lights: list[Light]
     camera: Camera
+    """That of frame 0."""
 
 
 def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
     """Load a scene.
 
-    Raises
-    ------
-    BadInput
-        If it is no Mitsuba scene, lacks a file, wears no fabric or an unknown one, has cloth without uv coordinates, a
-        light or camera of another kind, or no light or camera.
+    BadInput if it is no Mitsuba scene, lacks a file, wears no fabric or an unknown one, has cloth without uv
+    coordinates, a light or camera of another kind, or no light or camera.
     """
     options = options or SceneOptions()
-    mi, where = mitsuba(options.variant), _where(scene)
+    mi, where = mitsuba(options.variant), str(scene.source) if isinstance(scene.source, Path) else f"scene {scene.name}"
     world = _world(mi, scene, where)
     shapes = world.shapes()
     worn: dict[str, list[int]] = {}
-    wearing: dict[str, list[Any]] = {}
+    dressed: dict[str, list[Any]] = {}
     for number, shape in zip(shape_numbers(mi, shapes), shapes, strict=True):
         key = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if key.startswith(PREFIX):
             worn.setdefault(key.removeprefix(PREFIX), []).append(number)
-            wearing.setdefault(key, []).append(shape)
+            dressed.setdefault(key, []).append(shape)
             if shape.is_mesh() and not has_uv(mi, shape):
-                raise BadInput(
-                    where, "shape", shape.id() or shape.class_name(), "a shape that wears a fabric needs uv coordinates"
-                )
+                allowed = "a shape that wears a fabric needs uv coordinates"
+                raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
     if not worn:
         allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
         raise BadInput(where, "", "no fabric", allowed)
@@ -156,21 +136,11 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
             raise BadInput(where, f"cloths.{key}", key, f"no shape has the bsdf {PREFIX + key!r}; {nearest(key, worn)}")
     described = {key: scene.cloths.get(key, Cloth()) for key in worn}
     cloths = {key: (cloth, _fabric(where, key, cloth)) for key, cloth in described.items()}
-    dressed = [shape for shapes_of_cloth in wearing.values() for shape in shapes_of_cloth]
+    cloth = list(chain.from_iterable(dressed.values()))
     lights = lights_of(mi, world, where, options)
-    rest = [*(shape for shape in shapes if shape not in dressed), *world.emitters()]
-    return Loaded(
-        scene,
-        options,
-        mi,
-        world,
-        _scene_of(mi, dressed),
-        _scene_of(mi, rest),
-        cloths,
-        worn,
-        lights,
-        _camera(mi, world, where),
-    )
+    rest = [*(shape for shape in shapes if shape not in cloth), *world.emitters()]
+    parts = (_scene_of(mi, cloth), _scene_of(mi, rest))
+    return Loaded(scene, options, mi, world, *parts, cloths, worn, lights, _camera(mi, world, where))
 
 
 def _fabric(where: str, key: str, cloth: Cloth) -> Fabric:
@@ -182,9 +152,8 @@ def _fabric(where: str, key: str, cloth: Cloth) -> Fabric:
 
 def _scene_of(mi: Any, parts: list[Any]) -> Any:
     """Return the scene of some parts of another."""
-    return mi.load_dict(
-        {"type": "scene", **{f"part_{index}": part for index, part in enumerate(parts)}}, optimize=False
-    )
+    named = {f"part_{index}": part for index, part in enumerate(parts)}
+    return mi.load_dict({"type": "scene", **named}, optimize=False)
 
 
 def _world(mi: Any, scene: Scene, where: str) -> Any:
@@ -233,7 +202,3 @@ def _camera(mi: Any, world: Any, where: str) -> Camera:
 
 def _number(value: Any) -> float:
     return float(np.asarray(value).reshape(-1)[0])
-
-
-def _where(scene: Scene) -> str:
-    return str(scene.source) if isinstance(scene.source, Path) else f"scene {scene.name}"

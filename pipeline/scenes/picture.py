@@ -86,24 +86,16 @@ class TruthAnswers:
 
 
 class PicturePart(NamedTuple):
-    """A window of a picture, finished.
-
-    Attributes
-    ----------
-    window : FilmWindow
-        Which pixels.
-    planes : dict of float32 (H, W, C)
-        ``rgb``; with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share of a
-        pixel's rays that meet cloth, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
-        ``fabric``, the number of the cloth in the scene from 1 on.
-    queries, fallback : int
-        Queries, and those that the fallback answered.
-    """
+    """A window of a picture, finished."""
 
     window: FilmWindow
     planes: dict[str, Plane]
+    """``rgb`` (H, W, 3); with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share
+    of a pixel's rays that meet cloth, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
+    ``fabric``, the number of the cloth in the scene from 1 on."""
     queries: int
     fallback: int
+    """Queries that the fallback answered."""
 
 
 def sharpened(loaded: Loaded, side: int) -> Loaded:
@@ -135,37 +127,17 @@ def picture(
     layers: bool = False,
     seed: int = 0,
 ) -> Iterator[PicturePart]:
-    """Yield the windows of a frame.
+    """Yield the windows of a frame; frame 0 is the first, `size` width and height in pixels.
 
-    Parameters
-    ----------
-    loaded : Loaded
-        The scene.
-    answerer : PictureMethod
-        The method.
-    pool : Executor
-        Threads that answer queries.
-    size : (int, int)
-        Width and height in pixels.
-    frame : float
-        Which frame; 0 is the first.
-    side : int
-        Rays along each side of a pixel.
-    layers : bool
-        Whether components and what is seen are kept apart.
-    seed : int
-        Seed of methods that draw random numbers.
-
-    Raises
-    ------
-    BadInput
-        As `pipeline.scenes.frame.render`.
+    The threads of `pool` answer the queries. `side` is the number of rays along each side of a pixel, `seed` that of
+    methods that draw random numbers. With `layers`, components and what is seen are kept apart. Errors as
+    `pipeline.scenes.frame.render`.
     """
     fine, names = sharpened(loaded, side), (loaded.scene.name, frame, seed)
     under_way: deque[_UnderWay] = deque()
     for window in windows(size, side**2 * (len(loaded.lights) + 1)):
         traced = render(fine, frame, (side * size[0], side * size[1]), FilmWindow(*(side * edge for edge in window)))
-        under_way.append(_UnderWay(fine, answerer, pool, window, traced, (*names, *window)))
+        under_way.append(_UnderWay(fine, answerer, pool, window, traced, *names, *window))
         if len(under_way) == _AHEAD:
             yield under_way.popleft().part(side, layers)
     while under_way:
@@ -182,11 +154,11 @@ class _UnderWay:
         pool: Executor,
         window: FilmWindow,
         frame: SceneFrame,
-        names: Sequence[object],
+        *names: object,
     ) -> None:
-        self._loaded, self._answerer, self._pool, self._names = loaded, answerer, pool, names
-        self._window, self._frame = window, frame
-        queries = {key: gbuffer.queries(self._fabric(key).repeat) for key, gbuffer in frame.gbuffers.items()}
+        self._answerer, self._pool, self._window, self._frame, self._names = answerer, pool, window, frame, names
+        self._fabrics = {key: fabric for key, (_, fabric) in loaded.cloths.items()}
+        queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
 
@@ -212,11 +184,8 @@ class _UnderWay:
         planes["rgb"] = np.sum([planes["backdrop"], *(planes[name] for name in kept)], axis=0)
         if layers:
             planes |= {name: _middle(plane, side) for name, plane in _seen(frame).items()}
-        found = [int(np.isfinite(values[:, 4]).sum()) for values in answers.values()]
-        return PicturePart(self._window, planes, sum(map(len, answers.values())), sum(found))
-
-    def _fabric(self, key: str) -> Fabric:
-        return self._loaded.cloths[key][1]
+        fallback = sum(int(np.isfinite(values[:, 4]).sum()) for values in answers.values())
+        return PicturePart(self._window, planes, sum(map(len, answers.values())), fallback)
 
     def _transparency(self, key: str, known: Float32) -> Float32:
         """Return the transparency of each place, from any of its queries or a new one; 0 if all behind is dark."""
@@ -226,7 +195,7 @@ class _UnderWay:
         result[gbuffer.place[answered]] = known[answered]
         behind = self._frame.backdrop.reshape(-1, 3)[gbuffer.pixel].any(axis=1)
         rest = np.flatnonzero(np.isnan(result) & behind)
-        looks = gbuffer.looks(self._fabric(key).repeat).take(rest)
+        looks = gbuffer.looks(self._fabrics[key].repeat).take(rest)
         result[rest] = _gathered(self._ask(self._answerer.transparency, key, looks, "look"), (0,))
         return np.nan_to_num(result, nan=0.0)
 
@@ -237,7 +206,7 @@ class _UnderWay:
         asked = []
         for start in range(0, len(queries.u), CHUNK):
             seed = int(fingerprint([*self._names, key, kind, start]), 16)
-            asked.append(self._pool.submit(ask, self._fabric(key), queries.take(slice(start, start + CHUNK)), seed))
+            asked.append(self._pool.submit(ask, self._fabrics[key], queries.take(slice(start, start + CHUNK)), seed))
         return asked
 
 
@@ -249,16 +218,14 @@ def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float
 def _seen(frame: SceneFrame) -> dict[str, Plane]:
     """Return what each ray meets: depth, normal, and of cloth the place, the footprint and its number."""
     height, width = frame.backdrop.shape[:2]
-    planes = {name: np.zeros((height * width, channels), np.float32) for name, channels in _OF_CLOTH.items()}
+    channels = {"fabric": 1, "uv": 2, "sigma": 2}
+    planes = {name: np.zeros((height * width, count), np.float32) for name, count in channels.items()}
     for number, gbuffer in enumerate(frame.gbuffers.values(), start=1):
         planes["fabric"][gbuffer.mask.ravel()] = number
         planes["uv"][gbuffer.pixel] = np.stack([gbuffer.u, gbuffer.v], axis=-1)
         planes["sigma"][gbuffer.pixel] = np.stack([gbuffer.sigma, gbuffer.sigma_minor], axis=-1)
     shaped = {name: plane.reshape(height, width, -1) for name, plane in planes.items()}
     return shaped | {"depth": frame.depth[..., None].astype(np.float32), "normal": frame.normal.astype(np.float32)}
-
-
-_OF_CLOTH: Final = {"fabric": 1, "uv": 2, "sigma": 2}
 
 
 def _mean(plane: npt.NDArray[np.generic], side: int) -> Plane:

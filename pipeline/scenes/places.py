@@ -57,19 +57,15 @@ def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Floats]) 
     jacobian = np.stack([found["duv_dx"], found["duv_dy"]], axis=-1) * yarns[..., None]
     _refuse_shear(loaded, key, du, dv)
 
-    turn = _turn(cloth)
+    # From u, v in yarns to the coordinates along weft and warp.
+    cosine, sine = math.cos(math.radians(cloth.turn)), math.sin(math.radians(cloth.turn))
+    turn = np.array([[cosine, sine], [-sine, cosine]])
     x = unit(du - dot(du, normal)[:, None] * normal)
     y = np.cross(normal, x)
     across = np.einsum("ij,njk->nik", turn, np.stack([x, y], axis=1))
     frame = np.concatenate([across, normal[:, None]], axis=1)
     tangents = np.stack([du, dv], axis=-1) / cloth.yarns
     return Places(found["position"], outward, frame, (found["uv"] * yarns) @ turn.T, turn @ jacobian, tangents)
-
-
-def _turn(cloth: Cloth) -> Floats:
-    """Return the matrix from u, v in yarns to the coordinates along weft and warp."""
-    cosine, sine = math.cos(math.radians(cloth.turn)), math.sin(math.radians(cloth.turn))
-    return np.array([[cosine, sine], [-sine, cosine]])
 
 
 def tilted(wo: Floats, side: Floats, largest_angle: float) -> Floats:
@@ -106,13 +102,11 @@ def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
 
 def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:
     """Refuse cloth whose coordinates are sheared more than allowed."""
-    where = f"scene {loaded.scene.name}"
     cosine = np.abs(dot(unit(du), unit(dv)))
     shear = math.degrees(math.asin(min(float(cosine.max(initial=0.0)), 1.0)))
     if shear > loaded.options.largest_shear:
-        raise BadInput(
-            where, f"fabric_{key}", f"sheared by {shear:.1f} degrees", f"at most {loaded.options.largest_shear:g}"
-        )
+        allowed = f"at most {loaded.options.largest_shear:g}"
+        raise BadInput(f"scene {loaded.scene.name}", f"fabric_{key}", f"sheared by {shear:.1f} degrees", allowed)
 
 
 def dot(a: Floats, b: Floats) -> Floats:

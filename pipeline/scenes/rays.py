@@ -78,19 +78,9 @@ def _rays(mi: Any, origin: Floats, direction: Floats, distance: Floats) -> Any:
 
 
 def aovs_of(mi: Any, world: Any, sensor: Any, channels: Mapping[str, int]) -> dict[str, Floats]:
-    """Render AOVs with one ray a pixel.
+    """Render AOVs by name, each (H, W, its `channels`), with one ray a pixel, 0 where it hits nothing.
 
-    Parameters
-    ----------
-    mi, world, sensor : Any
-        The module mitsuba, a scene, and a camera whose filter is a box.
-    channels : dict
-        Which AOVs, and how many channels each has.
-
-    Returns
-    -------
-    dict of float64 (H, W, channels)
-        By name; 0 where a ray hits nothing.
+    The camera's filter is a box.
     """
     integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in channels)})
     planes = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)

@@ -65,24 +65,9 @@ class Requirement(Frozen):
     ) -> Requirement:
         """Return the requirements of queries.
 
-        Parameters
-        ----------
-        scene : str
-            Name of the scene.
-        frames : int
-            Frames of the queries.
-        by_fabric : mapping of Queries
-            All queries on each fabric, by its name.
-        edges, names : sequence
-            Edges of the classes of footprints, in yarn spacings, and the classes' names.
-        margin : float
-            Factor by which ranges of footprints and curvatures are widened at either end; angles by
-            that share of their distance to 90 degrees, at least 1 degree.
-
-        Raises
-        ------
-        BadInput
-            If there are no queries.
+        `edges` of the classes of footprints are in yarn spacings, `names` those of the classes. `margin` is the factor
+        by which ranges of footprints and curvatures are widened at either end; angles are by that share of their
+        distance to 90 degrees, at least 1 degree. BadInput if there are no queries.
         """
         counts = {name: len(queries.u) for name, queries in by_fabric.items() if len(queries.u)}
         total = sum(counts.values())

@@ -39,17 +39,7 @@ def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
 
 
 def shade(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.NDArray[np.float64]:
-    """Return the patch BSDF in linear RGB, (N, 3).
-
-    Parameters
-    ----------
-    fabric : Fabric
-        Whose colours are applied.
-    components : array_like (N, 4)
-        S_warp, S_weft, C_warp, C_weft with unit colour.
-    queries : Queries
-        Their N queries: footprints, and the sides of light and viewer.
-    """
+    """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries."""
     return coloured(components, colours_of(fabric, queries))
 
 
@@ -63,13 +53,11 @@ def compose(
     rgb: npt.ArrayLike,
     background: npt.ArrayLike = 0.0,
     transparency: npt.ArrayLike = 0.0,
-    coverage: npt.ArrayLike = 1.0,
 ) -> npt.NDArray[np.float32]:
     """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
 
-    A place shows coverage L + (1 - coverage + coverage transparency) background, L the sum of irradiance times f_P
-    over its lights. The background is `SceneFrame.backdrop`: cloth behind cloth is not seen, neither through gaps
-    nor past a silhouette.
+    A place shows L + transparency background, L the sum of irradiance times f_P over its lights. The background is
+    `SceneFrame.backdrop`: cloth behind cloth is not seen through gaps.
 
     Parameters
     ----------
@@ -81,18 +69,14 @@ def compose(
         What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
     transparency : array_like
         Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
-    coverage : array_like
-        Share of each place that the curved fabric hides (`pipeline.truth.geometry.opacity.opacity`), for cloth without
-        gaps: a number or (N,).
     """
     light = np.zeros((len(gbuffer.pixel), 3))
     np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))
     picture = np.empty((*gbuffer.mask.shape, 3))
     picture[:] = background
-    flat, hidden = picture.reshape(-1, 3), np.asarray(coverage)
-    seen = np.broadcast_to(1.0 - hidden + hidden * np.asarray(transparency), len(light))[:, None]
-    behind = flat[gbuffer.pixel] * seen
+    flat = picture.reshape(-1, 3)
+    behind = flat[gbuffer.pixel] * np.broadcast_to(transparency, len(light))[:, None]
     # Pixels of the fabric that no place speaks for are black.
     picture[gbuffer.mask] = 0.0
-    flat[gbuffer.pixel] = np.broadcast_to(hidden, len(light))[:, None] * light + behind
+    flat[gbuffer.pixel] = light + behind
     return picture.astype(np.float32)

@@ -183,18 +183,9 @@ def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
 
 
 def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
-    """Return the mesh of a grid of points, two triangles a cell.
+    """Return the mesh of a grid of points (R, C, 3), two triangles a cell, that wears the cloth of a key.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba.
-    cloth : str
-        Key of what it wears.
-    points, normals : float (R, C, 3)
-        Positions, and unit normals of the front.
-    uv : float (R, C, 2)
-        Lengths along the cloth: u along its weft, v along its warp.
+    `normals` (R, C, 3) are unit normals of the front, `uv` (R, C, 2) lengths along the weft and along the warp.
     """
     rows, columns = points.shape[:2]
     corner = np.arange(rows * columns).reshape(rows, columns)
@@ -202,14 +193,8 @@ def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> A
     faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
     settings = mi.Properties()
     settings["bsdf"] = mi.load_dict(wears(cloth))
-    mesh = mi.Mesh(
-        cloth,
-        vertex_count=rows * columns,
-        face_count=len(faces),
-        has_vertex_normals=True,
-        has_vertex_texcoords=True,
-        props=settings,
-    )
+    has = {"has_vertex_normals": True, "has_vertex_texcoords": True}
+    mesh = mi.Mesh(cloth, vertex_count=rows * columns, face_count=len(faces), props=settings, **has)
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = points.astype(np.float32).ravel()
     parameters["vertex_normals"] = normals.astype(np.float32).ravel()

@@ -41,8 +41,9 @@ def worn(scene: Scene) -> dict[str, str]:
 
     A dictionary's cloths are those that the scene describes; an XML file's also those whose BSDF ids it holds.
     """
-    found = dict.fromkeys(key.removeprefix(PREFIX) for key in _ids(scene) if key.startswith(PREFIX))
-    return {key: (scene.cloths[key].fabric if key in scene.cloths else "") or key for key in (*scene.cloths, *found)}
+    ids = [element.attributes.get("id", "") for element in elements(scene) if element.tag == "bsdf"]
+    keys = [*scene.cloths, *(name.removeprefix(PREFIX) for name in ids if name.startswith(PREFIX))]
+    return {key: (scene.cloths[key].fabric if key in scene.cloths else "") or key for key in keys}
 
 
 def files(scene: Scene) -> list[Path]:
@@ -57,11 +58,8 @@ def files(scene: Scene) -> list[Path]:
 def elements(scene: Scene) -> list[Element]:
     """Return the elements of a scene's XML and of the files that it includes; none of a scene that is no file.
 
-    Raises
-    ------
-    BadInput
-        If a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document
-        type or an element `path`, or names a file by a parameter or one that is no regular file.
+    BadInput if a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document
+    type or an element `path`, or names a file by a parameter or one that is no regular file.
     """
     if not isinstance(scene.source, Path):
         return []
@@ -122,7 +120,3 @@ def _refuse(element: Element, path: Path, home: Path) -> None:
         raise BadInput(where, "filename", name, "names of files and of properties are written out, without parameters")
     for place in {home, element.folder} if name else ():
         refuse_irregular(place / name, f"a file, which the scene {path.name} names,")
-
-
-def _ids(scene: Scene) -> list[str]:
-    return [element.attributes.get("id", "") for element in elements(scene) if element.tag == "bsdf"]

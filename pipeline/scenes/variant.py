@@ -62,12 +62,7 @@ def mitsuba(variant: Literal["auto", "scalar_rgb", "llvm_ad_rgb"] = "auto") -> A
 def instantiate(mi: Any, path: Path, where: str) -> Any:
     """Load a scene from a file of Mitsuba, without merging shapes or BSDFs that look alike to it.
 
-    Raises
-    ------
-    BadInput
-        If a type is no plugin of Mitsuba itself.
-    RuntimeError
-        As Mitsuba itself, if the file is no scene that loads.
+    BadInput if a type is no plugin of Mitsuba itself; Mitsuba's RuntimeError if the file is no scene that loads.
     """
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False

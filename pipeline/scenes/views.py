@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View, ViewOptions
+from pipeline.scenes.places import unit
 
 Floats = npt.NDArray[np.float64]
 
@@ -51,19 +52,7 @@ class _Surface(NamedTuple):
 
 
 def view(scene: View, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:
-    """Return what every pixel of a view shows.
-
-    Parameters
-    ----------
-    scene : str
-        ``sphere`` or ``plane``.
-    width, height : int
-        Size of the picture in pixels.
-    frame : float
-        Number of the frame: the cloth slides over the surface by ``frame * options.step`` pixels.
-    options : ViewOptions, optional
-        Camera, light and scale.
-    """
+    """Return what every pixel of a view shows; the cloth slides over the surface by ``frame * options.step`` pixels."""
     options = options or ViewOptions()
     return _SCENES[scene](width, height, frame * options.step, options)
 
@@ -89,7 +78,7 @@ def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuf
     along_y = np.stack([np.zeros_like(x), one, -0.5 * y], -1) - (0.5 * y)[:, None] * normal
     spacing = _SPHERE_PIXELS * (_SPHERE_DISTANCE - 1.0) / focal
     uv, weft, warp = _turned(np.stack([x, y], -1) / spacing, along_x, along_y, options.turn)
-    surface = _Surface(hit, distance, uv, np.stack([_unit(weft), _unit(warp), normal], axis=1), spacing * scale)
+    surface = _Surface(hit, distance, uv, np.stack([unit(weft), unit(warp), normal], axis=1), spacing * scale)
     light = _direction(options.sphere_light)
     return _gbuffer(surface, rays, focal, light, shift / _SPHERE_PIXELS, options)
 
@@ -99,14 +88,8 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
     focal = 0.5 * width / math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
     pitch = math.atan((0.5 - options.horizon) * height / focal)
     screen = _rays(width, height, focal)
-    rays = np.stack(
-        [
-            screen[..., 0],
-            math.cos(pitch) + screen[..., 1] * math.sin(pitch),
-            -math.sin(pitch) + screen[..., 1] * math.cos(pitch),
-        ],
-        axis=-1,
-    )
+    x, y, sine, cosine = screen[..., 0], screen[..., 1], math.sin(pitch), math.cos(pitch)
+    rays = np.stack([x, cosine + y * sine, -sine + y * cosine], axis=-1)
     # The height of the camera, in yarn spacings, gives a spacing the requested width in the bottom row.
     bottom = -rays[-1, 0, 2]
     camera = bottom * focal / options.plane_pixels_per_yarn
@@ -128,7 +111,7 @@ def _gbuffer(
     surface: _Surface, rays: Floats, focal: float, light: Floats, slide: float, options: ViewOptions
 ) -> GBuffer:
     """Bring directions and footprints into the local frames; `slide` in yarn spacings."""
-    wo = -_unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
+    wo = -unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
     wi = surface.frame @ light
     seen = wo[:, 2] >= math.cos(math.radians(options.largest_angle))
     above = seen & (wi[:, 2] > 0.0)
@@ -141,20 +124,9 @@ def _gbuffer(
     sigma = _footprint(surface, rays, focal, options)[above]
     flat, places = np.zeros_like(sigma), np.arange(len(sigma))
     irradiance = np.full((len(sigma), 3), options.irradiance)
-    return GBuffer(
-        mask,
-        np.flatnonzero(lit),
-        uv[above, 0],
-        uv[above, 1],
-        sigma,
-        sigma,
-        flat,
-        flat,
-        wo[above],
-        places,
-        wi[above],
-        irradiance,
-    )
+    u, v = uv[above].T
+    queries = places, wi[above], irradiance
+    return GBuffer(mask, np.flatnonzero(lit), u, v, sigma, sigma, flat, flat, wo[above], *queries)
 
 
 def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptions) -> Floats:
@@ -201,10 +173,6 @@ def _direction(angles: tuple[float, float]) -> Floats:
     """Return the unit vector at (angle from z, azimuth from x) in degrees."""
     polar, azimuth = (math.radians(angle) for angle in angles)
     return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 _SCENES: Final[dict[View, Callable[[int, int, float, ViewOptions], GBuffer]]] = {"sphere": _sphere, "plane": _plane}

@@ -130,7 +130,7 @@ def wif_pattern(text: str, where: str) -> PatternData:
         key = " ".join([section_name(str(section)), *(str(key) for key in keys[:1])])
         raise BadInput(where, key, first["input"], first["msg"]) from error
     _refuse_missing(wif, where)
-    yarns = {axis: _yarns_of(wif, axis, where) for axis in ("warp", "weft")}
+    yarns: dict[str, Any] = {axis: _yarns_of(wif, axis, where) for axis in ("warp", "weft")}
     # The reader takes the number of tied treadles for the last of them.
     wif.weaving.treadles = max([wif.weaving.treadles or 0, *wif.tieup])
     if not wif.liftplan and (most := max(max(used) for used in wif.treadling.values())) > wif.weaving.treadles:
@@ -229,7 +229,7 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
     return WarpWeftData(threads, default, None, yarns.spacing, yarns.thickness, yarns.units)
 
 
-def _pattern(wif: _Wif, yarns: dict[str, WarpWeftData], where: str) -> PatternData:
+def _pattern(wif: _Wif, yarns: dict[str, Any], where: str) -> PatternData:
     """Return the sections as the data of dtx-to-wif."""
     sets: dict[str, Any] = {
         name: {thread: set(numbers) for thread, numbers in getattr(wif, name).items()}

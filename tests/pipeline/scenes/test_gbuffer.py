@@ -35,8 +35,8 @@ def test_queries_repeat_their_places(gbuffer):
 def test_lights_add_up_over_what_is_seen_through(gbuffer):
     rgb = np.array([[0.1, 0.1, 0.1], [0.2, 0.4, 0.6], [0.01, 0.02, 0.03]])
     background = np.arange(18.0).reshape(2, 3, 3)
-    picture = compose(gbuffer, rgb, background, transparency=[0.0, 0.5, 0.25], coverage=[1.0, 0.5, 1.0])
+    picture = compose(gbuffer, rgb, background, transparency=[0.0, 0.5, 0.25])
     assert picture[0, 0] == pytest.approx([0.1 + 0.04, 0.2 + 0.08, 0.3 + 0.12])
-    assert picture[0, 2] == pytest.approx(0.5 * rgb[1] + 0.75 * background[0, 2])
+    assert picture[0, 2] == pytest.approx(rgb[1] + 0.5 * background[0, 2])
     assert picture[1, 1] == pytest.approx(0.25 * background[1, 1])
     assert picture[~gbuffer.mask] == pytest.approx(background[~gbuffer.mask])
