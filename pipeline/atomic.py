@@ -24,20 +24,8 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
     A process killed in between leaves only a ``.tmp-*`` file, which no reader looks at and the next writer replaces.
     For object storage the temporary file is one of this machine.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    durable : bool
-        False saves the two waits for the disk: the file is whole or missing after a kill, and may be empty after a
-        loss of power.
-
-    Raises
-    ------
-    BadInput
-        If the folder cannot be created or written.
-    WorkFailed
-        If the disk is full.
+    Not `durable`, it saves the two waits for the disk: the file is whole or missing after a kill, and may be empty
+    after a loss of power. BadInput if the folder cannot be created or written, WorkFailed if the disk is full.
     """
     if not storage.is_local(path):
         with tempfile.TemporaryDirectory(prefix="twillight-") as folder:

@@ -20,15 +20,9 @@ def canonical(specification: Any) -> bytes:
     """Return the canonical bytes of a JSON-able specification.
 
     Keys are sorted, floats use Python's shortest round-trip form, and an integral float equals the integer (TOML users
-    write 1 and 1.0 alike).
-
-    Raises
-    ------
-    ValueError
-        If a number is NaN or infinite.
+    write 1 and 1.0 alike). ValueError if a number is NaN or infinite.
     """
-    text = json.dumps(_plain(specification), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return text.encode()
+    return json.dumps(_plain(specification), sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
 def fingerprint(specification: Any, length: int = 16) -> str:

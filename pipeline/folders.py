@@ -35,19 +35,11 @@ Hashes = dict[str, set[str]]
 def own_files(folder: Path, listing: str) -> Iterator[Path]:
     """Yield an empty folder; on leaving without error its files take the place of those of an earlier run in `folder`.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder to write, made if need be. Files of others stay in it.
-    listing : str
-        Name of the listing. A JSON object of this name among the new files is completed, else it is made.
+    The folder is made if need be; files of others stay in it. A JSON object that is called as the listing among the new
+    files is completed, else it is made.
 
-    Raises
-    ------
-    BadInput
-        If a file of an earlier run was changed, a foreign one is in the way, or the folder cannot be written.
-    WorkFailed
-        If the disk is full, or another process writes the same files.
+    BadInput if a file of an earlier run was changed, a foreign one is in the way, or the folder cannot be written;
+    WorkFailed if the disk is full, or another process writes the same files.
     """
     with disk_errors(folder):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):

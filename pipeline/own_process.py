@@ -56,8 +56,6 @@ def in_own_process(
     ----------
     function : callable
         A function of a module, or a method; it, its arguments and its result can be pickled.
-    arguments
-        Its arguments.
     progress : callable
         Receives the finished share.
     look : callable

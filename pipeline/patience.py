@@ -66,19 +66,7 @@ def give_up() -> None:
 async def patiently(request: Callable[[], Awaitable[Answer]], kind_of: Callable[[Exception], Failure]) -> Answer:
     """Return the answer to a request; repeat it while it fails by an error that may pass.
 
-    Parameters
-    ----------
-    request : callable
-        Makes the request.
-    kind_of : callable
-        Returns the kind of an error.
-
-    Raises
-    ------
-    StorageFailed
-        If it fails for too long.
-    Exception
-        Any error that would come again.
+    StorageFailed if it fails for too long; an error that would come again is raised as it is.
     """
     begun, pause = time.monotonic(), _FIRST_PAUSE
     while True:

@@ -40,19 +40,10 @@ _LIBRARIES: Final = {"botocore", "aiobotocore", "aiohttp", "s3fs", "gcsfs", "adl
 
 
 def place(name: str, where: str = "--out") -> Path:
-    """Return the path of a folder or file by its name.
+    """Return the path of a folder or file: one of this machine, or an address ``protocol://...`` of fsspec.
 
-    Parameters
-    ----------
-    name : str
-        A path of this machine, or an address ``protocol://...`` of a file system of fsspec.
-    where : str
-        Option that it was given to, for messages.
-
-    Raises
-    ------
-    BadInput
-        If the protocol is unknown, its package is not installed, or the address has no bucket or has credentials in it.
+    BadInput, which names the option `where` it was given, if the protocol is unknown, its package is not installed, or
+    the address has no bucket or has credentials in it.
     """
     match = _ADDRESS.fullmatch(name)
     if match is None:
@@ -123,10 +114,7 @@ class Stored(NamedTuple):
 def listing(folder: Path) -> dict[str, Stored]:
     """Return all files below a folder of object storage, by path relative to it; S3 lists 1000 a request.
 
-    Raises
-    ------
-    FileNotFoundError
-        If the bucket does not exist.
+    FileNotFoundError if the bucket does not exist.
     """
     remote: Any = folder
     root = remote.path.rstrip("/") + "/"

@@ -29,13 +29,7 @@ Run = tuple[str, Annotated[StrictInt, Field(ge=1, le=MOST_THREADS)]]
 
 
 class ThreadColours(NamedTuple):
-    """Colours of the n threads after which a sequence repeats, linear sRGB, float64 (n, 3).
-
-    Attributes
-    ----------
-    specular, diffuse, diffuse_transmission : float64 (n, 3)
-        k_s, k_d and k_dt of each thread.
-    """
+    """Colours k_s, k_d and k_dt of the n threads after which a sequence repeats, linear sRGB, float64 (n, 3)."""
 
     specular: npt.NDArray[np.float64]
     diffuse: npt.NDArray[np.float64]

@@ -222,10 +222,8 @@ class Loom(Family):
         if not shafts or any(len(treadle) != shafts for treadle in self.tie_up):
             allowed = "one row per treadle is needed, all with one entry per shaft"
             raise BadInput("loom", "tie_up", self.tie_up, allowed)
-        for key, chosen, most in (
-            ("threading", self.threading, shafts),
-            ("treadling", self.treadling, len(self.tie_up)),
-        ):
+        for key, most in (("threading", shafts), ("treadling", len(self.tie_up))):
+            chosen = getattr(self, key)
             if not all(1 <= number <= most for number in chosen):
                 raise BadInput("loom", key, list(chosen), f"numbers from 1 to {most} are needed")
         lifted = np.array(self.tie_up, dtype=np.bool_)

@@ -161,13 +161,8 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
         low, high = np.sqrt(roughness).tolist()
         alpha = min(max(round(between((low, high)) ** 2, 6), roughness[0]), roughness[1])
         relief, width = between(ranges.relief), between(ranges.width)
-        return Yarn(
-            roughness=alpha,
-            relief=relief,
-            width=1.0 if solid else width,
-            bend=between(ranges.bend),
-            twist=twist,
-        )
+        shape = {"width": 1.0 if solid else width, "bend": between(ranges.bend), "twist": twist}
+        return Yarn(roughness=alpha, relief=relief, **shape)
 
     twist = between(ranges.twist)
     return Fabric(

@@ -148,14 +148,8 @@ def _torus(
 
     sin_p, cos_p = np.sin(np.radians(yarn.twist)), np.cos(np.radians(yarn.twist))
     normal = np.stack([sin_v, sin_u * cos_v, cos_u * cos_v], axis=-1)
-    tangent = np.stack(
-        [
-            -cos_v * sin_p,
-            cos_u * cos_p + sin_u * sin_v * sin_p,
-            -sin_u * cos_p + cos_u * sin_v * sin_p,
-        ],
-        axis=-1,
-    )
+    along_y, along_z = cos_u * cos_p + sin_u * sin_v * sin_p, -sin_u * cos_p + cos_u * sin_v * sin_p
+    tangent = np.stack([-cos_v * sin_p, along_y, along_z], axis=-1)
     beta = yarn.relief
     return beta * height, _unit(normal * (beta, beta, 1.0)), _unit(tangent * (1.0, 1.0, beta))
 

@@ -63,11 +63,4 @@ class Yarn(Frozen):
 
     def optics(self) -> dict[str, float]:
         """Return the numbers that shape the four components: all but the colours."""
-        return {
-            "width": self.width,
-            "bend": self.bend,
-            "twist": self.twist,
-            "roughness": self.roughness,
-            "relief": self.relief,
-            "blend": self.blend,
-        }
+        return {name: getattr(self, name) for name in ("width", "bend", "twist", "roughness", "relief", "blend")}

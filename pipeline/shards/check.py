@@ -30,17 +30,7 @@ def check_shard(folder: Path, entry: ShardEntry, manifest: Manifest) -> list[str
 
 
 def check_values(path: Path, entry: ShardEntry, repeat: tuple[int, int]) -> list[str]:
-    """Return every fault of a shard's rows as a sentence: schema, number, ranges.
-
-    Parameters
-    ----------
-    path : Path
-        The shard.
-    entry : ShardEntry
-        Its entry in the manifest.
-    repeat : (int, int)
-        Ends and picks of its fabric's repeat.
-    """
+    """Return every fault of a shard's rows as a sentence: schema, number, ranges; `repeat` is its fabric's."""
     faults = []
     try:
         table = read_table(path, entry.kind)
@@ -53,8 +43,7 @@ def check_values(path: Path, entry: ShardEntry, repeat: tuple[int, int]) -> list
 
     # Values: finite, within their ranges, directions of unit length.
     column = {name: table.column(name).to_numpy() for name in SCHEMAS[entry.kind].names[1:]}
-    ends, picks = repeat
-    ranges = {"u": (0.0, float(ends)), "v": (0.0, float(picks)), "wo_z": (-1.0, 1.0), "count": (1, np.inf)}
+    ranges = {"u": (0.0, float(repeat[0])), "v": (0.0, float(repeat[1])), "count": (1, np.inf)}
     ranges |= {"angle": (-np.inf, np.inf), "curvature": (0.0, STEEPEST_CURVATURE)}
     ranges |= {TRANSPARENCY: (0.0, 1.0), "opacity": (0.0, 1.0)}
     positive = ("sigma", "sigma_minor", "opacity_standard_error", "grazing_mean", "grazing_variance")

@@ -48,27 +48,18 @@ CHUNK: Final = 2048
 
 
 class Answerer(NamedTuple):
-    """A source of answers about a fabric: the ground truth, or a method.
-
-    Attributes
-    ----------
-    answer : callable
-        Takes queries and the place of the first in the file, returns answers. BadInput if it cannot.
-    about : dict
-        What the result's metadata says of it.
-    faults : callable
-        Faults of queries that it cannot answer.
-    prepare : callable
-        Takes the queries of a block before threads begin with them.
-    errors : bool
-        Whether it states errors; else their columns are null.
-    """
+    """A source of answers about a fabric: the ground truth, or a method."""
 
     answer: Callable[[Queries, int], Answers]
+    """Takes queries and the place of the first in the file. BadInput if it cannot answer."""
     about: dict[str, Any]
+    """What the result's metadata says of it."""
     faults: Faults = faults
+    """Faults of queries that it cannot answer."""
     prepare: Callable[[Queries], None] = lambda queries: None
+    """Takes the queries of a block before threads begin with them."""
     errors: bool = False
+    """True if it states errors; else their columns are null."""
 
 
 def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer:
@@ -97,14 +88,7 @@ def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer
 class Summary:
     """Statistics of the results, collected row by row in constant memory.
 
-    Attributes
-    ----------
-    rows, bad : int
-        Rows of the file, and how many of them have no answer.
-    points : int
-        Points evaluated.
-    seconds : float
-        Time that the answers took, on all threads together.
+    `rows` of the file, `bad` ones among them; `points` that were evaluated in `seconds`, on all threads together.
     """
 
     _EDGES = np.linspace(-8.0, 2.0, 5001)  # of log10: a median to 0.25 %
@@ -145,20 +129,14 @@ def evaluate_file(
 
     Parameters
     ----------
-    fabric : Fabric
-        The cloth.
     queries : Path
         A file with `QUERY_COLUMNS` as float32 or float64, less any of `OPTIONAL`; other columns are carried along.
     out : Path
         The result: all columns of the file and the answers, named as in a shard.
-    answerer : Answerer
-        What answers them.
     skip_bad : bool
         Leave the answers of bad rows null and list these in ``out`` with the suffix ``.bad.csv``.
     chunk : int
         Rows that a thread answers at a time.
-    threads : int
-        Threads that answer; kernels run without the interpreter's lock.
     progress : callable
         Receives the finished share.
 
@@ -184,7 +162,9 @@ def evaluate_file(
             "queries_sha256": file_sha256(queries),
             "left_out": {name: value for name, value in OPTIONAL.items() if name not in carried.names},
         }
-        schema = _schema(carried, about, skip_bad or not answerer.errors)
+        fields = [field.with_nullable(skip_bad or not answerer.errors) for field in ANSWERS]
+        facts = {FACTS: json.dumps(about, sort_keys=True).encode()}
+        schema = pa.schema([*carried, *fields]).with_metadata((carried.metadata or {}) | facts)
         result = stack.enter_context(atomic_path(out))
         encoded = [field.name for field in schema if field.type not in (pa.float32(), pa.float64())]
         writer = stack.enter_context(parquet_writer(result, schema, encoded))
@@ -244,12 +224,6 @@ def _answers(
         progress(summary.rows)
     summary.seconds += time.perf_counter() - begun
     return whole
-
-
-def _schema(carried: pa.Schema, about: dict[str, Any], nullable: bool) -> pa.Schema:
-    answers = [field.with_nullable(nullable) for field in ANSWERS]
-    facts = {FACTS: json.dumps(about, sort_keys=True).encode()}
-    return pa.schema([*carried, *answers]).with_metadata((carried.metadata or {}) | facts)
 
 
 def _arrays(batch: Queries, answers: Answers, good: npt.NDArray[np.bool_], errors: bool) -> list[pa.Array]:

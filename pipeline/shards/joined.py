@@ -31,21 +31,10 @@ def columns_joined() -> list[tuple[str, str, str]]:
 
 
 def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> None:
-    """Write the rows of shards, in their order, to one file, whole or not at all.
+    """Write the rows of shards of kind `components`, at least one, to one file in their order, whole or not at all.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    shards : sequence of Path
-        Shards of kind `components`, at least one.
-    about : dict
-        JSON-able facts of the file. A file that is there and has these facts, and no damaged page, is kept.
-
-    Raises
-    ------
-    BadInput
-        If a shard is missing or damaged.
+    A file that is there, with the same JSON-able facts `about` it and no damaged page, is kept. BadInput if a shard is
+    missing or damaged.
     """
     facts = json.dumps(about, sort_keys=True).encode()
     if _is_whole(path, facts):
@@ -59,10 +48,7 @@ def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> No
 def read_fabric(path: Path, fabric: str) -> dict[str, npt.NDArray[Any]]:
     """Return a fabric's rows of a joined file by column, the fabric left out, with their checksums verified.
 
-    Raises
-    ------
-    BadInput
-        If the file is missing or damaged, or has other columns.
+    BadInput if the file is missing or damaged, or has other columns.
     """
     refuse_irregular(path, "a file of rows")
     missing = "does not exist", "get the whole data set"

@@ -20,25 +20,14 @@ _OF_PUBLISHED: Final = "croissant.json"
 
 
 class RowPiece(NamedTuple):
-    """Rows of one fabric and split in one file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    fabric, split : str
-        Name of the fabric, and split of the rows.
-    rows : int
-        Number of rows.
-    joined : bool
-        True if the file may have rows of other fabrics too.
-    """
+    """Rows of one fabric and split in one file."""
 
     path: Path
     fabric: str
     split: str
     rows: int
     joined: bool
+    """True if the file may have rows of other fabrics too."""
 
     def read(self) -> dict[str, npt.NDArray[Any]]:
         """Return the rows by column, the fabric left out; BadInput if the file is missing or damaged."""
@@ -51,24 +40,14 @@ class RowPiece(NamedTuple):
 
 
 class DatasetRows(NamedTuple):
-    """Fabrics and pieces of a data set.
-
-    Attributes
-    ----------
-    folder : Path
-        Its folder.
-    fabrics : dict of str to Fabric
-        Every fabric.
-    roles : dict of str to list of str
-        Names of the fabrics in each role.
-    pieces : list of RowPiece
-        All rows that every model may read, in their order.
-    """
+    """Fabrics and pieces of a data set in a folder."""
 
     folder: Path
     fabrics: dict[str, Fabric]
     roles: dict[Role, list[str]]
+    """Names of the fabrics in each role."""
     pieces: list[RowPiece]
+    """All rows that every model may read, in their order."""
 
     @classmethod
     def load(cls, folder: Path) -> DatasetRows:
@@ -80,19 +59,9 @@ class DatasetRows(NamedTuple):
         return cls(folder, dict(manifest.fabrics), dict(manifest.roles), list(_shards(manifest, folder)))
 
     def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[RowPiece]:
-        """Return the pieces of a split, fabric after fabric.
+        """Return the pieces of a split, train, validation or test, of some fabrics or all that have it, one by one.
 
-        Parameters
-        ----------
-        split : str
-            train, validation or test.
-        fabrics : sequence of str, optional
-            Names; all that have this split if left out.
-
-        Raises
-        ------
-        BadInput
-            If a split or fabric does not exist, or has no rows.
+        BadInput if a split or fabric does not exist, or has no rows.
         """
         if split not in SPLITS:
             raise BadInput(str(self.folder), "split", split, nearest(split, SPLITS))

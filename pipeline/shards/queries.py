@@ -63,18 +63,9 @@ class QueryOptions(Frozen):
 
 
 def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, start: int, count: int) -> Queries:
-    """Return rows `start` to `start + count` of the stream `seed`.
+    """Return rows `start` to `start + count` of the stream `seed`, 0 <= seed < 2^64.
 
-    Parameters
-    ----------
-    options : QueryOptions
-        The distribution.
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings; centres are uniform in it.
-    seed : int
-        Name of the stream, 0 <= seed < 2^64.
-    start, count : int
-        Rows wanted.
+    Centres are uniform in the fabric's `repeat`, its extent in x and y in yarn spacings.
     """
     draws = uniform_draws(seed, start, count)
     low, high = (math.log(bound) for bound in options.sigma)

@@ -44,13 +44,7 @@ def _readable(path: Path) -> AbstractContextManager[None]:
 
 @contextmanager
 def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
-    """Open a Parquet file whose pages are verified as they are read.
-
-    Raises
-    ------
-    BadInput
-        If it is missing, cut short, or no such file.
-    """
+    """Open a Parquet file whose pages are verified as they are read; BadInput if it is missing, cut short, or none."""
     refuse_irregular(path, "a Parquet file")
     with ExitStack() as stack:
         with _readable(path):
@@ -122,10 +116,7 @@ def checked_queries(
     single: dict[str, npt.NDArray[np.float32]] = {}
     for name in QUERY_COLUMNS:
         default = OPTIONAL.get(name, 0.0)
-        if name not in given:
-            column = single["sigma"] if default == "sigma" else np.full(len(block), default)
-        else:
-            column = given[name]
+        column = given.get(name, single["sigma"] if default == "sigma" else np.full(len(block), default))
         with np.errstate(over="ignore", under="ignore"):
             single[name] = column.astype(np.float32)
         if name in ("u", "v"):

@@ -45,18 +45,9 @@ Columns = Mapping[str, npt.NDArray[Any]]
 
 
 def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: dict[str, Any]) -> None:
-    """Write one shard, whole.
+    """Write one shard, whole: all columns of its kind but `fabric`, whose name every row has.
 
-    Parameters
-    ----------
-    path, kind : Path, Kind
-        The file, and the kind of its rows.
-    fabric : str
-        Name of the fabric of every row.
-    columns : mapping
-        All columns of the kind but `fabric`, N values each.
-    about : dict
-        JSON-able facts of the file: the task that made it, options, versions.
+    `about` has JSON-able facts of the file: the task that made it, options, versions.
     """
     schema = SCHEMAS[kind]
     rows = len(next(iter(columns.values())))
@@ -111,10 +102,7 @@ def readable(path: Path, missing: tuple[str, str], broken: str) -> Iterator[None
 def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ()) -> pa.Table:
     """Read a shard of a kind, or only some of its columns by their `names`, with checksums verified.
 
-    Raises
-    ------
-    BadInput
-        If the file is missing, cut short, damaged, or not a shard of this kind and schema.
+    BadInput if the file is missing, cut short, damaged, or not a shard of this kind and schema.
     """
     schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
