@@ -53,7 +53,7 @@ class Answerer(NamedTuple):
     answer: Callable[[Queries, int], Answers]
     """Takes queries and the place of the first in the file. BadInput if it cannot answer."""
     about: dict[str, Any]
-    """What the result's metadata says of it."""
+    """Facts of it for the result's metadata."""
     faults: Faults = faults
     """Faults of queries that it cannot answer."""
     prepare: Callable[[Queries], None] = lambda queries: None
