@@ -6,7 +6,10 @@ The slope of the horizon is the greatest (h(s) - z) / s over everything that a r
 
 from __future__ import annotations
 
+import hashlib
 import math
+from threading import Lock
+from typing import Final
 
 import numpy as np
 
@@ -41,6 +44,11 @@ _NEAREST = 1e-6
 _FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are treated as equal
 _STEEPEST = 1e4
 _FARTHEST = 1e4  # yarn spacings
+
+# Tables of every level and kind need the same horizons, which take most of their time; 3 to 5 MB each.
+_KEPT: Final = 32
+_LAST: Final[dict[bytes, Float32]] = {}
+_KEEPING: Final = Lock()
 
 
 @kernel
@@ -156,15 +164,30 @@ def horizon(
     return best
 
 
-@allocating_kernel
 def horizons(
     field: HeightField, x: Float64, y: Float64, azimuths: int, own_plane: bool, curvature: float = 0.0
 ) -> Float32:
     """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
 
     Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. The base has the `curvature` in
-    all azimuths. Shape (azimuths, points).
+    all azimuths. Shape (azimuths, points). The last `_KEPT` results are kept and shared: nobody may write to them.
     """
+    arrays = (field.top, field.floats, field.crown, field.yarn, x, y)
+    scalars = (*(part.shape for part in arrays), field.highest, field.lowest, azimuths, own_plane, curvature)
+    asked = hashlib.sha256(b"".join(part.tobytes() for part in arrays) + repr(scalars).encode()).digest()
+    slopes = _LAST.get(asked)
+    if slopes is None:
+        slopes = _horizons(field, x, y, azimuths, own_plane, curvature)
+        with _KEEPING:
+            _LAST[asked] = slopes
+            while len(_LAST) > _KEPT:
+                _LAST.pop(next(iter(_LAST)))
+    return slopes
+
+
+@allocating_kernel
+def _horizons(field: HeightField, x: Float64, y: Float64, azimuths: int, own_plane: bool, curvature: float) -> Float32:
+    """Compute `horizons`."""
     slopes = np.zeros((azimuths, len(x)), np.float32)
     for k in range(len(x)):
         family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
