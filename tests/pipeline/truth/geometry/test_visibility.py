@@ -18,12 +18,15 @@ STEP = 0.004
 def _marched(fabric, x, y, z, w):
     """Say for each point whether a march in steps of STEP leaves the cloth; all points share the direction w."""
     ends, picks = fabric.weave.repeat
-    flat = math.hypot(w[0], w[1])
-    free = np.ones(len(x), bool)
-    for k in range(1, int(1.2 / (w[2] / flat) / STEP) + 1):
-        s = k * STEP
-        point = oracle(fabric, (x + s * w[0] / flat) % ends, (y + s * w[1] / flat) % picks)
-        free &= ~((point.yarn != GAP) & (point.height > z + s * w[2] / flat + 1e-9))
+    dx, dy, rise = np.array(w) / math.hypot(w[0], w[1])
+    highest, free, left, s = height_field(fabric).highest, np.ones(len(x), bool), np.arange(len(x)), 0.0
+    while left.size:
+        s += STEP
+        point = oracle(fabric, (x[left] + s * dx) % ends, (y[left] + s * dy) % picks)
+        altitude = z[left] + s * rise
+        hidden = (point.yarn != GAP) & (point.height > altitude + 1e-9)
+        free[left[hidden]] = False
+        left = left[~hidden & (altitude < highest)]
     return free
 
 
