@@ -94,7 +94,7 @@ def _brute(fabric, wi, wo, curvature, x, y):
 def test_curved_estimates_match_brute_force(name, curvature, light, viewer):
     fabric, wi, wo = load_fabric(name), _direction(*light), _direction(*viewer)
     # One random point in each stratum of a grid over the repeat.
-    strata = 96
+    strata = 72
     at = np.stack(np.meshgrid(np.arange(strata), np.arange(strata)), -1).reshape(-1, 2)
     x, y = ((at + np.random.default_rng(5).random(at.shape)) * fabric.weave.repeat / strata).T
     shares, yarn, front, behind = _brute(fabric, wi, wo, curvature, x, y)

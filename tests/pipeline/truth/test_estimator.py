@@ -64,8 +64,8 @@ def _patch_by_oracle(fabric, wi, wo, texels):
     def seen(w):
         free = point.normal @ w > 0
         flat, step = math.hypot(w[0], w[1]), 0.006
-        for k in range(1, int(1.0 / (w[2] / flat) / step)):
-            s = k * step
+        rise = np.ptp(point.height)
+        for s in np.arange(step, rise / (w[2] / flat) + step, step):
             height = oracle(fabric, (x + s * w[0] / flat) % ends, (y + s * w[1] / flat) % picks).height
             free &= height <= point.height + s * w[2] / flat
         return free
