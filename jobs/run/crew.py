@@ -20,7 +20,7 @@ from jobs.plan.task import Task
 from jobs.run.compiling import KernelGroup
 from jobs.run.outcome import Outcome, work
 from jobs.run.receipt import Product
-from jobs.run.software import difference, software
+from jobs.run.software import software
 from pipeline import patience
 from pipeline.storage import place
 from weaves.errors import WorkFailed
@@ -209,7 +209,7 @@ class Crew:
         for address, there in self._client.run(software, workers=new, on_error="return").items():
             if isinstance(there, OSError):
                 continue  # it is gone, or the next look queries it again
-            self._checked[address] = difference(there)
+            self._checked[address] = _difference(there)
             if self._checked[address]:
                 self._hear({"sentence": self._refusal(address)})
         if self._threads and all(self._checked.get(address) for address in self._threads):
@@ -217,6 +217,16 @@ class Crew:
 
     def _refusal(self, address: str) -> str:
         return f"worker {address} gets no task: {self._checked[address]}; install the same version there"
+
+
+def _difference(there: Mapping[str, str] | BaseException) -> str:
+    """Return how a worker's software differs from this process's, in words; empty if it does not."""
+    if isinstance(there, BaseException):
+        return f"it has no twillight of this version ({type(there).__name__})"
+    here = software()
+    other = [name for name in here if there.get(name) != here[name]]
+    words = [f"{name} {there.get(name, 'missing')} (here {here[name]})" for name in other]
+    return f"it has {', '.join(words)}" if words else ""
 
 
 def _compile(group: KernelGroup, topic: str) -> None:

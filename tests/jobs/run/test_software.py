@@ -1,22 +1,36 @@
+from types import SimpleNamespace
+
 import pytest
 
-from jobs.run.software import difference, software
+from jobs.run.crew import Crew
+from jobs.run.software import software
+from weaves.errors import WorkFailed
 
 
-def test_equal_software_has_no_difference():
-    assert difference(dict(software())) == ""
+def crew(there):
+    """Return the crew of a scheduler whose one worker answers a query of its software so."""
+    client = SimpleNamespace(
+        subscribe_topic=lambda *given: None,
+        nthreads=lambda: {"tcp://a": 1},
+        run=lambda function, workers, on_error: dict.fromkeys(workers, there),
+    )
+    return Crew(client, True, lambda message: None)
+
+
+def test_a_worker_of_equal_software_is_accepted():
+    assert crew(dict(software())).accepted == ["tcp://a"]
+    assert "+" not in "".join(software().values())  # builds for other devices are one version
 
 
 @pytest.mark.parametrize("name", list(software()))
 def test_each_difference_is_named_with_both_versions(name):
-    other = software() | {name: "0.1"}
-    assert difference(other) == f"it has {name} 0.1 (here {software()[name]})"
+    with pytest.raises(WorkFailed) as refused:
+        crew(software() | {name: "0.1"})
+    assert f"tcp://a gets no task: it has {name} 0.1 (here {software()[name]}); install" in str(refused.value)
 
 
 def test_what_a_worker_cannot_say_is_named():
-    assert difference({}).count("missing") == len(software())
-    assert difference(ModuleNotFoundError("jobs")) == "it has no twillight of this version (ModuleNotFoundError)"
-
-
-def test_builds_of_a_library_for_other_devices_are_one_version():
-    assert "+" not in "".join(software().values())
+    with pytest.raises(WorkFailed, match=rf"(missing.*){{{len(software())}}}"):
+        crew({})
+    with pytest.raises(WorkFailed, match=r"it has no twillight of this version \(ModuleNotFoundError\)"):
+        crew(ModuleNotFoundError("jobs"))
