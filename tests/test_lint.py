@@ -54,17 +54,20 @@ def test_names_in_docstrings_and_comments_exist(text, wrong):
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong"), [("teacher_of", 1), ("knobs", 1), ("stand_in", 1), ("errors", 0), ("_placed", 1)]
+    ("check", "text", "wrong"),
+    [
+        (words.wrong_names, "teacher_of", 1),
+        (words.wrong_names, "knobs", 1),
+        (words.wrong_names, "stand_in", 1),
+        (words.wrong_names, "_placed", 1),
+        (words.wrong_names, "errors", 0),
+        (words.wrong_prose, "Queries that it was not taught.", 1),
+        (words.wrong_prose, "The column `asked`.", 0),
+        (words.wrong_prose, "A task is given.", 0),
+    ],
 )
-def test_names_use_the_terms_of_the_field(name, wrong):
-    assert len(list(words.wrong_names(name))) == wrong
-
-
-@pytest.mark.parametrize(
-    ("text", "wrong"), [("Queries that it was not taught.", 1), ("The column `asked`.", 0), ("A task is given.", 0)]
-)
-def test_prose_uses_the_terms_of_the_field(text, wrong):
-    assert len(list(words.wrong_prose(text))) == wrong
+def test_names_and_prose_use_the_terms_of_the_field(check, text, wrong):
+    assert len(list(check(text))) == wrong
 
 
 def test_lines_of_code_are_counted_without_imports_docstrings_and_comments():

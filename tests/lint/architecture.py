@@ -10,67 +10,31 @@ from tests.lint.tree import DOORS, GRAPH, MODULES, PACKAGES, ROOT, TESTS, Source
 
 # Imports point to the left (upwards in this list) only.
 ORDER = [
-    "weaves",
-    "pipeline",  # fingerprint, atomic, folders
-    "pipeline.compiled",
-    "pipeline.truth",
-    "pipeline.analytic",
-    "pipeline.materials",
-    "pipeline.shards",
-    "pipeline.scenes",
-    "pipeline.models",
-    "pipeline.shader",
-    "pipeline.mitsuba",
-    "pipeline.training",
-    "reports",  # record, options
-    "reports.images",
-    "reports.viewer",
-    "reports.exports",
-    "reports.measure",
-    "reports.truth",
-    "reports.tables",
-    "reports.page",
-    "jobs",
-    "jobs.recipe",
-    "jobs.plan",
-    "jobs.run",
-    "jobs.verbs",
-    "jobs.cli",
-    "jobs.entry",
-]
+    "weaves", "pipeline", "pipeline.compiled", "pipeline.truth", "pipeline.analytic", "pipeline.materials",
+    "pipeline.shards", "pipeline.scenes", "pipeline.models", "pipeline.shader", "pipeline.mitsuba", "pipeline.training",
+    "reports", "reports.images", "reports.viewer", "reports.exports", "reports.measure", "reports.truth",
+    "reports.tables", "reports.page",
+    "jobs", "jobs.recipe", "jobs.plan", "jobs.run", "jobs.verbs", "jobs.cli", "jobs.entry",
+]  # fmt: skip
 
-HOMES = {
-    "numba": ["pipeline.compiled"],
-    "pyarrow": ["pipeline.shards"],
-    "torch": ["pipeline.models", "pipeline.training"],
-    "onnx": ["pipeline.models"],
-    "onnxruntime": ["pipeline.models"],
-    "safetensors": ["pipeline.models", "pipeline.training"],
-    "colour": ["weaves"],
-    "dtx_to_wif": ["weaves"],
-    "pandas": ["reports"],
-    "matplotlib": ["reports"],
-    "jinja2": ["reports"],
-    "OpenEXR": ["reports"],
-    "av": ["reports.images"],
-    "PIL": ["pipeline.shader", "reports.images"],
-    "skimage": ["reports"],
-    "flip_evaluator": ["reports"],
-    "pyfvvdp": ["reports"],
-    "distributed": ["jobs"],
-    "upath": ["pipeline.storage"],
-    "fsspec": ["pipeline.storage"],
-    "s3fs": ["pipeline.storage"],
-    "dask": ["jobs"],
-    "cyclopts": ["jobs"],
-    "rich": ["jobs"],
-    "trimesh": ["reports.exports"],
-    "MaterialX": ["reports.exports"],
-    "pygltflib": ["reports.exports"],
-    "mitsuba": ["pipeline.scenes", "pipeline.mitsuba"],
-    "drjit": ["pipeline.scenes", "pipeline.mitsuba"],
+LIBRARIES = {
+    "weaves": ["colour", "dtx_to_wif"],
+    "pipeline.compiled": ["numba"],
+    "pipeline.shards": ["pyarrow"],
+    "pipeline.storage": ["upath", "fsspec", "s3fs"],
+    "pipeline.scenes": ["mitsuba", "drjit"],
+    "pipeline.mitsuba": ["mitsuba", "drjit"],
+    "pipeline.models": ["torch", "onnx", "onnxruntime", "safetensors"],
+    "pipeline.training": ["torch", "safetensors"],
+    "pipeline.shader": ["PIL"],
+    "reports": ["pandas", "matplotlib", "jinja2", "OpenEXR", "skimage", "flip_evaluator", "pyfvvdp"],
+    "reports.images": ["av", "PIL"],
+    "reports.exports": ["trimesh", "MaterialX", "pygltflib"],
+    "jobs": ["distributed", "dask", "cyclopts", "rich"],
 }
-"""Heavy libraries and the packages that may import them."""
+"""Packages, and the heavy libraries that no others may import."""
+
+HOMES = {name: [home for home, own in LIBRARIES.items() if name in own] for own in LIBRARIES.values() for name in own}
 
 OUTSIDE_TRUTH = {"pipeline.truth.conventions"}
 """Modules of the truth's room that only explain."""

@@ -108,20 +108,6 @@ def test_normal_is_the_gradient_of_the_height(fabric):
         assert seen.under[inside].any()
 
 
-@pytest.mark.parametrize("name", ["gaps", "satin", "closed"])
-def test_height_is_continuous_along_a_float(name):
-    """Cross every border between cells that one float spans: the height jumps by no more than its slope allows."""
-    fabric = CLOTHS[name]
-    over = fabric.weave.warp_over
-    crossed = np.argwhere(over & np.roll(over, -1, axis=0))
-    assert len(crossed)
-    for pick, end in crossed:
-        x = end + 0.5 + np.linspace(-0.45, 0.45, 9) * fabric.warp.width
-        below, above = surface_at(fabric, x, pick + 1 - 1e-9), surface_at(fabric, x, pick + 1 + 1e-9)
-        assert np.allclose(below.height, above.height, atol=1e-8)
-        assert np.allclose(below.normal, above.normal, atol=1e-7)
-
-
 def test_yarn_beneath_is_smooth_and_ends_with_the_bend():
     """Along the axis of a weft beneath narrow warps: no kink where the arc ends, inclination never above u_max."""
     fabric = CLOTHS["steep beneath"]

@@ -8,7 +8,7 @@ from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.to_fabric import fabric_of
 from weaves.errors import BadInput
-from weaves.fabric import load_fabric
+from weaves.fabric import PRESETS, load_fabric
 
 denim, voile = load_fabric("denim"), load_fabric("voile")
 NOTHING = {"warp": {}, "weft": {}}
@@ -137,3 +137,13 @@ def test_what_is_no_cloth_is_refused(imported, change, named):
 def test_a_number_of_a_yarn_that_is_not_allowed_is_refused(imported):
     with pytest.raises(BadInput, match=r"warp\.bend = 95"):
         imported(wif(), given={"warp": {"bend": 95.0}, "weft": {}})
+
+
+def test_the_shipped_houndstooth_is_a_twill_of_four_and_four():
+    path = PRESETS.parent / "examples" / "houndstooth.wif"
+    fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
+    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
+    assert fabric.colours is not None and fabric.yarns_per_cm == (18.0, 16.0)
+    order = [name for name, count in fabric.colours.ends for _ in range(count // 4)]
+    brown, cream, red = dict.fromkeys(order)
+    assert order == [brown, cream, brown, cream, brown, red] and fabric.colours.picks == fabric.colours.ends
