@@ -87,6 +87,7 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
         text.arrow_patch.set_visible(distance > UNJOINED)
         taken.append(np.concatenate([mark + offset - half, mark + offset + half]))
         written.append(text)
+    figure.set_layout_engine("none")  # labels are not in the layout: `savefig` would find the same one again
     return written
 
 

@@ -208,6 +208,8 @@ def test_everything_has_a_name(page):
     for picture in page.all("img"):
         assert picture["alt"].strip()
         sources.setdefault(picture["alt"], set()).add(picture["src"])
+    (timing,) = (picture["alt"] for picture in page.all("img") if picture["src"] == "figures/timing-light.png")
+    assert "Lowest: points" in timing.replace("\u00a0", " ")
     assert len(sources) > 20 and all(len(files) == 1 for files in sources.values()), "two pictures have the same words"
     assert len(page.all("table")) == len(page.all("caption")) > 8
     assert all(head["scope"] in ("col", "row", "rowgroup") and head["text"].strip() for head in page.all("th"))

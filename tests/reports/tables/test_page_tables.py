@@ -13,10 +13,15 @@ from reports.truth.calibration import RECORDS as CALIBRATIONS
 from reports.truth.calibration import Calibration
 
 
+def sections_of(records):
+    """Return the tables of every section, from Records."""
+    frames = ranged_frames(page_frames(records))
+    return result_tables(records, frames, facts(records, frames["errors"]))
+
+
 def tables_of(records, section):
     """Return the tables of a section, from Records."""
-    frames = ranged_frames(page_frames(records))
-    return result_tables(records, frames, facts(records, frames["errors"])).get(section, [])
+    return sections_of(records).get(section, [])
 
 
 def cells_of(table, label):
@@ -47,10 +52,11 @@ def test_a_paragraph_without_its_value_is_left_out():
 def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
     """Neumip was trained once: its errors on the unseen fabric have no range; woven's have."""
     assert [table.title.partition(",")[0] for table in tables_of(made_up, "aliasing")]
-    labels = {table.key: [row.label for row in table.rows] for table in tables_of(three_trainings, "aliasing")}
+    sections = sections_of(three_trainings)
+    labels = {table.key: [row.label for row in table.rows] for table in sections["aliasing"]}
     assert "NeuMIP" in labels["seen"] and "NeuMIP" not in labels["unseen"] and "woven" in labels["unseen"]
     for section in ("trade", "error"):
-        unseen = [table for table in tables_of(three_trainings, section) if table.key == "unseen"]
+        unseen = [table for table in sections[section] if table.key == "unseen"]
         assert unseen and not any(row.label.startswith("NeuMIP") for table in unseen for row in table.rows)
     errors = page_frames(three_trainings)["errors"]
     assert len(errors[(errors["method"] == "neumip") & (errors["role"] == "unseen")]) == 1
