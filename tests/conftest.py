@@ -15,7 +15,7 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "_
 settings.register_profile("fixed", derandomize=True)
 settings.load_profile("fixed")
 
-STARTED = {"cpp", "selvage_cpp", "neumip_cpp", "webgl", "browse", "llvm", "switch"}
+STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
 
 LONG = (

@@ -1,20 +1,49 @@
-"""Variants of Mitsuba: the scalar one works everywhere, the other one needs LLVM."""
-
-import math
+"""Variants of Mitsuba, of which the scalar one works everywhere and the other one needs LLVM; worn cloth."""
 
 import numpy as np
 import pytest
 
 from pipeline.mitsuba.register import register
+from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 
 
-def unit(degrees, azimuth):
-    """Return a direction, from its angle to the normal and its azimuth in degrees."""
-    theta, phi = math.radians(degrees), math.radians(azimuth)
-    return np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
+CONFIGURATIONS = {
+    "front": ("polyester_lining", 0.3, 30.0, 20.0),
+    "along the normal": ("denim", 0.3, 0.0, 0.0),
+    "grazing": ("silk_charmeuse", 0.4, 80.0, 130.0),
+    "very grazing": ("wool_gabardine", 0.4, 86.0, 250.0),
+    "wide": ("silk_charmeuse", 30.0, 40.0, 65.0),
+    "tiny": ("polyester_lining", 0.001, 50.0, 250.0),
+    "one yarn": ("cotton_twill", 0.1, 60.0, 300.0),
+    "voile": ("voile", 1.5, 20.0, 100.0),
+    "gauze": ("gauze", 0.4, 70.0, 10.0),
+    "behind": ("silk_charmeuse", 0.5, 130.0, 45.0),
+    "behind a gauze": ("gauze", 1.0, 105.0, 200.0),
+    "behind, along the normal": ("denim", 0.5, 180.0, 0.0),
+}
+"""Fabric, deviation of the footprint, and the viewer's angle to the normal and azimuth: more than 90 is behind."""
+
+UV = (0.0062, 0.0057)
+
+
+def hits_of(viewer, count=1, uv=UV, **other):
+    """Return places of a shape that face the viewer."""
+    columns = {
+        "uv": np.tile(uv, (count, 1)),
+        "viewer": np.tile(viewer, (count, 1)),
+        "outward": np.tile([0.0, 0.0, 1.0], (count, 1)),
+        "handed": np.ones(count),
+        "jacobian": np.zeros((count, 2, 2)),
+        "spread": np.zeros(count),
+    }
+    return RayHits(**{**columns, **other})
+
+
+def worn_of(fabric, sigma=0.3, **other):
+    return Worn(ClothOptions(fabric=fabric, sigma=sigma, **other))
 
 
 @pytest.fixture

@@ -4,27 +4,11 @@ import numpy as np
 import pytest
 
 from pipeline.mitsuba.bsdf import STRAIGHT_THROUGH
-from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
-from tests.pipeline.mitsuba.conftest import NEEDS_LLVM, unit
+from tests.directions import unit
+from tests.pipeline.mitsuba.conftest import CONFIGURATIONS, NEEDS_LLVM, UV, hits_of, worn_of
 from tests.presets import slow
 
 LEVEL = 0.01
-CONFIGURATIONS = {
-    "front": ("polyester_lining", 0.3, 30.0, 20.0),
-    "along the normal": ("denim", 0.3, 0.0, 0.0),
-    "grazing": ("silk_charmeuse", 0.4, 80.0, 130.0),
-    "very grazing": ("wool_gabardine", 0.4, 86.0, 250.0),
-    "wide": ("silk_charmeuse", 30.0, 40.0, 65.0),
-    "tiny": ("polyester_lining", 0.001, 50.0, 250.0),
-    "one yarn": ("cotton_twill", 0.1, 60.0, 300.0),
-    "voile": ("voile", 1.5, 20.0, 100.0),
-    "gauze": ("gauze", 0.4, 70.0, 10.0),
-    "behind": ("silk_charmeuse", 0.5, 130.0, 45.0),
-    "behind a gauze": ("gauze", 1.0, 105.0, 200.0),
-    "behind, along the normal": ("denim", 0.5, 180.0, 0.0),
-}
-"""Fabric, deviation of the footprint, and the viewer's angle to the normal and azimuth: more than 90 is behind."""
-UV = (0.0062, 0.0057)
 
 
 def interaction(mi, viewer, count=1):
@@ -37,11 +21,6 @@ def interaction(mi, viewer, count=1):
     return si
 
 
-def hits(viewer):
-    zero = np.zeros((1, 3))
-    return RayHits(np.array([UV]), np.array([viewer]), zero, np.ones(1), np.zeros((1, 2, 2)), np.zeros(1))
-
-
 def number(value):
     return np.asarray(value, np.float64).reshape(-1)
 
@@ -50,13 +29,13 @@ def number(value):
 def test_values_and_densities_are_those_of_the_cloth(mi, name):
     fabric, sigma, theta, phi = CONFIGURATIONS[name]
     bsdf = mi.load_dict({"type": "twillight", "fabric": fabric, "sigma": sigma})
-    worn = Worn(ClothOptions(fabric=fabric, sigma=sigma))
+    worn = worn_of(fabric, sigma)
     si, context = interaction(mi, unit(theta, phi).tolist()), mi.BSDFContext()
+    hits = hits_of(unit(theta, phi))
     for light in (unit(40.0, 200.0).tolist(), unit(120.0, 30.0).tolist()):
-        one = hits(unit(theta, phi).tolist())
         value, pdf = bsdf.eval_pdf(context, si, light)
-        np.testing.assert_allclose(number(value), worn.eval(one, np.array([light]))[0], rtol=1e-5)
-        np.testing.assert_allclose(number(pdf), worn.pdf(one, np.array([light])), rtol=1e-5)
+        np.testing.assert_allclose(number(value), worn.eval(hits, np.array([light]))[0], rtol=1e-5)
+        np.testing.assert_allclose(number(pdf), worn.pdf(hits, np.array([light])), rtol=1e-5)
         np.testing.assert_array_equal(number(bsdf.eval(context, si, light)), number(value))
         np.testing.assert_array_equal(number(bsdf.pdf(context, si, light)), number(pdf))
 
@@ -67,7 +46,7 @@ def test_samples_name_their_lobe(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
     viewer = unit(25.0, 70.0).tolist()
     si, context = interaction(mi, viewer), mi.BSDFContext()
-    worn, one = Worn(ClothOptions(fabric="voile", sigma=0.5)), hits(viewer)
+    worn, hits = worn_of("voile", 0.5), hits_of(viewer)
     flags, kinds = mi.BSDFFlags, set()
     for random in np.random.default_rng(0).random((60, 3)):
         sample, weight = bsdf.sample(context, si, random[0].item(), random[1:].tolist())
@@ -76,7 +55,7 @@ def test_samples_name_their_lobe(mi):
         kinds.add((component, kind))
         if component == 2:
             np.testing.assert_allclose(wo, -np.array(viewer), atol=1e-7)
-            np.testing.assert_allclose(number(weight), worn.transparency(one)[0] / pdf, rtol=1e-5)
+            np.testing.assert_allclose(number(weight), worn.transparency(hits)[0] / pdf, rtol=1e-5)
             continue
         assert (wo[2] > 0.0) == (component == 0)
         np.testing.assert_allclose(number(bsdf.pdf(context, si, wo.tolist())), pdf, rtol=1e-3)
@@ -88,11 +67,8 @@ def test_samples_name_their_lobe(mi):
 @pytest.mark.slow
 def test_a_context_chooses_lobes(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
-    si, front, behind = (
-        interaction(mi, unit(25.0, 70.0).tolist()),
-        unit(40.0, 200.0).tolist(),
-        unit(140.0, 30.0).tolist(),
-    )
+    si = interaction(mi, unit(25.0, 70.0).tolist())
+    front, behind = unit(40.0, 200.0).tolist(), unit(140.0, 30.0).tolist()
     context = mi.BSDFContext()
     context.component = 0
     assert number(bsdf.eval(context, si, front)).any() and not number(bsdf.eval(context, si, behind)).any()
@@ -105,70 +81,58 @@ def test_light_straight_through_is_known_without_sampling(mi):
     bsdf = mi.load_dict({"type": "twillight", "fabric": "gauze", "sigma": 0.5})
     viewer = unit(25.0, 70.0).tolist()
     share = number(bsdf.eval_null_transmission(interaction(mi, viewer)))
-    wanted = Worn(ClothOptions(fabric="gauze", sigma=0.5)).transparency(hits(viewer))
+    wanted = worn_of("gauze", 0.5).transparency(hits_of(viewer))
     np.testing.assert_allclose(share, wanted[0], rtol=1e-5)
     assert 0.1 < share[0] < 0.9
 
 
 @pytest.mark.parametrize(
-    ("properties", "words"),
+    ("plugin", "properties", "words"),
     [
-        ({"fabric": "denin"}, "did you mean 'denim'"),
-        ({}, "fabric"),
-        ({"fabric": "denim", "method": "soft_node"}, "did you mean 'soft_nodes'"),
-        ({"fabric": "denim", "yarns": -1.0}, "yarns"),
-        ({"fabric": "denim", "yarn": 1.0}, "did you mean 'yarns'"),
+        ("twillight", {"fabric": "denin"}, "did you mean 'denim'"),
+        ("twillight", {}, "fabric"),
+        ("twillight", {"fabric": "denim", "method": "soft_node"}, "did you mean 'soft_nodes'"),
+        ("twillight", {"fabric": "denim", "yarns": -1.0}, "yarns"),
+        ("twillight", {"fabric": "denim", "yarn": 1.0}, "did you mean 'yarns'"),
+        ("twillight_path", {"max_dept": 3}, "did you mean 'max_depth'"),
     ],
 )
-def test_bad_properties_end_in_one_sentence(scalar, properties, words):
+def test_bad_properties_end_in_one_sentence(scalar, plugin, properties, words):
     with pytest.raises(RuntimeError) as caught:
-        scalar.load_dict({"type": "twillight", **properties})
+        scalar.load_dict({"type": plugin, **properties})
     last = str(caught.value).strip().splitlines()[-1]
     assert last.startswith("BadInput: ") and words in last
 
 
-def chi_square(mi, name, cells, nodes, samples):
-    """Return Mitsuba's chi-square test of a configuration; light straight through is a delta lobe and left out.
+@NEEDS_LLVM
+@pytest.mark.parametrize(
+    ("names", "cells", "nodes", "samples"),
+    [(("front", "gauze", "behind"), 11, 24, 20_000), slow(tuple(CONFIGURATIONS), 21, 32, 500_000)],
+)
+def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
+    """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough.
 
-    Mitsuba's adapter drops samples without weight. Here they count: the density does not know which light is in shadow.
+    Light straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they
+    count: the density does not know which light is in shadow.
     """
     import drjit as dr
 
-    fabric, sigma, theta, phi = CONFIGURATIONS[name]
-    context = mi.BSDFContext()
-    context.type_mask = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Null)
-    properties = {"type": "twillight", "fabric": fabric, "sigma": sigma}
-    _, density = mi.chi2.BSDFAdapter("twillight", properties, wi=unit(theta, phi).tolist(), uv=list(UV), ctx=context)
-    bsdf = mi.load_dict(properties)
+    context = llvm.BSDFContext()
+    context.type_mask = int(llvm.BSDFFlags.All) & ~int(llvm.BSDFFlags.Null)
+    for name in names:
+        fabric, sigma, theta, phi = CONFIGURATIONS[name]
+        viewer, properties = unit(theta, phi).tolist(), {"type": "twillight", "fabric": fabric, "sigma": sigma}
+        _, density = llvm.chi2.BSDFAdapter("twillight", properties, wi=viewer, uv=list(UV), ctx=context)
+        bsdf = llvm.load_dict(properties)
 
-    def draw(random):
-        si = interaction(mi, unit(theta, phi).tolist(), dr.width(random))
-        sample, _ = bsdf.sample(context, si, random[0], [random[1], random[2]])
-        return sample.wo, dr.select(sample.sampled_component == STRAIGHT_THROUGH, mi.Float(0.0), mi.Float(1.0))
+        def draw(random, bsdf=bsdf, viewer=viewer):
+            si = interaction(llvm, viewer, dr.width(random))
+            sample, _ = bsdf.sample(context, si, random[0], [random[1], random[2]])
+            scattered = sample.sampled_component != STRAIGHT_THROUGH
+            return sample.wo, dr.select(scattered, llvm.Float(1.0), llvm.Float(0.0))
 
-    return mi.chi2.ChiSquareTest(
-        domain=mi.chi2.SphericalDomain(),
-        sample_func=draw,
-        pdf_func=density,
-        sample_dim=3,
-        sample_count=samples,
-        res=cells,
-        ires=nodes,
-    )
-
-
-@NEEDS_LLVM
-@pytest.mark.parametrize("name", ["front", "gauze", "behind"])
-def test_mitsubas_chi_square_test_in_short(llvm, name):
-    """Sidak over the three; few cells, so that the quadrature of densities is exact enough."""
-    test = chi_square(llvm, name, 11, 24, 20_000)
-    assert test.run(significance_level=LEVEL, test_count=3, quiet=True), test.messages
-
-
-@pytest.mark.slow
-@NEEDS_LLVM
-@pytest.mark.parametrize("name", CONFIGURATIONS)
-def test_mitsubas_chi_square_test(llvm, name):
-    """Twelve configurations at a level of LEVEL for all of them together."""
-    test = chi_square(llvm, name, 21, 32, 500_000)
-    assert test.run(significance_level=LEVEL, test_count=len(CONFIGURATIONS), quiet=True), test.messages
+        test = llvm.chi2.ChiSquareTest(
+            domain=llvm.chi2.SphericalDomain(), sample_func=draw, pdf_func=density, sample_dim=3,
+            sample_count=samples, res=cells, ires=nodes,
+        )  # fmt: skip
+        assert test.run(significance_level=LEVEL, test_count=len(names), quiet=True), test.messages

@@ -181,10 +181,3 @@ def test_a_mesh_without_uv_is_one_sentence(scalar):
     scene = mi.load_dict({"type": "scene", "mesh": mesh, "sky": {"type": "constant"}, "sensor": sensor(mi)})
     with pytest.raises(BadInput, match=r"needs uv coordinates"):
         mi.render(scene, integrator=path(mi), spp=1)
-
-
-def test_bad_properties_end_in_one_sentence(scalar):
-    with pytest.raises(RuntimeError) as caught:
-        path(scalar, max_dept=3)
-    last = str(caught.value).strip().splitlines()[-1]
-    assert last.startswith("BadInput: ") and "did you mean 'max_depth'" in last

@@ -1,26 +1,29 @@
-"""Exported folders, and the shader compiled as C++ and called from Python."""
+"""Exported folders, and the shader compiled as C++ and called from Python, or run by a browser."""
 
 import base64
 import ctypes
-import html
-import http.server
 import io
 import json
-import queue
 import re
 import shutil
 import subprocess
-import threading
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import safetensors.torch
+import torch
 from PIL import Image
 
+from pipeline.fingerprint import IDENTITY, fingerprint
+from pipeline.models.card import write_model
+from pipeline.models.neumip import NeumipOptions
+from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
+from tests.browser import opened
 from weaves.fabric import load_fabric
 
 FORMAT_PAGE = Path(__file__).parents[3] / "docs" / "shader_format.md"
@@ -30,11 +33,16 @@ _ROWS = re.findall(r"^\| ([^|]+) \| ([\d.e-]+) \|$", FORMAT_PAGE.read_text(encod
 ALLOWED = {form: float(share) for forms, share in _ROWS for form in forms.split(", ")}
 """Largest difference from golden answers, as a share of the range of a column, as the page promises it to readers."""
 
+FORMS = [("float32", ALLOWED["C++"]), ("float16", ALLOWED["16 bits"])]
+"""Types of numbers, and what is allowed of the C++ form with them."""
 
-def missing(*programs):
-    """Return the sentence for what a test needs and is not there, or nothing."""
-    there = {"slangc": slangc, "g++": lambda: shutil.which("g++"), "chromium": lambda: shutil.which("chromium")}
-    return ", ".join(f"{name} is not installed" for name in programs if there[name]() is None)
+
+CLOTH = "gingham"
+"""The fabric of the trained `neumip`, and of the programs, which are those of every fabric."""
+
+
+def bytes_of(folder):
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +52,8 @@ def exported(tmp_path_factory):
 
     @cache
     def export(name, level=2, *languages, kinds=(), model=None):
+        if {*languages} - {"onnx"} and slangc() is None:
+            pytest.skip("slangc is not installed")
         folder = home / "-".join((name, str(level), *languages, *kinds, Path(model or "soft_nodes").name))
         write_shader(load_fabric(name), folder, model, None if model else level, languages, kinds)
         return folder
@@ -51,32 +61,44 @@ def exported(tmp_path_factory):
     return export
 
 
-@pytest.fixture(scope="session")
-def read():
-    """A function that reads an exported folder as a program would that has only its files."""
+def read(folder, type_of_numbers="float32"):
+    """Read an exported folder as a program would that has only its files."""
+    (listing,) = (path for path in folder.glob("*.json") if path.name != "golden.json")
+    about = json.loads(listing.read_text())
+    codes = {"int32": "<i4", "float32": "<f4", "float16": "<f2"}
+    buffers = {}
+    for name, buffer in about["buffers"].items():
+        kind = type_of_numbers if type_of_numbers in buffer["files"] else next(iter(buffer["files"]))
+        path = folder / buffer["files"][kind]
+        if kind == "uint8":
+            values = np.asarray(Image.open(io.BytesIO(path.read_bytes()))).ravel()
+        else:
+            values = np.frombuffer(path.read_bytes(), codes[kind])
+        count = buffer["elements"] * buffer["channels"]
+        assert len(values) >= count and (kind == "uint8" or len(values) == count)
+        buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
+    golden = json.loads((folder / about["golden"]).read_text())
+    queries = np.array(golden["queries"], np.float32)
+    columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
+    answers = np.column_stack([np.array(column) for column in columns if column])
+    return SimpleNamespace(about=about, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
-    def read(folder, type_of_numbers="float32"):
-        (listing,) = (path for path in folder.glob("*.json") if path.name != "golden.json")
-        said = json.loads(listing.read_text())
-        codes = {"int32": "<i4", "float32": "<f4", "float16": "<f2"}
-        buffers = {}
-        for name, buffer in said["buffers"].items():
-            kind = type_of_numbers if type_of_numbers in buffer["files"] else next(iter(buffer["files"]))
-            path = folder / buffer["files"][kind]
-            if kind == "uint8":
-                values = np.asarray(Image.open(io.BytesIO(path.read_bytes()))).ravel()
-            else:
-                values = np.frombuffer(path.read_bytes(), codes[kind])
-            count = buffer["elements"] * buffer["channels"]
-            assert len(values) >= count and (kind == "uint8" or len(values) == count)
-            buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
-        golden = json.loads((folder / said["golden"]).read_text())
-        queries = np.array(golden["queries"], np.float32)
-        columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
-        answers = np.column_stack([np.array(column) for column in columns if column])
-        return SimpleNamespace(said=said, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
-    return read
+def worst(answers, cloth, first=0):
+    """Return the largest difference from the golden answers from a column on, as a share of its range in its group."""
+    differences = []
+    for start, stop in cloth.groups.values():
+        expected = cloth.answers[start:stop, first : first + answers.shape[1]]
+        # What is 0 throughout, as the transparency of a dense cloth, has no range.
+        span = np.maximum(np.ptp(expected, axis=0), 1e-12)
+        differences.append((np.abs(answers[start:stop] - expected) / span).max())
+    return max(differences)
+
+
+def check_answers(answers, cloth, allowed):
+    """Compare components and bounds (N, 8) with the golden ones: all are positive, components at most their bounds."""
+    assert worst(answers, cloth) < allowed, cloth.about["fabric"]
+    assert (answers >= 0.0).all() and (answers[:, :4] <= answers[:, 4:]).all()
 
 
 WIDTHS = {"evaluate": (12, 8), "scatter": (16, 16)}
@@ -92,34 +114,58 @@ class _Groups(ctypes.Structure):
 
 
 @pytest.fixture(scope="session")
-def cpp(exported, tmp_path_factory):
-    """A function that runs an entry point of the C++ form on rows: components and bounds, (N, 8), of queries, (N, 12).
+def programs(exported, tmp_path_factory):
+    """A function that compiles the C++ form of a model once, and returns a function that runs it on rows.
 
-    `scatter` takes random numbers beside them, (N, 15), and returns the columns of a Scatter, (N, 16).
+    That one returns components and bounds, (N, 8), of queries, (N, 12). With the entry point `scatter` it takes random
+    numbers beside them, (N, 15), and returns the columns of a Scatter, (N, 16).
     """
-    if lacking := missing("slangc", "g++"):
-        pytest.skip(lacking)
-    return compiled(exported("gingham", 2, "cpp"), tmp_path_factory.mktemp("cpp"))
+
+    @cache
+    def program(model=None):
+        source = exported(CLOTH, 2, "cpp", model=model) / "cpp" / "evaluate.cpp"
+        if shutil.which("g++") is None:
+            pytest.skip("g++ is not installed")
+        library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
+        subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
+        entries = ctypes.CDLL(str(library))
+
+        def call(buffers, queries, entry="evaluate"):
+            count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
+            rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
+            rows[: len(queries), : queries.shape[1]] = queries
+            arrays = [*(np.ascontiguousarray(values) for values in buffers.values()), rows, answers]
+            buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
+            groups = _Groups((0, 0, 0), (count, 1, 1))
+            getattr(entries, entry)(ctypes.byref(groups), None, ctypes.byref(buffer))
+            return answers[: len(queries)]
+
+        return call
+
+    return program
 
 
-def compiled(exported, folder):
-    """Compile the C++ form of an exported folder into another, and return the function of the fixture `cpp`."""
-    library, source = folder / "evaluate.so", exported / "cpp" / "evaluate.cpp"
-    subprocess.run(["g++", "-O2", "-w", "-shared", "-fPIC", "-o", library, source], check=True)
-    programs = ctypes.CDLL(str(library))
+@pytest.fixture(scope="session")
+def cpp(programs):
+    """The function of `programs` for the soft nodes."""
+    return programs()
 
-    def call(buffers, queries, entry="evaluate"):
-        count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
-        rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
-        rows[: len(queries), : queries.shape[1]] = queries
-        arrays = [np.ascontiguousarray(values) for values in buffers.values()]
-        arrays += [rows, answers]
-        buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
-        groups = _Groups((0, 0, 0), (count, 1, 1))
-        getattr(programs, entry)(ctypes.byref(groups), None, ctypes.byref(buffer))
-        return answers[: len(queries)]
 
-    return call
+def job_of(buffers, rows, **other):
+    """Return buffers and rows of queries for a page."""
+    columns = {**buffers, "queries": rows}
+    encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
+    return {"names": list(columns), **encoded, "count": len(rows), **other}
+
+
+def answered(page, folder, jobs, source, *options):
+    """Return what a page beside this file answers to jobs with the source of a shader."""
+    text = Path(__file__).with_name(page).read_text()
+    written = folder / page
+    written.write_text(text.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(source), 1))
+    ready = "typeof answers !== 'undefined'"
+    with opened(written.as_uri(), folder / "profile", *options, ready=ready) as own:
+        return own.run("answers")
 
 
 @pytest.fixture(scope="session")
@@ -128,9 +174,6 @@ def webgl(exported, tmp_path_factory):
 
     For `scatter` the random numbers are 0.5.
     """
-    if lacking := missing("slangc", "chromium"):
-        pytest.skip(lacking)
-    page = Path(__file__).with_name("evaluate.html").read_text()
 
     @cache
     def source(entry, folder):
@@ -141,69 +184,45 @@ def webgl(exported, tmp_path_factory):
         compile_program(slangc(), folder / "slang", program, "glsl", path)
         return path.read_text()
 
-    def call(cloths, half=False, entry="evaluate", folder=None):
-        text = source(entry, folder or exported("gingham", 2, "glsles"))
+    def call(cloths, half=False, entry="evaluate", model=None):
+        text = source(entry, exported(CLOTH, 2, "glsles", model=model))
         columns, results = WIDTHS[entry]
         jobs = []
         for cloth in cloths:
             rows = np.full((len(cloth.queries), columns), 0.5, np.float32)
             rows[:, : cloth.queries.shape[1]] = cloth.queries
-            values = {**cloth.buffers, "queries": rows}
+            values = dict(cloth.buffers)
             for name in {"nodes", "weights"} & values.keys():
                 values[name] = values[name].astype(np.float16 if half else np.float32)
-            encoded = {name: base64.b64encode(array.tobytes()).decode() for name, array in values.items()}
-            jobs.append(
-                {
-                    "names": list(values),
-                    **encoded,
-                    "count": len(rows),
-                    "half": half,
-                    "texels": columns // 4,
-                    "targets": results // 4,
-                }
-            )
-        written = tmp_path_factory.mktemp("webgl") / "evaluate.html"
-        written.write_text(page.replace("JOBS", json.dumps(jobs), 1).replace("SOURCE", json.dumps(text), 1))
-        command = ["chromium", "--headless", "--no-sandbox", "--dump-dom", f"--user-data-dir={written.parent}"]
-        done = subprocess.run([*command, written.as_uri()], capture_output=True, text=True, timeout=600, check=True)
-        shown = re.search(r'<pre id="answers">(.*?)</pre>', done.stdout, re.DOTALL)
-        assert shown, done.stdout[-1000:]
-        text = html.unescape(shown[1])
-        assert text.startswith("["), text
-        return [np.concatenate([np.reshape(part, (-1, 4)) for part in answer], axis=1) for answer in json.loads(text)]
+            jobs.append(job_of(values, rows, half=half, texels=columns // 4, targets=results // 4))
+        answers = answered("evaluate.html", tmp_path_factory.mktemp("webgl"), jobs, text)
+        return [np.concatenate([np.reshape(part, (-1, 4)) for part in parts], axis=1) for parts in answers]
 
     return call
 
 
-class _Handler(http.server.SimpleHTTPRequestHandler):
-    """A folder for a browser, which posts what it has found."""
-
-    posted: queue.Queue = queue.Queue()
-
-    def do_POST(self):
-        self.posted.put(self.rfile.read(int(self.headers["Content-Length"])))
-        self.send_response(204)
-        self.end_headers()
-
-    def log_message(self, *_):
-        pass
-
-
-@pytest.fixture
-def browse(tmp_path):
-    """A function that opens a page of a folder in a browser, and returns what the page posts."""
-    handler = partial(_Handler, directory=tmp_path)
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield partial(_posted, tmp_path, f"http://127.0.0.1:{server.server_port}")
-        server.shutdown()
+def neumip_folder(folder, fabric, version=1, **options):
+    """Write a `neumip` whose random textures and perceptrons give components of all sizes."""
+    design = NeumipOptions(**options)
+    with torch.random.fork_rng():
+        torch.manual_seed(3)
+        network = NeumipNetwork(design, fabric.weave.repeat)
+        weights = {
+            name: values + torch.randn_like(values) if name.startswith(("levels", "depth")) else values
+            for name, values in network.state_dict().items()
+        }
+    weights["decoder.6.bias"] = torch.tensor([0.5, 0.2, 1.0, -0.2])
+    about = {"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
+    card = {
+        "options": design.model_dump(mode="json", context=IDENTITY),
+        "version": {"model": version},
+        "fabrics": [about],
+    }
+    write_model(folder, safetensors.torch.save(weights), card)
+    return str(folder)
 
 
-def _posted(folder, address, page, *options):
-    command = ["chromium", "--headless", "--no-sandbox", "--remote-debugging-port=0", *options]
-    command += [f"--user-data-dir={folder / 'profile'}", f"{address}/{page}"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
-        try:
-            return _Handler.posted.get(timeout=240)
-        finally:
-            browser.terminate()
+@pytest.fixture(scope="session")
+def neumip(tmp_path_factory):
+    """The folder of a trained `neumip`: a repeat of odd sides at the coarser levels, channels that fill no element."""
+    return neumip_folder(tmp_path_factory.mktemp("models") / "neumip", load_fabric(CLOTH), texels_per_yarn=5, hidden=18)

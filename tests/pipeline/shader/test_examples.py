@@ -3,13 +3,17 @@
 import re
 import shutil
 import subprocess
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.shader.golden import DENSITY_COLUMN, TRANSPARENCY_COLUMN
-from tests.pipeline.shader.conftest import ALLOWED, missing
+from tests.browser import opened
+from tests.pipeline.shader.conftest import ALLOWED, read
 
 pytestmark = pytest.mark.external  # slangc, g++ and Chromium
 
@@ -18,21 +22,25 @@ PAGE = Path(__file__).parents[3] / "docs" / "shader.md"
 
 def example(language):
     """Return the code block of a language; there is one."""
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
-    return found
+    (code,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
+    return code
 
 
-def test_the_quad_draws_what_the_shader_answers(exported, read, cpp, tmp_path, browse):
-    if lacking := missing("chromium"):
-        pytest.skip(lacking)
+def test_the_quad_draws_what_the_shader_answers(exported, cpp, tmp_path):
     shutil.copytree(exported("denim", 2, "glsles"), tmp_path / "shaders" / "denim")
-    show = (
-        "const seen = new Uint8Array(4 * 256 * 256);\n"
-        "gl.readPixels(0, 0, 256, 256, gl.RGBA, gl.UNSIGNED_BYTE, seen);\n"
-        'await fetch("/", { method: "POST", body: seen.slice(4 * 256 * 100, 4 * 256 * 101) });\n'
-    )
-    (tmp_path / "quad.html").write_text(example("html").replace("</script>", show + "</script>"))
-    pixels = np.frombuffer(browse("quad.html"), np.uint8).reshape(256, 4)[:, :3].astype(float)
+    (tmp_path / "quad.html").write_text(example("html"))
+    handler = partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}/quad.html"
+        with opened(address, tmp_path / "profile", ready="document.title === 'drawn'") as page:
+            row = page.run("""(() => {
+                const gl = document.getElementById("cloth").getContext("webgl2"), seen = new Uint8Array(4 * 256);
+                gl.readPixels(0, 100, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, seen);
+                return Array.from(seen);
+            })()""")
+        server.shutdown()
+    pixels = np.reshape(row, (256, 4))[:, :3].astype(float)
 
     # The camera of the page: row 100 of 256, eight yarns wide, from 40 yarns above.
     cloth, side = read(exported("denim")), 8.0 / 256.0
@@ -40,16 +48,14 @@ def test_the_quad_draws_what_the_shader_answers(exported, read, cpp, tmp_path, b
     wo = -ray / np.linalg.norm(ray, axis=1, keepdims=True)
     rows = np.zeros((256, 12))
     rows[:, :2], rows[:, 2:4], rows[:, 5:8], rows[:, 8:11] = 4.0 + ray[:, :2], 0.5 * side, (0.48, 0.36, 0.8), wo
-    colours = np.array(list(cloth.said["colours"].values()))[:4]
+    colours = np.array(list(cloth.about["colours"].values()))[:4]
     colour = np.minimum(3.0 * cpp(cloth.buffers, rows)[:, :4] @ colours, 1.0)
     expected = 255.0 * np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * colour ** (1 / 2.4) - 0.055)
     # Places are rounded in another order, which moves a few of them into the next cell of a grid.
     assert np.ptp(expected) > 50.0 and (np.abs(pixels - expected).max(axis=1) <= 1.0).mean() > 0.98
 
 
-def test_the_node_answers_the_golden_queries(exported, read, tmp_path):
-    if lacking := missing("slangc", "g++"):
-        pytest.skip(lacking)
+def test_the_node_answers_the_golden_queries(exported, tmp_path):
     if not Path("/usr/include/stb/stb_image.h").exists():
         pytest.skip("stb_image.h is not installed")
     folder, program = exported("denim", 2, "cpp", kinds=("behind",)), tmp_path / "node"
@@ -59,13 +65,12 @@ def test_the_node_answers_the_golden_queries(exported, read, tmp_path):
     cloth = read(folder)
     rows = "\n".join(" ".join(f"{value:.9g}" for value in row) for row in cloth.queries)
     done = subprocess.run([program, folder], input=rows, capture_output=True, text=True, check=True)
-    found = np.array([line.split() for line in done.stdout.splitlines()], float)
-    colours = np.array(list(cloth.said["colours"].values()))
+    answers = np.array([line.split() for line in done.stdout.splitlines()], float)
+    colours = np.array(list(cloth.about["colours"].values()))
     through = cloth.queries[:, 7] * cloth.queries[:, 10] < 0.0
-    values = np.where(
-        through[:, None], cloth.answers[:, :4] @ colours[[0, 1, 4, 5]], cloth.answers[:, :4] @ colours[:4]
-    )  # fmt: skip
+    components = cloth.answers[:, :4]
+    values = np.where(through[:, None], components @ colours[[0, 1, 4, 5]], components @ colours[:4])
     expected = np.column_stack([values, cloth.answers[:, [DENSITY_COLUMN, TRANSPARENCY_COLUMN]]])
     for start, stop in cloth.groups.values():
         span = np.ptp(expected[start:stop], axis=0)
-        assert (np.abs(found - expected)[start:stop] < ALLOWED["C++"] * span).all()
+        assert (np.abs(answers - expected)[start:stop] < ALLOWED["C++"] * span).all()

@@ -1,6 +1,5 @@
 """The exported folder, and the sentences for what cannot be exported."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -13,38 +12,33 @@ from pipeline.shader import languages
 from pipeline.shader.descriptor import Buffer, Descriptor, Networks, PlacedLayer
 from pipeline.shader.languages import LANGUAGES
 from pipeline.truth.conventions import COMPONENTS
-from tests.pipeline.shader.conftest import FORMAT_PAGE, missing
+from tests.pipeline.shader.conftest import FORMAT_PAGE, bytes_of, read
 from tests.presets import PRESETS
 from weaves.fabric import load_fabric
 
 
-def bytes_of(folder):
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-
-
 @pytest.fixture(scope="module")
-def largest(exported):
-    """Bytes of the longest programs of a language, which are those of every fabric; CUDA brings its own definitions."""
-    if lacking := missing("slangc"):
-        pytest.skip(lacking)
-    folder = exported("gingham", 2, "all")
-    return max(bytes_of(folder / name) for name in LANGUAGES if name != "cuda")
+def every(exported):
+    """The folder with all languages."""
+    return exported("gingham", 2, "all")
 
 
 @pytest.mark.external
 @pytest.mark.parametrize("name", PRESETS)
-def test_a_folder_has_less_than_a_megabyte_with_a_language(exported, largest, name):
+def test_a_folder_has_less_than_a_megabyte_with_a_language(exported, every, name):
+    """Programs are those of every fabric; CUDA brings its own definitions."""
+    largest = max(bytes_of(every / language) for language in LANGUAGES if language != "cuda")
     assert bytes_of(exported(name)) + largest < 1_000_000
 
 
-def test_tables_are_those_of_the_fabric(exported, read):
+def test_tables_are_those_of_the_fabric(exported):
     table, cloth = tabulate(load_fabric("crepe")), read(exported("crepe"))
-    said, nodes = cloth.said, cloth.buffers["nodes"].reshape(-1, cloth.said["scalars"]["stride"], 4)
-    assert said["components"] == list(COMPONENTS) and said["repeat"] == [16, 16] and said["level"] == 2
+    about, nodes = cloth.about, cloth.buffers["nodes"].reshape(-1, cloth.about["scalars"]["stride"], 4)
+    assert about["components"] == list(COMPONENTS) and about["repeat"] == [16, 16] and about["level"] == 2
     for buffer, name, expected in (
         ("numbers", "yarn", table.yarn), ("numbers", "bounds", table.bounds), ("integers", "pieces", table.pieces)
     ):  # fmt: skip
-        place = said["buffers"][buffer]["arrays"][name]
+        place = about["buffers"][buffer]["arrays"][name]
         count = int(np.prod(place["shape"]))
         values = cloth.buffers[buffer][place["offset"] : place["offset"] + count].reshape(place["shape"])
         assert (values == expected).all()
@@ -66,56 +60,39 @@ def test_slangc_of_the_search_path_is_found(monkeypatch):
 
 
 @pytest.mark.external
-def test_every_language_is_written(exported):
-    if lacking := missing("slangc"):
-        pytest.skip(lacking)
-    folder = exported("gingham", 2, "all")
-    said = json.loads((folder / "soft_nodes.json").read_text())["languages"]
-    assert set(said) == set(LANGUAGES)
-    for name, files in said.items():
+def test_every_language_is_written(every):
+    languages_written = read(every).about["languages"]
+    assert set(languages_written) == set(LANGUAGES)
+    for name, files in languages_written.items():
         for file, program in zip(files, LANGUAGES[name].programs, strict=True):
             for entry in program.entries:
-                assert re.search(rf"\b({entry}|main)\(", (folder / file).read_text())
+                assert re.search(rf"\b({entry}|main)\(", (every / file).read_text())
 
 
 def test_no_sine_and_no_cosine_is_called(exported):
-    for path in exported("gingham").glob("slang/*.slang"):
+    for path in exported("crepe").glob("slang/*.slang"):
         assert not re.search(r"\b(sin|cos|tan|atan2?|asin|acos|exp2?|log2?)\(", path.read_text()), path
 
 
 @pytest.mark.external
 @pytest.mark.parametrize(
-    ("name", "file", "options"),
+    "file",
     [
-        ("glsl", "evaluate.comp", ()),
-        ("glsl", "scatter.comp", ()),
-        ("glsles", "evaluate.frag", ()),
-        ("glsles", "draw.frag", ()),
-        ("hlsl", "evaluate.hlsl", ("-V", "-D", "-e", "evaluate", "-S", "comp", "-o", "/dev/null")),
-        ("hlsl", "scatter.hlsl", ("-V", "-D", "-e", "scatter", "-S", "comp", "-o", "/dev/null")),
+        "glsl/evaluate.comp", "glsl/scatter.comp", "glsles/evaluate.frag", "glsles/draw.frag",
+        "hlsl/evaluate.hlsl", "hlsl/scatter.hlsl", "cuda/evaluate.cu",
     ],
-)
-def test_glslang_accepts_what_is_written(exported, name, file, options):
-    if lacking := missing("slangc"):
-        pytest.skip(lacking)
-    if shutil.which("glslangValidator") is None:
-        pytest.skip("glslangValidator is not installed")
-    path = exported("gingham", 2, "all") / name / file
-    done = subprocess.run(["glslangValidator", *options, path], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
-
-
-@pytest.mark.external
-def test_nvcc_accepts_the_cuda_form(exported, tmp_path):
-    if lacking := missing("slangc"):
-        pytest.skip(lacking)
-    if shutil.which("nvcc") is None:
-        pytest.skip("nvcc is not installed")
-    path = exported("gingham", 2, "all") / "cuda" / "evaluate.cu"
-    done = subprocess.run(
-        ["nvcc", "--ptx", "-w", "-o", tmp_path / "evaluate.ptx", path], capture_output=True, text=True
-    )
-    assert done.returncode == 0 and "evaluate" in (tmp_path / "evaluate.ptx").read_text(), done.stderr
+)  # fmt: skip
+def test_compilers_accept_what_is_written(every, tmp_path, file):
+    path, made = every / file, tmp_path / "made"
+    program, *options = {
+        ".hlsl": ["glslangValidator", "-V", "-D", "-e", path.stem, "-S", "comp", "-o", made],
+        ".cu": ["nvcc", "--ptx", "-w", "-o", made],
+    }.get(path.suffix, ["glslangValidator"])
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+    done = subprocess.run([program, *options, path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert path.suffix != ".cu" or "evaluate" in made.read_text()
 
 
 def test_the_page_on_the_format_has_every_key_of_the_descriptor():

@@ -10,9 +10,11 @@ from scipy import stats
 from pipeline.analytic.importance.lobes import STRAIGHT, Lobes
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.shader.golden import lobes_of
-from pipeline.shader.tables import BEHIND, tabulate_sides
+from pipeline.shader.tables import BEHIND, EVERY, tabulate_sides
 from pipeline.truth.query import Queries
-from tests.pipeline.shader.test_evaluate import EVERY
+from tests.directions import sphere, unit
+from tests.pipeline.shader.conftest import read
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 LEVEL = 0.01
@@ -31,7 +33,7 @@ SLOW = {
     "filaments along the normal": ("silk_charmeuse", 0.001, 0.0, 0.0),
 }
 CONFIGURATIONS = QUICK | SLOW
-NAMES = [pytest.param(name, id=name, marks=[] if name in QUICK else pytest.mark.slow) for name in CONFIGURATIONS]
+NAMES = [*QUICK, *map(slow, SLOW)]
 # Sidak over the configurations.
 LEAST = 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS))
 
@@ -39,8 +41,7 @@ LEAST = 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS))
 def look(name):
     """Return the row of a configuration, light along the viewer."""
     _, deviation, degrees, azimuth = CONFIGURATIONS[name]
-    theta, phi = math.radians(degrees), math.radians(azimuth)
-    wo = (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+    wo = unit(degrees, azimuth)
     return np.array([0.62, 0.57, deviation, deviation, 0.0, *wo, *wo, 0.0], np.float32)
 
 
@@ -48,14 +49,6 @@ def scattered(cpp, cloth, name, wi, random):
     rows = np.tile(look(name), (len(random), 1))
     rows[:, 5:8] = wi
     return cpp(cloth.buffers, np.column_stack([rows, random]), "scatter")
-
-
-def sphere(rows, columns):
-    """Return the middles of cells of equal solid angle, cosine by azimuth, (rows columns, 3)."""
-    z = -1.0 + 2.0 * (np.arange(rows) + 0.5) / rows
-    turn = 2.0 * math.pi * (np.arange(columns) + 0.5) / columns
-    sine = np.sqrt(1.0 - z * z)[:, None]
-    return np.stack(np.broadcast_arrays(sine * np.cos(turn), sine * np.sin(turn), z[:, None]), axis=-1).reshape(-1, 3)
 
 
 @cache
@@ -79,7 +72,7 @@ def density(name, wi):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_samples_follow_the_density_of_the_python(cpp, exported, read, name):
+def test_samples_follow_the_density_of_the_python(cpp, exported, name):
     """Chi-square over the cells of the sphere and the delta lobe; cells of fewer than 20 expected samples pooled."""
     cloth = read(exported(CONFIGURATIONS[name][0], kinds=(EVERY,)))
     random = np.random.default_rng(17).random((COUNT, 3)).astype(np.float32) * np.float32(1.0 - 1e-7)
@@ -110,7 +103,7 @@ def test_samples_follow_the_density_of_the_python(cpp, exported, read, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_weights_have_the_mean_of_the_bsdf(cpp, exported, read, name):
+def test_weights_have_the_mean_of_the_bsdf(cpp, exported, name):
     """A z-test for each colour: drawn directions against even ones, at LEAST over three."""
     cloth = read(exported(CONFIGURATIONS[name][0], kinds=(EVERY,)))
     rng = np.random.default_rng(23)

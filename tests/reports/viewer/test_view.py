@@ -13,7 +13,7 @@ from reports.viewer import view
 from reports.viewer.generate import SHADERS, mark, shader, shipped, sources
 from reports.viewer.view import BEND_FACTORS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
 from tests.presets import PRESETS
-from tests.reports.viewer.conftest import opened, write
+from tests.reports.viewer.conftest import viewer
 from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
 from weaves.fabric import load_fabric
 
@@ -62,7 +62,7 @@ def test_factors_keep_yarns_within_their_ranges(name):
 @pytest.mark.external
 def test_a_page_draws_what_python_does(small, tmp_path):
     """The one test of the browser that is not slow."""
-    with opened(write(small, tmp_path), tmp_path / "profile") as page:
+    with viewer(small, tmp_path) as page:
         page.run("viewer.go(3)")
         cloth = load_fabric("gingham")
         assert_equal(components(page, 2), expected(cloth, VIEWS["Sphere"], 2))

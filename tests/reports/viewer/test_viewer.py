@@ -11,7 +11,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.viewer.shapes import seen
 from reports.viewer.view import TILES, VIEWS, bent
-from tests.reports.viewer.conftest import FABRIC, SIZE, opened
+from tests.reports.viewer.conftest import FABRIC, SIZE, viewer
 from weaves.fabric import load_fabric
 
 pytestmark = pytest.mark.slow
@@ -28,15 +28,15 @@ def components(page, method, state="viewer.state"):
 
 def expected(fabric, camera, level):
     """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them."""
-    return whole(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
+    return squared(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
 
 
 def expected_of(name, fabric, camera):
     """Return the components of a method in Python, (SIZE, SIZE, 4): outside its training too, as a shader."""
-    return whole(camera, lambda queries: own_method(name, "test", "method").predict(fabric, queries))
+    return squared(camera, lambda queries: own_method(name, "test", "method").predict(fabric, queries))
 
 
-def whole(camera, answer):
+def squared(camera, answer):
     picture = seen(camera, SIZE, ENDS)
     found = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
     found[picture.lit] = answer(picture.queries)
@@ -81,8 +81,8 @@ def test_selvage_equals_python_where_the_yarns_are_those_of_the_fabric(fresh, na
     assert said == "Selvage: known of the yarns as they are. Soft nodes are shown instead."
 
 
-def test_a_shader_of_selvage_that_does_not_compile_is_named(written, tmp_path):
-    with opened(written, tmp_path / "profile") as own:
+def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
+    with viewer(whole, tmp_path) as own:
         own.run("viewer.picture.sources.selvage = 'broken', viewer.set({ left: 'selvage' }).then(() => viewer.drawn)")
         assert own.run("viewer.methods[0].label") == "Soft nodes, k = 2"
         said = own.run("document.getElementById('notice').textContent")
@@ -243,7 +243,7 @@ def test_choices_and_reset(fresh):
 # ---- the truth and its read-out ------------------------------------------------------------------------------------
 
 
-def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, found):
+def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, whole):
     fresh.run("viewer.go(3), viewer.set({ left: 'truth', right: '2' })")
     camera = VIEWS["Sphere"]
     picture = seen(camera, SIZE, ENDS)
@@ -259,7 +259,7 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, found):
     text = fresh.run("byId('error').textContent")
     own, other, of_truth = (float(part.strip("()%, ")) for part in text.replace("(", " ").split("%")[:3])
     assert own == 0.0 and abs(other / 100 - share) < 0.06 * share
-    assert 0.0 < of_truth < 3.0 and found["views"][3]["standard_error"] < 0.02
+    assert 0.0 < of_truth < 3.0 and whole["views"][3]["standard_error"] < 0.02
 
 
 @pytest.mark.parametrize("name", TILES)
@@ -327,9 +327,9 @@ def test_every_control_has_a_name_and_takes_the_focus(page):
     assert page.run("document.querySelectorAll('[data-name]').length") >= 20
 
 
-def test_without_webgl_a_still_picture_and_a_sentence(written, tmp_path):
+def test_without_webgl_a_still_picture_and_a_sentence(whole, tmp_path):
     without = "HTMLCanvasElement.prototype.getContext = () => null"
-    with opened(written, tmp_path / "profile", without) as own:
+    with viewer(whole, tmp_path, without) as own:
         assert own.run("byId('notice').textContent") == ("This is a still picture: This browser has no WebGL 2.")
         assert own.run("byId('still').getBoundingClientRect().width * byId('still').naturalWidth") > 0
         assert own.run("getComputedStyle(byId('panel')).display") == "none"

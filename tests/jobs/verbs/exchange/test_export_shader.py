@@ -10,7 +10,7 @@ from pipeline.models.card import write_model
 from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
-from tests.pipeline.shader.test_networks import CLOTH, neumip_folder
+from tests.pipeline.shader.conftest import CLOTH, neumip_folder
 from weaves.fabric import load_fabric
 
 

@@ -2,7 +2,7 @@
 
 from jobs.cli import main
 from reports.viewer import view
-from tests.reports.viewer.conftest import find
+from tests.reports.viewer.conftest import shown_of
 
 
 def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path):
@@ -13,7 +13,7 @@ def test_a_large_repeat_is_refused_before_any_work(capsys, monkeypatch, tmp_path
 
 
 def test_a_page_is_written_whole(capsys, monkeypatch, tmp_path):
-    found = find(0, (2,), (1.0,), 32)
+    found = shown_of(0, (2,), (1.0,), 32)
     monkeypatch.setattr(view, "content", lambda fabric, truth: found)
     assert main(["view", "gingham", "--out", str(tmp_path / "a" / "x.html")]) == 0
     assert "5 views" in capsys.readouterr().out
