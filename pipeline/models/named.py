@@ -7,8 +7,6 @@ most accurate. `selvage:.02` is that model at a wished relative error.
 
 from __future__ import annotations
 
-import math
-
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
@@ -62,7 +60,11 @@ def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
         (trained,) = load_model(model_folder(model, where, key))
         if not isinstance(trained, Selvage):
             raise BadInput(where, key, name, f"{model} has no settings")
-        chosen = trained.within(_wished_error(setting, where, key, name))
+        try:
+            chosen = trained.within(float(setting))
+        except ValueError as error:
+            allowed = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
+            raise BadInput(where, key, name, allowed) from error
         return chosen, _kinds(chosen)
     if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():
         if name in CLASSES:
@@ -71,17 +73,6 @@ def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
         raise BadInput(where, key, name, f"the folder of a trained model or a name is needed; {nearest(name, known)}")
     (method,) = load_model(model_folder(name, where, key))
     return method, _kinds(method)
-
-
-def _wished_error(setting: str, where: str, key: str, name: str) -> float:
-    """Return the wished error that a name ends with."""
-    try:
-        error = float(setting)
-    except ValueError:
-        error = math.nan
-    if not 0.0 < error < 1.0:
-        raise BadInput(where, key, name, "a relative error above 0 and below 1 after the colon is needed, such as :.02")
-    return error
 
 
 def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:

@@ -1,9 +1,15 @@
-"""Methods whose tables take long to make, once for all tests."""
+"""Weights that every test draws alike, and methods whose tables take long to make, once for all tests."""
 
 import pytest
+import torch
 
 from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.registry import load_methods
+
+
+@pytest.fixture(autouse=True)
+def _fixed_weights():
+    torch.manual_seed(0)
 
 
 @pytest.fixture(scope="session")

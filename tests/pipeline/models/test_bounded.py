@@ -6,26 +6,16 @@ import pytest
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded, counterpart, limited
 from pipeline.shards.queries import QueryOptions, draw_queries
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-class Bright:
-    """A network gone wrong: it answers a thousand times too much, everywhere."""
-
-    name, setting = "bright", ""
+class Bright(FakeMethod):
+    """A network gone wrong, which knows all cloths but one."""
 
     def covers(self, fabric):
         return fabric.name != "basket"
-
-    def prepare(self, fabric):
-        pass
-
-    def predict(self, fabric, queries, seed=0):
-        return np.full((len(queries.u), 4), 1e3, np.float32)
-
-    def bytes_stored(self, fabric):
-        return 7
 
 
 def test_what_is_below_the_bound_stays_as_it_is():
@@ -58,9 +48,9 @@ def test_an_excess_goes_to_the_other_yarn_up_to_its_bound(components, bounds, ex
 
 def test_it_is_named_apart_and_answers_for_the_same_fabrics():
     bounded = counterpart(Bright())
-    assert (bounded.name, bounded.setting) == ("bright", "bounded")
+    assert (bounded.name, bounded.setting) == ("fake", "bounded")
     assert not bounded.covers(load_fabric("basket"))
-    assert bounded.bytes_stored(load_fabric("denim")) > 7
+    assert bounded.bytes_stored(load_fabric("denim")) > 48
 
 
 def test_light_from_behind_is_refused():

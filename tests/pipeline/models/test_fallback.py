@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
+from pipeline.models.curved import CurvedOptions
+from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
@@ -12,30 +15,9 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import FakeMethod
 from tests.presets import slow
 from weaves.fabric import load_fabric
-
-
-class Seen:
-    """Remembers what it was asked."""
-
-    name, setting = "seen", ""
-
-    def __init__(self):
-        self.asked = []
-
-    def covers(self, fabric):
-        return True
-
-    def prepare(self, fabric):
-        pass
-
-    def predict(self, fabric, queries, seed=0):
-        self.asked.append(queries)
-        return np.ones((len(queries.u), 4), np.float32)
-
-    def bytes_stored(self, fabric):
-        return 1
 
 
 def mixed(count=60):
@@ -49,7 +31,7 @@ def mixed(count=60):
 
 
 def test_ellipses_become_round_ones_of_the_same_area_and_curvature_is_left_out():
-    queries, method = mixed(), Seen()
+    queries, method = mixed(), FakeMethod()
     Fallback(method, {"behind"}).predict(load_fabric("voile"), queries)
     (asked,) = method.asked
     own = queries.take(queries.wo[:, 2] > 0)
@@ -59,13 +41,13 @@ def test_ellipses_become_round_ones_of_the_same_area_and_curvature_is_left_out()
 
 
 def test_the_major_axis_never_aliases():
-    queries, method = mixed(), Seen()
+    queries, method = mixed(), FakeMethod()
     Fallback(method, {"behind"}, "major").predict(load_fabric("voile"), queries)
     np.testing.assert_array_equal(method.asked[0].sigma, queries.take(queries.wo[:, 2] > 0).sigma)
 
 
 def test_what_a_method_knows_reaches_it_unchanged():
-    queries, method = mixed(), Seen()
+    queries, method = mixed(), FakeMethod()
     Fallback(method, {"behind", "stretch", "curvature"}).predict(load_fabric("voile"), queries)
     own = queries.take(queries.wo[:, 2] > 0)
     for name in Queries._fields:
@@ -74,7 +56,7 @@ def test_what_a_method_knows_reaches_it_unchanged():
 
 def test_what_no_form_stands_for_is_answered_by_quadrature():
     fabric, queries = load_fabric("voile"), mixed()
-    method = Seen()
+    method = FakeMethod()
     fallback = Fallback(method, ())
     strange = fallback.out_of_domain(fabric, queries)
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
@@ -108,7 +90,7 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
         assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-class Narrow(Seen):
+class Narrow(FakeMethod):
     """A trained method with a domain."""
 
     domain = Domain.of({}, [load_fabric("denim")])
@@ -155,7 +137,7 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
 
 
 def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_method():
-    fabric, method = load_fabric("voile"), Seen()
+    fabric, method = load_fabric("voile"), FakeMethod()
     method.domain = Domain.of({"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}}, [fabric])
     queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
     fallback = Fallback(method, ())
@@ -175,7 +157,7 @@ def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_met
 
 def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own():
     """A recipe narrowed to a scene without light from behind teaches none, though the model could learn it."""
-    fabric, queries, method = load_fabric("voile"), mixed(), Seen()
+    fabric, queries, method = load_fabric("voile"), mixed(), FakeMethod()
     method.domain = Domain.of({}, [fabric])
     fallback = Fallback(method, {"behind", "stretch", "curvature"})
     strange = fallback.out_of_domain(fabric, queries)
@@ -198,3 +180,19 @@ def test_it_is_called_as_its_method():
     fallback = Fallback(points, ())
     assert (fallback.name, fallback.setting) == (points.name, points.setting)
     assert fallback.bytes_stored(load_fabric("denim")) == points.bytes_stored(load_fabric("denim"))
+
+
+def test_cloth_steeper_than_was_taught_is_quadratures():
+    """The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond."""
+    denim = load_fabric("denim")
+    options = CurvedOptions(texels_per_yarn=2, silhouette_texels_per_yarn=1)
+    about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}
+    network = CurvedNetwork(options, denim.weave.repeat)
+    method = Curved({fingerprint(denim.optics()): network}, Domain.of(about, [denim]))
+    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), denim.weave.repeat, 3, 0, 40)
+    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
+    assert steep.any() and not steep.all()
+    np.testing.assert_array_equal(fallback.out_of_domain(denim, queries), steep)
+    answers = fallback.predict(denim, queries)
+    np.testing.assert_array_equal(answers[~steep], method.predict(denim, queries.take(~steep)))
+    np.testing.assert_array_equal(answers[steep], fallback_answers(denim, queries.take(steep), 0))

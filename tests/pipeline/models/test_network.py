@@ -1,11 +1,15 @@
-"""Chunks of inference, and the part of a network that runs for every query."""
+"""Chunks of inference, the part of a network that runs for every query, and networks of one fabric each as a method."""
 
 import numpy as np
 import pytest
 import torch
 
+from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.point_sampled import PointSampledOptions
-from pipeline.models.network import Portable, evaluated, loaded
+from pipeline.models.domain import Domain
+from pipeline.models.network import Portable, evaluated, restored
+from pipeline.models.neumip import NeumipOptions
+from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.models.registry import load_methods
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
@@ -52,8 +56,22 @@ def test_answers_are_as_wide_as_asked_even_of_no_rows():
         assert answers.shape == (rows, 1) and answers.dtype == np.float32
 
 
-def test_weights_of_another_network_are_refused():
-    weights = torch.nn.Linear(2, 3).state_dict()
-    assert torch.equal(loaded(torch.nn.Linear(2, 3), weights).weight, weights["weight"])
-    with pytest.raises(RuntimeError):
-        loaded(torch.nn.Linear(3, 2), weights)
+NEUMIP = NeumipOptions(texels_per_yarn=2)
+CLOTHS = [load_fabric(name) for name in ("denim", "silk_charmeuse", "polyester_lining")]
+
+
+def trained(fabric):
+    """Return the card and the weights of a network of one fabric."""
+    domain = Domain.of({}, [fabric]).model_dump(mode="json")
+    card = {"fabrics": [{"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}]}
+    return card | {"domain": domain}, NeumipNetwork(NEUMIP, fabric.weave.repeat).state_dict()
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
+def test_the_ranges_hold_those_of_every_fabric_and_nothing_more(order):
+    """Whichever was read last."""
+    parts = [trained(CLOTHS[index]) for index in order]
+    networks, domain = restored(NEUMIP, parts, lambda repeat: NeumipNetwork(NEUMIP, repeat))
+    assert networks.keys() == {fingerprint(fabric.optics()) for fabric in CLOTHS}
+    assert domain == Domain.of({}, CLOTHS)
+    assert all(domain.knows(fabric) for fabric in CLOTHS) and not domain.knows(load_fabric("voile"))

@@ -19,12 +19,7 @@ def test_an_unknown_model_names_the_nearest():
         module_of("neumipp")
 
 
-def test_a_folder_without_a_model_is_bad_input(tmp_path):
-    with pytest.raises(BadInput, match=r"card\.json: does not exist"):
-        load_model(tmp_path)
-    (tmp_path / "card.json").write_text("{")
-    with pytest.raises(BadInput, match="damaged"):
-        load_model(tmp_path)
+def test_options_of_no_model_are_bad_input(tmp_path):
     write_model(tmp_path, b"", {"options": {"model": "wovenn"}})
     with pytest.raises(BadInput, match="options"):
         load_model(tmp_path)

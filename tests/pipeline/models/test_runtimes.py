@@ -18,6 +18,7 @@ from pipeline.models.runtimes import RUNTIME_TOLERANCE, RUNTIMES, RunBy, Runtime
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 
@@ -26,10 +27,10 @@ DENIM = FABRICS[0]
 NEAR_ONE = 1 + 2.0**-9  # rounds to 1 in bfloat16, and is exact in float16
 
 
-class Linear:
+class Linear(FakeMethod):
     """A method of one product of matrices: u, v, sigma times a matrix, plus a number of the fabric."""
 
-    name, setting = "linear", ""
+    name = "linear"
 
     def __init__(self, weight, constant=0.0):
         self.layer = nn.Linear(3, 4, bias=False)
@@ -37,18 +38,9 @@ class Linear:
         self.constant = torch.full((1, 4), constant)
         self.module = Answering(self.layer, lambda u, v, sigma, add: self.layer(torch.stack([u, v, sigma], -1)) + add)
 
-    def covers(self, fabric):
-        return True
-
-    def prepare(self, fabric):
-        pass
-
     def predict(self, fabric, queries, seed=0):
         columns = np.stack([queries.u, queries.v, queries.sigma], axis=-1)
         return columns @ self.layer.weight.detach().numpy().T + self.constant.numpy()
-
-    def bytes_stored(self, fabric):
-        return 4 * 12
 
     def per_query(self, fabric):
         def refuse(queries):
@@ -93,7 +85,6 @@ def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatc
         return plain.load(*given)
 
     monkeypatch.setitem(RUNTIMES, "onnx", Runtime(plain.missing, load))
-    torch.manual_seed(0)
     woven = Woven(WovenNetwork(WovenOptions(map_texels=16, latent=16, hidden=32)))
     run = RunBy(woven, "onnx")
     assert (run.name, run.setting) == ("woven", "onnx")
@@ -108,7 +99,6 @@ def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatc
 
 @pytest.mark.slow
 def test_eight_bits_cost_a_percent_and_save_three_bytes_of_four():
-    torch.manual_seed(0)
     options = NeumipOptions(texels_per_yarn=2, hidden=128)
     neumip = Neumip({fingerprint(DENIM.optics()): NeumipNetwork(options, DENIM.weave.repeat)})
     run, queries = RunBy(neumip, "onnx-int8"), asked(500)

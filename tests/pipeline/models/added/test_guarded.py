@@ -9,6 +9,7 @@ from pipeline.models.added.guarded import Guarded, MethodFailed, load_added, loa
 from pipeline.models.added.source import locate
 from pipeline.models.method import Method
 from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 
@@ -16,20 +17,12 @@ OPTIONS = AddedMethod(name="theirs", source="/theirs.py:Theirs", sha256="0" * 64
 DENIM = load_fabric("denim")
 
 
-class Theirs:
-    name, setting = "class", ""
-
-    def __init__(self, answers):
-        self.answers = answers
-
+class Theirs(FakeMethod):
     def covers(self, fabric):
         return 1
 
     def prepare(self, fabric):
         raise RuntimeError("no table\nof two lines")
-
-    def predict(self, fabric, queries, seed=0):
-        return self.answers(queries)
 
     def bytes_stored(self, fabric):
         return self.answers(None)

@@ -5,69 +5,34 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.network import build_added, restore_added
-from pipeline.models.added.source import locate
 from pipeline.models.network import Batch
 from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import written
 from weaves.errors import WorkFailed
 from weaves.fabric import load_fabric
 
 CLOTHS = load_fabric("denim"), load_fabric("cotton_twill")
 
-THEIRS = """
-import torch
-from torch import nn
-
-
+NETWORK = """
 class Network(nn.Module):
     def __init__(self, fabrics):
         super().__init__()
-        self.names = [fabric.name for fabric in fabrics]
         self.answer = nn.Parameter(torch.ones(4))
+
+    def forward(self, queries):
+        return self.answer.repeat(len(queries.u), 1)
 
     def loss(self, batch, random):
         return (torch.rand(()) * self.answer - batch.target).square().mean()
 
-
-class Theirs:
-    name, version, setting = "theirs", 1, ""
-
-    def network(self, fabrics):
-        return Network(fabrics)
-
-    def load(self, network):
-        self.trained = network
-
-    def covers(self, fabric):
-        return True
-
-    def prepare(self, fabric):
-        assert fabric.name in self.trained.names and not self.trained.training
-
-    def predict(self, fabric, queries, seed=0):
-        return self.trained.answer.detach().repeat(len(queries.u), 1).numpy()
-
-    def bytes_stored(self, fabric):
-        return 16
 """
 
 
 @pytest.fixture
 def theirs(tmp_path):
-    """Options of the method above, in which a part of the text is another."""
-
-    def of(old="", new="", **fields):
-        assert old in THEIRS
-        path = tmp_path / "theirs.py"
-        path.write_text(THEIRS.replace(old, new))
-        source = locate(f"{path}:Theirs")
-        return AddedMethod(
-            name="theirs", source=source.text, sha256=source.sha256(), stated="1", has_network=True, **fields
-        )
-
-    return of
+    return written(tmp_path, NETWORK)
 
 
 def batch():
@@ -133,7 +98,7 @@ def test_random_numbers_of_torch_are_those_of_the_step(theirs):
     ("old", "new", "sentence"),
     [
         ("return Network(fabrics)", "return 5", "network returned int; a torch.nn.Module is needed"),
-        ("return Network(fabrics)", "raise KeyError('x')", "network: KeyError: 'x' (theirs.py, line 20)"),
+        ("return Network(fabrics)", "raise KeyError('x')", "network: KeyError: 'x' (theirs.py, line 36)"),
         ("def loss", "def los", "network returned Network, which lacks the function 'loss'"),
         ("nn.Parameter(torch.ones(4))", "torch.ones(4)", "network returned Network, which has nothing to train"),
     ],
@@ -186,13 +151,13 @@ def test_weights_are_loaded_into_the_method(theirs):
     options = theirs()
     network = build_added(options, CLOTHS)
     method = restore_added(options, [trained(network, CLOTHS, 3)])
-    method.prepare(CLOTHS[1])
+    assert not method.method.trained.training
     assert method.predict(CLOTHS[0], queries(2)).tolist() == [[3.0] * 4] * 2
     assert (method.name, method.domain, method.bytes_stored(CLOTHS[0])) == ("theirs", None, 16)
 
 
 def test_fabrics_come_back_from_the_card_without_their_colours(theirs):
-    options = theirs("self.names =", "self.seen = fabrics; self.names =")
+    options = theirs("super().__init__()", "super().__init__(); self.seen = fabrics")
     network = build_added(options, CLOTHS)
     assert [cloth.optics() for cloth in network.network.seen] == [cloth.optics() for cloth in CLOTHS]
     assert network.network.seen[0].warp.diffuse != CLOTHS[0].warp.diffuse

@@ -4,7 +4,6 @@ from pydantic import ValidationError
 
 from pipeline.materials.lobes import even_sky, reflectance
 from pipeline.models.analytic.map_material import MapMaterialOptions
-from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -65,16 +64,6 @@ def test_an_even_sky_is_not_made_brighter():
         answers = method.predict(cloth, Queries.round(none, none, none + 16.0, wi, wo))
         # The incident cosine is inside: directions are drawn in proportion to it.
         assert (np.pi * answers / wi[:, 2:]).mean(axis=0) @ np.array([0.3, 0.3, 1.0, 1.0]) < 1.0
-
-
-def test_it_is_a_method_of_flat_cloth():
-    fabric, (method,) = load_fabric("denim"), load_methods(MapMaterialOptions(size=128))
-    assert isinstance(method, Method) and method.covers(fabric) and method.setting == ""
-    # 128 x 128 texels and all coarser ones, 15 numbers of a byte each.
-    assert method.bytes_stored(fabric) == sum(4**level for level in range(8)) * 15
-    queries = draw_queries(QueryOptions(curvature=(0.1, 0.5)), fabric.weave.repeat, 1, 0, 8)
-    with pytest.raises(BadInput, match="flat cloth"):
-        method.predict(fabric, queries)
 
 
 def test_the_size_of_the_maps_is_checked():

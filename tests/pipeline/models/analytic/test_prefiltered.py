@@ -2,12 +2,10 @@ import numpy as np
 import pytest
 
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
-from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 UNSHADED = TruthOptions(estimator="quadrature", shadows=False, relative_error=1e-3, absolute_error=1e-6)
@@ -36,14 +34,3 @@ def test_widening_helps_highlights(fabric):
         answer, truth = answers(widening, 4.0, fabric=fabric)
         errors.append(np.sqrt(np.mean((answer - truth)[:, :2] ** 2)))
     assert errors[2] < errors[1] < errors[0]
-
-
-def test_it_is_a_method_of_plain_queries():
-    fabric = load_fabric("denim")
-    (method,) = load_methods(PrefilteredOptions())
-    assert isinstance(method, Method) and method.covers(fabric) and method.setting == ""
-    # 64 x 64 texels and all coarser ones, 26 numbers each.
-    assert method.bytes_stored(fabric) == sum(4**level for level in range(7)) * 26 * 4
-    queries = draw_queries(QueryOptions(curvature=(0.1, 0.5)), fabric.weave.repeat, 1, 0, 8)
-    with pytest.raises(BadInput, match="flat cloth"):
-        method.predict(fabric, queries)

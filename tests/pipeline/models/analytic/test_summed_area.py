@@ -3,12 +3,10 @@ import pytest
 
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.summed_area import SummedAreaOptions
-from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
@@ -16,13 +14,9 @@ def test_each_number_of_clusters_is_a_method():
     fabric, methods = load_fabric("polyester_lining"), load_methods(SummedAreaOptions(clusters=[16, 64]))
     assert [method.setting for method in methods] == ["k = 16", "k = 64"]
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 64)
-    answers = []
-    for method in methods:
-        assert isinstance(method, Method) and method.covers(fabric)
-        answers.append(method.predict(fabric, queries, seed=1))
-        assert answers[-1].shape == (64, 4) and answers[-1].dtype == np.float32
-        np.testing.assert_array_equal(answers[-1], method.predict(fabric, queries, seed=2))
-    assert not np.array_equal(*answers)
+    few, many = (method.predict(fabric, queries, seed=1) for method in methods)
+    np.testing.assert_array_equal(few, methods[0].predict(fabric, queries, seed=2))
+    assert not np.array_equal(few, many)
     assert 0 < methods[0].bytes_stored(fabric) < methods[1].bytes_stored(fabric)
 
 
@@ -36,13 +30,3 @@ def test_it_errs_less_than_points_of_the_same_time(sigma, clusters):
     (points,) = load_methods(PointSampledOptions(counts=[16], sequence="r2", visibility="soft_horizon"))
     own, others = (np.mean((m.predict(fabric, queries) @ colour - truth) ** 2) for m in (clusters, points))
     assert own < 0.8 * others
-
-
-@pytest.mark.parametrize(
-    ("kinds", "says"), [(QueryOptions(behind=0.5), "viewer's side"), (QueryOptions(curvature=(0.1, 0.5)), "flat cloth")]
-)
-def test_other_queries_are_refused(kinds, says):
-    fabric, (method,) = load_fabric("denim"), load_methods(SummedAreaOptions(clusters=[16]))
-    queries = draw_queries(kinds, fabric.weave.repeat, 1, 0, 16)
-    with pytest.raises(BadInput, match=says):
-        method.predict(fabric, queries)

@@ -23,7 +23,6 @@ def card_of(fabric):
 
 
 def test_a_network_knows_one_fabric():
-    torch.manual_seed(0)
     network = untrained(LINING)
     (method,) = restore(SMALL, [(card_of(LINING), network.state_dict())])
     assert method.covers(LINING)

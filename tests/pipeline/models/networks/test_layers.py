@@ -9,11 +9,6 @@ from pipeline.models.networks.layers import component_error, perceptron, to_comp
 from pipeline.models.options import ComponentLossOptions
 
 
-@pytest.fixture(autouse=True)
-def _fixed_weights():
-    torch.manual_seed(0)
-
-
 def test_it_is_linear_layers_with_a_relu_between_each_two():
     network = perceptron(3, 8, 2, 5)
     linear = [layer for layer in network if isinstance(layer, torch.nn.Linear)]

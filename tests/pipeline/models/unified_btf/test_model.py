@@ -71,7 +71,6 @@ def test_place_chooses_the_texel():
 
 def test_it_learns_what_differs_from_place_to_place():
     """A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained."""
-    torch.manual_seed(0)
     model = trainable(texels_per_yarn=4).train()
     queries = draw_queries(QueryOptions(sigma=(0.1, 0.1)), LINING.weave.repeat, 3, 0, 256)
     warp = torch.from_numpy(np.sin(np.pi * queries.u) * np.sin(np.pi * queries.v))

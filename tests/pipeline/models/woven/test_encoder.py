@@ -10,32 +10,28 @@ from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
 SMALL = WovenOptions(map_texels=16, encoder_channels=4)
+TWILL = load_fabric("cotton_twill")
 
 
-@pytest.fixture
-def twill():
-    return load_fabric("cotton_twill")
-
-
-def test_surface_and_parameters_are_read_at_the_right_place(twill):
+def test_surface_and_parameters_are_read_at_the_right_place():
     """Texel (row, column) is the point (u, v) = (column + 1/2, row + 1/2)/side of the repeat."""
     options = WovenOptions(map_texels=32, standard=False)
-    maps, parameters, _ = read_cloth([twill], options)
-    ends, picks = twill.weave.repeat
-    point = surface_at(twill, np.array([(5 + 0.5) / 32 * ends]), np.array([(20 + 0.5) / 32 * picks]))
+    maps, parameters, _ = read_cloth([TWILL], options)
+    ends, picks = TWILL.weave.repeat
+    point = surface_at(TWILL, np.array([(5 + 0.5) / 32 * ends]), np.array([(20 + 0.5) / 32 * picks]))
     np.testing.assert_allclose(maps[0, :3, 20, 5], point.normal[0], atol=1e-6)
     np.testing.assert_allclose(maps[0, 3:, 20, 5], point.tangent[0], atol=1e-6)
-    expected = [twill.warp.roughness, twill.weft.roughness, twill.warp.relief, twill.weft.relief]
+    expected = [TWILL.warp.roughness, TWILL.weft.roughness, TWILL.warp.relief, TWILL.weft.relief]
     np.testing.assert_allclose(parameters[0], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("standard", [False, True])
-def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard, twill):
+def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard):
     """One end and three picks of four, 4 and 12 texels of 16: the maps of the rolled drawdown, the same point seen."""
     options = SMALL.model_copy(update={"standard": standard})
-    cloth = read_cloth([twill], options)
+    cloth = read_cloth([TWILL], options)
     begun = cloth.begun(np.array([[1 / 4, 3 / 4]]))
-    seen = standard_of(twill)[0] if standard else twill
+    seen = standard_of(TWILL)[0] if standard else TWILL
     rolled = seen.model_copy(update={"draft": Matrix(rows=tuple(seen.weave.rolled(1, 3).rows()))})
     plain = options.model_copy(update={"standard": False})
     np.testing.assert_allclose(begun.maps, read_cloth([rolled], plain).maps, atol=1e-6)

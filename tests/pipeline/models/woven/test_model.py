@@ -17,16 +17,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 SMALL = WovenOptions(map_texels=16, encoder_channels=4)
-
-
-@pytest.fixture(autouse=True)
-def _fixed_weights():
-    torch.manual_seed(0)
-
-
-@pytest.fixture
-def twill():
-    return load_fabric("cotton_twill")
+TWILL = load_fabric("cotton_twill")
 
 
 def queries(u, v, sigma, wi=(0.6, 0.0, 0.8), wo=(0.0, -0.28, 0.96)):
@@ -35,46 +26,43 @@ def queries(u, v, sigma, wi=(0.6, 0.0, 0.8), wo=(0.0, -0.28, 0.96)):
     return Queries.round(u, v, sigma, *directions)
 
 
-def test_decoder_stores_the_published_bytes(twill):
-    method = Woven(WovenNetwork(WovenOptions(one_blob="plain")))
-    assert method.bytes_stored(twill) == 4 * (86_660 + 64)  # 0.35 MB
+@pytest.mark.parametrize(("one_blob", "filters", "picture"), [("plain", 0, 0), ("local", 64 * 128, 64)])
+def test_decoder_stores_the_published_bytes(one_blob, filters, picture):
+    """0.35 MB with the latent; a picture costs its filters and itself."""
+    network = WovenNetwork(WovenOptions(one_blob=one_blob))
+    assert network.architecture()["parameters"]["decoder"] == 86_660 + filters
+    assert Woven(network).bytes_stored(TWILL) == 4 * (86_660 + filters + 64 + picture)
 
 
-def test_the_picture_costs_its_filters_and_itself(twill):
-    network = WovenNetwork(WovenOptions())
-    assert network.architecture()["parameters"]["decoder"] == 86_660 + 64 * 128
-    assert Woven(network).bytes_stored(twill) == 4 * (86_660 + 64 * 128 + 64 + 64)
-
-
-def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size(twill):
+def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
     """The decoder is handed u, v as shares and log2 of the size over its range: sigma = .4 of 4 yarns is .1 repeat."""
     network = WovenNetwork(SMALL.model_copy(update={"one_blob": "none", "standard": False}))
     handed = []
     network.decoder.register_forward_hook(lambda module, inputs, output: handed.append(inputs))
-    Woven(network).predict(twill, queries([5.0], [3.0], 0.4))
+    Woven(network).predict(TWILL, queries([5.0], [3.0], 0.4))
     size = math.log(0.1 / 0.005) / math.log(1.0 / 0.005)
     assert handed[0][1] is None
     assert handed[0][2].flatten().tolist() == pytest.approx([0.25, 0.75, size], abs=1e-6)
 
 
 @pytest.mark.parametrize("one_blob", ["none", "plain", "periodic", "local"])
-def test_training_sees_what_rendering_sees(one_blob, twill):
+def test_training_sees_what_rendering_sees(one_blob):
     """The loss against the network's own predictions is 0: training and inference place queries alike."""
     options = SMALL.model_copy(update={"one_blob": one_blob, "roll": False})
-    network = WovenNetwork(options, [load_fabric("denim"), twill])
+    network = WovenNetwork(options, [load_fabric("denim"), TWILL])
     network.start_at(torch.full((2, 4), 2.0))  # far from 0, where outputs would be clamped
-    asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 64)
-    answers = Woven(network).predict(twill, asked)
+    asked = draw_queries(QueryOptions(), TWILL.weave.repeat, 1, 0, 64)
+    answers = Woven(network).predict(TWILL, asked)
     columns = (*asked, answers, np.zeros(64, np.float32))
     batch = Batch(torch.tensor([1]), *(torch.from_numpy(column)[None] for column in columns))
     assert network.loss(batch, np.random.default_rng(0)).item() < 1e-10
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
-def test_mirror_images_are_answered_alike(symmetry, twill):
+def test_mirror_images_are_answered_alike(symmetry):
     """Standard position makes it exact, with any weights, for a cloth without symmetries of its own."""
     method = Woven(WovenNetwork(SMALL))
-    cloth = twill.model_copy(update={"draft": Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))})
+    cloth = TWILL.model_copy(update={"draft": Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))})
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
     image, there, one = image_of(symmetry, cloth, asked)
     expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
@@ -87,62 +75,56 @@ def other_yarns(fabric, name):
 
 
 @pytest.mark.parametrize("standard", [False, True])
-def test_between_two_fabrics_lie_both_at_its_ends(standard, twill):
+def test_between_two_fabrics_lie_both_at_its_ends(standard):
     """A 3/1 twill has one standard position whatever its yarns are, so that the second end is the second fabric too."""
     method = Woven(WovenNetwork(SMALL.model_copy(update={"standard": standard})))
-    second = other_yarns(twill, "satin_8")
-    asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 200)
-    one, other = method.predict(twill, asked), method.predict(second, asked)
+    second = other_yarns(TWILL, "satin_8")
+    asked = draw_queries(QueryOptions(), TWILL.weave.repeat, 1, 0, 200)
+    one, other = method.predict(TWILL, asked), method.predict(second, asked)
     assert np.abs(one - other).max() > 1e-3
     # Two fabrics at once are summed in another order than one: single precision.
-    np.testing.assert_allclose(method.predict_between(twill, second, 0.0, asked), one, rtol=1e-4, atol=1e-5)
-    np.testing.assert_allclose(method.predict_between(twill, second, 1.0, asked), other, rtol=1e-4, atol=1e-5)
+    for end, share, expected in ((second, 0.0, one), (second, 1.0, other), (TWILL, 0.3, one)):
+        between = method.predict_between(TWILL, end, share, asked)
+        np.testing.assert_allclose(between, expected, rtol=1e-4, atol=1e-5)
 
 
-def test_between_a_fabric_and_itself_is_nothing_else(twill):
-    method = Woven(WovenNetwork(SMALL))
-    asked = draw_queries(QueryOptions(), twill.weave.repeat, 1, 0, 50)
-    expected = method.predict(twill, asked)
-    np.testing.assert_allclose(method.predict_between(twill, twill, 0.3, asked), expected, rtol=1e-4, atol=1e-5)
-
-
-def test_fabrics_of_other_repeats_cannot_be_blended(twill):
+def test_fabrics_of_other_repeats_cannot_be_blended():
     method = Woven(WovenNetwork(SMALL))
     with pytest.raises(BadInput, match="the repeat of cotton_twill is needed, 4 x 4, to blend the two"):
-        method.predict_between(twill, load_fabric("satin_8"), 0.5, queries([0.5], [0.5], 0.1))
+        method.predict_between(TWILL, load_fabric("satin_8"), 0.5, queries([0.5], [0.5], 0.1))
 
 
-def test_a_colour_edit_needs_no_encoding_and_another_yarn_does(twill):
+def test_a_colour_edit_needs_no_encoding_and_another_yarn_does():
     network = WovenNetwork(SMALL)
     method, runs = Woven(network), []
     network.encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
-    method.prepare(twill)
-    method.prepare(twill.model_copy(update={"warp": twill.warp.model_copy(update={"diffuse": (0.1, 0.2, 0.3)})}))
+    method.prepare(TWILL)
+    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"diffuse": (0.1, 0.2, 0.3)})}))
     assert len(runs) == 1
-    method.prepare(twill.model_copy(update={"warp": twill.warp.model_copy(update={"roughness": 0.31})}))
+    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"roughness": 0.31})}))
     assert len(runs) == 2
 
 
-def test_large_footprints_see_no_place(twill):
+def test_large_footprints_see_no_place():
     """Far above one repeat, the `local` network answers the same wherever it is asked."""
-    answers = Woven(WovenNetwork(SMALL)).predict(twill, queries([0.1, 1.7, 3.2], [2.2, 0.4, 3.9], 50.0))
+    answers = Woven(WovenNetwork(SMALL)).predict(TWILL, queries([0.1, 1.7, 3.2], [2.2, 0.4, 3.9], 50.0))
     np.testing.assert_allclose(answers, np.broadcast_to(answers[:1], answers.shape), rtol=1e-5)
 
 
-def test_predictions_repeat_with_the_cloth(twill):
+def test_predictions_repeat_with_the_cloth():
     method = Woven(WovenNetwork(SMALL))
-    ends, picks = twill.weave.repeat
-    here = method.predict(twill, queries([0.25, 1.5], [0.75, 2.25], 0.3))
-    there = method.predict(twill, queries([0.25 + 64 * ends, 1.5 - ends], [0.75 - 32 * picks, 2.25 + picks], 0.3))
+    ends, picks = TWILL.weave.repeat
+    here = method.predict(TWILL, queries([0.25, 1.5], [0.75, 2.25], 0.3))
+    there = method.predict(TWILL, queries([0.25 + 64 * ends, 1.5 - ends], [0.75 - 32 * picks, 2.25 + picks], 0.3))
     np.testing.assert_allclose(there, here, atol=2e-6)
 
 
-def test_predictions_are_finite_and_not_negative_at_extremes(twill):
+def test_predictions_are_finite_and_not_negative_at_extremes():
     method = Woven(WovenNetwork(SMALL))
     grazing = (np.sin(np.radians(89.9)), 0.0, np.cos(np.radians(89.9)))
     u, v, sigma = (a.ravel() for a in np.meshgrid([0.0, 4.0, 1e6, -1e6], [0.0, -1e-30, 1e6], [1e-4, 1.0, 1e4]))
     for wi, wo in ((grazing, grazing), ((0, 0, 1), grazing), (grazing, (0, 0, 1))):
-        prediction = method.predict(twill, queries(u, v, sigma, wi, wo))
+        prediction = method.predict(TWILL, queries(u, v, sigma, wi, wo))
         assert prediction.shape == (len(u), 4)
         assert prediction.dtype == np.float32
         assert np.isfinite(prediction).all()

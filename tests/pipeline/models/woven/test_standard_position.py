@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.woven.standard_position import SYMMETRIES, Placement, moved, placement, standard
+from pipeline.models.woven.standard_position import SYMMETRIES, moved, placement, standard
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
+from tests.pipeline.models.images import image_of
 from tests.presets import PRESETS, slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
@@ -26,22 +26,6 @@ def fabric():
 def moved_vector(vector, symmetry):
     moved = vector * np.array([-1.0 if symmetry.mirror_x else 1.0, -1.0 if symmetry.mirror_y else 1.0, 1.0])
     return moved[..., [1, 0, 2]] if symmetry.exchange else moved
-
-
-def moved_queries(queries, mean, repeat, symmetry, start=(0.0, 0.0)):
-    """Send queries (N,) and answers through a `Placement` of one fabric."""
-    ends, picks = repeat
-    one = Placement(
-        torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
-        torch.tensor([[symmetry.exchange]]),
-        torch.tensor([start]),
-        torch.ones(1, 2),
-    )
-    columns = (torch.from_numpy(c)[None] for c in (queries.u / ends, queries.v / picks, queries.wi, queries.wo))
-    u, v, wi, wo = (column[0].numpy() for column in one.move(*columns))
-    ends, picks = (picks, ends) if symmetry.exchange else (ends, picks)
-    there = Queries.round(u * np.float32(ends), v * np.float32(picks), queries.sigma, wi, wo)
-    return there, one.swap(torch.from_numpy(mean)[None])[0].numpy()
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
@@ -73,8 +57,9 @@ def test_the_truth_moves_with_the_cloth(fabric, symmetry):
     options = TruthOptions(relative_error=0.02, min_count=256, max_count=1024)
     queries = draw_queries(QueryOptions(sigma=(0.1, 2.0), max_angle=75), fabric.weave.repeat, 5, 0, 48)
     here = estimate(fabric, queries, options, 1)
-    asked, expected = moved_queries(queries, here.mean, fabric.weave.repeat, symmetry)
-    there = estimate(moved(fabric, symmetry), asked, options, 2)
+    image, asked, one = image_of(symmetry, fabric, queries)
+    expected = one.swap(torch.from_numpy(here.mean)[None])[0].numpy()
+    there = estimate(image, asked, options, 2)
     order = [1, 0, 3, 2] if symmetry.exchange else [0, 1, 2, 3]
     error = np.hypot(there.standard_error, here.standard_error[:, order])
     assert (np.abs(there.mean - expected) <= 6 * error + 1e-6).all()

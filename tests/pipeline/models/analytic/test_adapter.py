@@ -1,0 +1,41 @@
+"""What all models that learn nothing have in common: the interface of methods, and queries that they refuse."""
+
+import numpy as np
+import pytest
+
+from pipeline.models.analytic.map_material import MapMaterialOptions
+from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.prefiltered import PrefilteredOptions
+from pipeline.models.analytic.soft_nodes import SoftNodesOptions
+from pipeline.models.analytic.summed_area import SummedAreaOptions
+from pipeline.models.method import Method
+from pipeline.models.registry import load_methods
+from pipeline.shards.queries import QueryOptions, draw_queries
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+DENIM = load_fabric("denim")
+BEHIND, BENT = ({"behind": 0.5}, "light from the viewer's side"), ({"curvature": (0.1, 0.5)}, "flat cloth")
+# 128 x 128 texels of 15 bytes, or 64 x 64 of 26 numbers, and all coarser ones.
+CASES = [
+    (MapMaterialOptions(size=128), "", sum(4**level for level in range(8)) * 15, [BENT]),
+    (PointSampledOptions(counts=[4], visibility="horizon"), "k = 4", None, [BEHIND]),
+    (PrefilteredOptions(), "", sum(4**level for level in range(7)) * 26 * 4, [BENT]),
+    (SoftNodesOptions(levels=[1]), "k = 1", None, []),
+    (SummedAreaOptions(clusters=[16]), "k = 16", None, [BEHIND, BENT]),
+]
+
+
+@pytest.mark.parametrize(("options", "setting", "size", "refused"), CASES, ids=lambda case: getattr(case, "model", ""))
+def test_it_is_a_method_of_its_own_kinds_of_queries(options, setting, size, refused):
+    (method,) = load_methods(options)
+    assert isinstance(method, Method) and method.covers(DENIM) and method.setting == setting
+    queries = draw_queries(QueryOptions(), DENIM.weave.repeat, 1, 0, 16)
+    answers = method.predict(DENIM, queries)
+    assert answers.shape == (16, 4) and answers.dtype == np.float32
+    assert method.bytes_stored(DENIM) == size if size else method.bytes_stored(DENIM) > 0
+    for kinds, says in refused:
+        with pytest.raises(BadInput, match=says):
+            method.predict(DENIM, draw_queries(QueryOptions(**kinds), DENIM.weave.repeat, 1, 0, 16))
+    with pytest.raises(BadInput, match="wo"):
+        method.predict(DENIM, queries._replace(wo=-queries.wo))
