@@ -128,14 +128,6 @@ def test_a_cylinders_curvature_is_eulers(turn, askew):
     np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * spacing / radius)
 
 
-def test_a_mesh_sphere_has_the_curvature_of_its_radius():
-    """Interpolated normals of a 320 by 320 mesh: 1 % allowed. The conformal spacing is 4 / (4 + u^2 + v^2) / 24."""
-    gbuffer = render(load(SHIPPED["sphere"], SCALAR), size=SIZE).gbuffers["silk_charmeuse"]
-    inner = gbuffer.wo[:, 2] > 0.1
-    square = (np.square(gbuffer.u) + np.square(gbuffer.v)) / 24**2
-    np.testing.assert_allclose(gbuffer.curvature[inner], 4 / (4 + square[inner]) / 24, rtol=0.01)
-
-
 def test_a_hollow_is_flat_and_so_is_the_back():
     def parts(mi):
         return {

@@ -40,3 +40,5 @@ def test_lights_add_up_over_what_is_seen_through(gbuffer):
     assert picture[0, 2] == pytest.approx(rgb[1] + 0.5 * background[0, 2])
     assert picture[1, 1] == pytest.approx(0.25 * background[1, 1])
     assert picture[~gbuffer.mask] == pytest.approx(background[~gbuffer.mask])
+    dark = compose(gbuffer, np.zeros((3, 3)), background=0.5)
+    assert dark.dtype == np.float32 and (dark[gbuffer.mask] == 0).all() and (dark[~gbuffer.mask] == 0.5).all()

@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.scenes.options import ViewOptions
-from pipeline.scenes.shade import colours, compose, shade
-from pipeline.scenes.views import view
+from pipeline.scenes.shade import colours, shade
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric, load_fabric
 
@@ -25,16 +23,6 @@ def test_shade_applies_each_colour_to_its_component():
     assert rgb.reshape(2, 4, 3) == pytest.approx(np.array(expected))
     assert np.array([colours(fabric), colours(fabric, transmitted=True)]) == pytest.approx(np.array(expected))
     assert fabric.warp.diffuse_rgb != fabric.weft.diffuse_rgb
-
-
-def test_compose_scales_by_the_irradiance_and_leaves_the_rest():
-    gbuffer = view("sphere", 40, 40, options=ViewOptions(irradiance=2.0, sphere_light=(75.0, 0.0)))
-    rgb = np.arange(3 * len(gbuffer.u), dtype=np.float64).reshape(-1, 3)
-    picture = compose(gbuffer, rgb, background=0.5)
-    assert picture.shape == (40, 40, 3) and picture.dtype == np.float32
-    assert picture[gbuffer.lit] == pytest.approx(2.0 * rgb)
-    assert (picture[gbuffer.mask & ~gbuffer.lit] == 0).all()
-    assert (picture[~gbuffer.mask] == 0.5).all()
 
 
 def test_footprints_of_a_check_take_the_colours_of_their_own_threads():

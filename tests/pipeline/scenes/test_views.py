@@ -29,9 +29,8 @@ def test_directions_are_unit_and_in_front(scene):
     for directions in (gbuffer.wi, gbuffer.wo):
         assert np.linalg.norm(directions, axis=1) == pytest.approx(1.0, abs=1e-12)
         assert (directions[:, 2] > 0).all()
-    assert (gbuffer.wo[:, 2] >= math.cos(math.radians(ViewOptions().largest_angle))).all()
-    assert (gbuffer.sigma > 0).all()
-    assert not (gbuffer.lit & ~gbuffer.mask).any()
+    assert gbuffer.wo[:, 2].min() >= math.cos(math.radians(ViewOptions().largest_angle))
+    assert (gbuffer.sigma > 0).all() and not (gbuffer.lit & ~gbuffer.mask).any()
 
 
 def test_the_centre_of_the_sphere():
@@ -118,13 +117,10 @@ def test_plane_ends_with_a_whole_row():
 @pytest.mark.parametrize("scene", ["sphere", "plane"])
 def test_frames_slide_the_cloth_by_less_than_a_pixel(scene):
     still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
-    slide = 2 * FLAT.step / 6
-    heading = math.radians(HEADING)
-    assert FLAT.step < 1
-    assert still.u - moved.u == pytest.approx(np.full(still.u.shape, slide * math.cos(heading)))
-    assert still.v - moved.v == pytest.approx(np.full(still.v.shape, slide * math.sin(heading)))
-    assert (still.lit == moved.lit).all()
-    assert (still.wi == moved.wi).all()
+    slide, heading = 2 * FLAT.step / 6, math.radians(HEADING)
+    np.testing.assert_allclose(still.u - moved.u, slide * math.cos(heading), rtol=1e-6)
+    np.testing.assert_allclose(still.v - moved.v, slide * math.sin(heading), rtol=1e-6)
+    assert FLAT.step < 1 and (still.lit == moved.lit).all() and (still.wi == moved.wi).all()
 
 
 def test_queries_are_reduced_in_float64_first():

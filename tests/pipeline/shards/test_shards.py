@@ -62,14 +62,17 @@ def test_a_shard_explains_itself(folder):
     assert {group.column(column).compression for column in range(group.num_columns)} == {"ZSTD"}
 
 
-def test_identity_follows_optics_and_not_colours():
-    def identity(**changes):
-        warp = TASK.fabric.warp.model_copy(update=changes)
-        return TASK.model_copy(update={"fabric": TASK.fabric.model_copy(update={"warp": warp})}).identity()
-
-    assert identity(diffuse="#112233") == TASK.identity()
-    assert identity(roughness=0.33) != TASK.identity()
-    assert TASK.model_copy(update={"start": 0}).identity() != TASK.identity()
+def test_identity_follows_optics_and_parameters_and_not_colours():
+    extra = [ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=8) for extra in EXTRA]
+    for task in (TASK, *extra):
+        dyed, rough = (
+            task.fabric.model_copy(update={"warp": task.fabric.warp.model_copy(update=change)})
+            for change in ({"diffuse": "#112233"}, {"roughness": 0.33})
+        )
+        assert task.model_copy(update={"fabric": dyed}).identity() == task.identity()
+        assert task.model_copy(update={"fabric": rough}).identity() != task.identity()
+        assert task.model_copy(update={"start": 1}).identity() != task.identity() and "version" in task.identity()
+    assert len({json.dumps(task.identity()) for task in extra}) == len({task.split for task in extra}) == 3
 
 
 def test_splits_and_fabrics_draw_different_queries(folder):
@@ -171,14 +174,6 @@ def test_damaged_extra_rows_are_named(folder):
     # One kind read as another is refused, never misread.
     misread = entry.model_copy(update={"kind": "components"})
     assert "must be schema version" in check_shard(folder, misread, manifest)[-1]
-
-
-def test_identity_of_extra_rows_follows_their_parameters():
-    tasks = [ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=8) for extra in EXTRA]
-    assert len({json.dumps(task.identity()) for task in tasks}) == len({task.split for task in tasks}) == 3
-    red = TASK.fabric.model_copy(update={"warp": TASK.fabric.warp.model_copy(update={"diffuse": "#ff0000"})})
-    assert tasks[0].model_copy(update={"fabric": red}).identity() == tasks[0].identity()
-    assert "version" in tasks[0].identity()
 
 
 def test_a_manifest_is_written_as_json_writes_it():
