@@ -1,6 +1,5 @@
 """The checks of `make lint` can fail."""
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +11,7 @@ from tests.lint.tree import ROOT, Source
 
 
 def source(text, module="pipeline.truth.made_up"):
-    return Source(Path(f"{module.rpartition('.')[2]}.py"), module, text, ast.parse(text))
+    return Source(Path(f"{module.rpartition('.')[2]}.py"), module, text)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The sources, each read and parsed once."""
+"""The sources, each read once, and parsed once when that is asked for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -23,19 +23,23 @@ class Source:
     path: Path
     module: str
     text: str
-    tree: ast.Module
 
     @classmethod
     def read(cls, path: Path) -> Source:
-        """Parse a file below the root."""
+        """Read a file below the root."""
         text = path.read_text(encoding="utf-8")
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        return cls(path, module, text, ast.parse(text))
+        return cls(path, module, text)
 
     @property
     def name(self) -> str:
         """Its path from the root."""
         return str(self.path.relative_to(ROOT))
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        """Its syntax tree."""
+        return ast.parse(self.text)
 
     @cached_property
     def nodes(self) -> list[ast.AST]:
@@ -117,8 +121,10 @@ def module_of(name: str) -> str:
     return next((m for n in range(len(parts), 0, -1) if (m := ".".join(parts[:n])) in MODULES), name)
 
 
-GRAPH = {m: {module_of(name) for name in source.imports} & MODULES.keys() - {m} for m, source in MODULES.items()}
-"""The modules that each one imports."""
+@cache
+def graph() -> dict[str, set[str]]:
+    """Return the modules that each one imports."""
+    return {m: {module_of(name) for name in source.imports} & MODULES.keys() - {m} for m, source in MODULES.items()}
 
 
 def reachable(starts: list[str]) -> set[str]:
@@ -128,5 +134,5 @@ def reachable(starts: list[str]) -> set[str]:
     while left:
         if (module := left.pop()) not in reached:
             reached.add(module)
-            left += GRAPH[module]
+            left += graph()[module]
     return reached
