@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -14,54 +13,12 @@ import psutil
 
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
+from tests.jobs.dask_processes import DaskProcesses, family
+from tests.jobs.small_recipes import write_smallest
 
 ROOT = Path(__file__).parents[2]
 START = "import sys; from jobs.entry import main; sys.exit(main())"
 TIMEOUT = 900.0  # the first run compiles
-RECIPE = """
-name = "faults"
-
-[dataset]
-seen = ["polyester_lining"]
-shard_rows = 256
-seed = 5
-
-[dataset.rows]
-train = 2048
-validation = 64
-test = 128
-
-[dataset.truth]
-estimator = "owen"
-relative_error = 0.2
-min_count = 64
-max_count = 512
-
-[[models]]
-model = "neumip"
-texels_per_yarn = 4
-[models.training]
-steps = 60
-batch = 64
-checkpoint_every = 10
-device = "cpu"
-
-[[models]]
-model = "point_sampled"
-counts = [2]
-
-[bench]
-sphere_size = [16, 16]
-plane_size = [16, 16]
-picture_counts = [2]
-frames = 3
-frame_size = [16, 16]
-rows = 64
-timing_rows = 64
-timing_repeats = 20
-latents = false
-truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 128 }
-"""
 
 
 class End(NamedTuple):
@@ -78,9 +35,9 @@ class End(NamedTuple):
 
 
 def write_recipe(folder):
-    path = folder / "faults.toml"
-    path.write_text(RECIPE, encoding="utf-8")
-    return path
+    dataset = {"seed": 5, "rows": {"train": 2048}, "truth": {"max_count": 512}}
+    training = {"steps": 60, "checkpoint_every": 10}
+    return write_smallest(folder, "faults", dataset, {"texels_per_yarn": 4, "training": training})
 
 
 def start(recipe, out, *arguments, verb="run", before=(), env=None):
@@ -131,33 +88,12 @@ def gone(processes, seconds=20.0):
     return psutil.wait_procs(processes, timeout=seconds)[1]
 
 
-def family(process):
-    """Return the processes that a run has started."""
-    try:
-        return psutil.Process(process.pid).children(recursive=True)
-    except psutil.NoSuchProcess:
-        return []
-
-
 @contextmanager
 def cluster(folder, number):
     """A scheduler and two workers of their own; yields the scheduler's process and its file."""
-    file = folder / f"scheduler-{number}.json"
-    base, local = [sys.executable, "-m"], ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    quiet = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-    scheduler = subprocess.Popen(
-        [*base, "distributed.cli.dask_scheduler", *local, "--scheduler-file", str(file)],
-        **quiet,
-    )
-    while not file.exists():
-        time.sleep(0.05)
-    worker = [*base, "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
-    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
-    try:
-        yield scheduler, file
-    finally:
-        for process in (*workers, scheduler):
-            children = family(process)
-            for one in (*children, process):
-                one.kill()
-            process.wait()
+    own = folder / f"scheduler-{number}"
+    own.mkdir()
+    with DaskProcesses(own) as dask:
+        for _ in range(2):
+            dask.add("--nanny")
+        yield dask.processes[0], dask.file

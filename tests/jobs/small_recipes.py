@@ -1,6 +1,7 @@
-"""Recipes at a hundredth of their rows, steps and pixels, with their own fabrics, models and estimators.
+"""The smallest recipe of every stage; and shipped ones at a hundredth of their rows, steps and pixels.
 
-Of a population the first 32 members are kept, of an unseen one the first 4, of several trainings two.
+These keep their fabrics, models and estimators. Of a population the first 32 members are kept, of an unseen one the
+first 4, of several trainings two.
 """
 
 import tomllib
@@ -17,6 +18,48 @@ SCALE = 100
 MOST_MEMBERS = 32
 MOST_UNSEEN = 4
 MOST_SEEDS = 2
+
+
+SMALLEST = """
+[dataset]
+seen = ["polyester_lining"]
+shard_rows = 256
+rows = { train = 256, validation = 64, test = 128 }
+truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 64 }
+
+[[models]]
+model = "neumip"
+texels_per_yarn = 2
+training = { steps = 4, batch = 64, checkpoint_every = 2, device = "cpu" }
+
+[[models]]
+model = "point_sampled"
+counts = [2]
+
+[bench]
+sphere_size = [16, 16]
+plane_size = [16, 16]
+picture_counts = [2]
+frames = 3
+frame_size = [16, 16]
+rows = 64
+timing_rows = 64
+timing_repeats = 20
+threads = [1]
+latents = false
+truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 128 }
+"""
+
+
+def write_smallest(folder, name, dataset=None, model=None):
+    """Write the smallest recipe with a name, and other values of the data set and the network; return its path."""
+    content = {"name": name} | tomllib.loads(SMALLEST)
+    for table, changes in ((content["dataset"], dataset), (content["models"][0], model)):
+        for key, value in (changes or {}).items():
+            table[key] = table.get(key, {}) | value if isinstance(value, dict) else value
+    path = folder / f"{name}.toml"
+    path.write_text(tomli_w.dumps(content), encoding="utf-8")
+    return path
 
 
 def write_small(name, folder):

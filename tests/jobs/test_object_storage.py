@@ -20,49 +20,9 @@ from pipeline import patience
 from pipeline.storage import place
 from tests.jobs import fake_stages
 from tests.jobs.s3_server import serving
+from tests.jobs.small_recipes import write_smallest
 
 pytestmark = pytest.mark.external  # an S3 server
-
-RECIPE = """
-name = "stored"
-[dataset]
-seen = ["polyester_lining"]
-shard_rows = 64
-[dataset.rows]
-train = 128
-validation = 64
-test = 64
-[dataset.truth]
-estimator = "owen"
-relative_error = 0.5
-min_count = 64
-max_count = 64
-[[models]]
-model = "neumip"
-texels_per_yarn = 2
-hidden = 8
-[models.training]
-steps = 4
-batch = 32
-checkpoint_every = 2
-device = "cpu"
-"""
-BENCH = """
-[[models]]
-model = "point_sampled"
-counts = [2]
-[bench]
-sphere_size = [16, 16]
-plane_size = [16, 16]
-picture_counts = [2]
-frames = 3
-frame_size = [16, 16]
-rows = 64
-timing_rows = 64
-timing_repeats = 20
-latents = false
-truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 128 }
-"""
 
 
 @pytest.fixture(scope="module")
@@ -91,15 +51,25 @@ def switch(server, monkeypatch, tmp_path):
     switch.set("")
 
 
+@pytest.fixture
+def recipe(tmp_path):
+    return small(tmp_path, "stored")
+
+
+def small(folder, name, seed=0):
+    """Write a recipe of four shards; return its path."""
+    dataset = {"seed": seed, "shard_rows": 64, "rows": {"train": 128, "test": 64}, "truth": {"relative_error": 0.5}}
+    return write_smallest(folder, name, dataset, {"hidden": 8, "training": {"batch": 32}})
+
+
 def hashes(out):
     files = [path for path in out.rglob("*") if path.is_file()]
     kept = [path for path in files if path.parent.name != "ledger"]  # receipts have times
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in kept}
 
 
-def test_a_storage_that_fails_for_a_while_has_the_shards_of_a_folder(switch, tmp_path, capsys):
-    recipe, address = tmp_path / "stored.toml", "s3://products/some/prefix"
-    recipe.write_text(RECIPE)
+def test_a_storage_that_fails_for_a_while_has_the_shards_of_a_folder(switch, tmp_path, capsys, recipe):
+    address = "s3://products/some/prefix"
     switch.set("fail", count=2)
     assert main(["generate", str(recipe), "--out", address, "--workers", "1"]) == 0, capsys.readouterr().err
     tasks = [task for task in plan(load_recipe(recipe)) if task.stage == "generate"]
@@ -116,10 +86,8 @@ def test_a_storage_that_fails_for_a_while_has_the_shards_of_a_folder(switch, tmp
 
 
 @pytest.mark.slow
-def test_generate_train_check_and_repair_leave_the_bytes_of_a_folder(switch, tmp_path, capsys, monkeypatch):
-    recipe, address = tmp_path / "stored.toml", "s3://products/whole"
-    recipe.write_text(RECIPE)
-    here = tmp_path / "out"
+def test_generate_train_check_and_repair_leave_the_bytes_of_a_folder(switch, tmp_path, capsys, monkeypatch, recipe):
+    here, address = tmp_path / "out", "s3://products/whole"
     for verb in ("generate", "train"):
         for out in (str(here), address):
             assert main([verb, str(recipe), "--out", out, "--workers", "1"]) == 0, capsys.readouterr().err
@@ -165,17 +133,15 @@ def test_a_query_file_and_its_answers_may_be_there(switch, tmp_path, capsys):
         ("s3://there-is-none/x", "bucket"),
     ],
 )
-def test_addresses_that_cannot_be_used(switch, tmp_path, capsys, address, sentence):
-    (tmp_path / "stored.toml").write_text(RECIPE)
-    assert main(["generate", str(tmp_path / "stored.toml"), "--out", address]) == 2
+def test_addresses_that_cannot_be_used(switch, recipe, capsys, address, sentence):
+    assert main(["generate", str(recipe), "--out", address]) == 2
     said = capsys.readouterr().err
     assert sentence in said and "hidden" not in said
 
 
-def test_refusals_are_bad_input_and_show_no_secret(switch, tmp_path, capsys):
-    (tmp_path / "stored.toml").write_text(RECIPE)
+def test_refusals_are_bad_input_and_show_no_secret(switch, recipe, capsys):
     switch.set("refuse")
-    assert main(["generate", str(tmp_path / "stored.toml"), "--out", "s3://products/refused"]) == 2
+    assert main(["generate", str(recipe), "--out", "s3://products/refused"]) == 2
     said = capsys.readouterr().err
     assert "credentials of the environment" in said
     assert "secret-of-the-tests" not in said and "key-of-the-tests" not in said
@@ -259,21 +225,19 @@ def test_verbs_that_need_a_folder_refuse_an_address(switch, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("verb", ["status", "plan", "check", "run"])
-def test_a_bucket_that_does_not_exist_is_bad_input(switch, tmp_path, capsys, verb):
-    (tmp_path / "stored.toml").write_text(RECIPE)
-    assert main([verb, str(tmp_path / "stored.toml"), "--out", "s3://there-is-none/x"]) == 2
+def test_a_bucket_that_does_not_exist_is_bad_input(switch, recipe, capsys, verb):
+    assert main([verb, str(recipe), "--out", "s3://there-is-none/x"]) == 2
     assert "an existing bucket is needed" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("verb", ["status", "plan", "check", "generate"])
-def test_a_storage_that_does_not_answer_ends_with_a_sentence(switch, tmp_path, capsys, monkeypatch, verb):
+def test_a_storage_that_does_not_answer_ends_with_a_sentence(switch, recipe, capsys, monkeypatch, verb):
     import fsspec
 
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     fsspec.get_filesystem_class("s3").clear_instance_cache()
     monkeypatch.setattr(patience, "UNREACHED_SECONDS", 0.5)
-    (tmp_path / "stored.toml").write_text(RECIPE)
-    assert main([verb, str(tmp_path / "stored.toml"), "--out", "s3://products/x"]) == 1
+    assert main([verb, str(recipe), "--out", "s3://products/x"]) == 1
     assert "the object storage cannot be reached" in capsys.readouterr().err
 
 
@@ -307,10 +271,7 @@ def after_first_receipt(switch, action):
 
 
 @pytest.mark.slow
-def test_a_run_waits_for_a_storage_that_fails_for_a_minute(switch, tmp_path, capsys):
-    recipe = tmp_path / "stored.toml"
-    recipe.write_text(RECIPE)
-
+def test_a_run_waits_for_a_storage_that_fails_for_a_minute(switch, recipe, capsys):
     def fail():
         switch.set("fail")
         time.sleep(60)
@@ -326,9 +287,8 @@ def test_a_run_waits_for_a_storage_that_fails_for_a_minute(switch, tmp_path, cap
 
 
 @pytest.mark.slow
-def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch, tmp_path, capsys, monkeypatch):
-    recipe, tokens = tmp_path / "stored.toml", ["--out", "s3://products/ends", "--workers", "1"]
-    recipe.write_text(RECIPE)
+def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch, recipe, capsys, monkeypatch):
+    tokens = ["--out", "s3://products/ends", "--workers", "1"]
     monkeypatch.setattr(patience, "MOST_SECONDS", 5.0)  # of the driver; workers would wait for ten minutes
     thread = after_first_receipt(switch, lambda: switch.set("fail"))
     assert main(["generate", str(recipe), *tokens]) == 1
@@ -344,9 +304,8 @@ def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch
 
 
 @pytest.mark.slow
-def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, capsys):
-    recipe, address = tmp_path / "stored.toml", "s3://products/run"
-    recipe.write_text(RECIPE + BENCH)
+def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, capsys, recipe):
+    address = "s3://products/run"
     assert main(["run", str(recipe), "--out", address, "--workers", "1"]) == 0, capsys.readouterr().err
     assert f"the page: {address}/report/stored/index.html" in capsys.readouterr().out
     for verb in ("check", "status", "plan", "bench", "report", "results"):
@@ -363,9 +322,8 @@ def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, capsys):
     assert main(["check", str(recipe), "--repair", "--out", address, "--workers", "1"]) == 0, capsys.readouterr().err
     assert weights.read_bytes() == whole[0] and picture.exists()
     # Another recipe needs none of it.
-    (tmp_path / "other.toml").write_text(RECIPE.replace("stored", "other").replace("[dataset]", "[dataset]\nseed = 9"))
     capsys.readouterr()
-    assert main(["prune", str(tmp_path / "other.toml"), "--delete", "--out", address]) == 0
+    assert main(["prune", str(small(tmp_path, "other", seed=9)), "--delete", "--out", address]) == 0
     assert "files removed" in capsys.readouterr().out
     left = [str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()]
     assert sorted(left) == ["ledger/lock", "report/stored/results.md"]

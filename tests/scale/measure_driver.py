@@ -20,8 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -35,8 +34,9 @@ from jobs.run.cluster import Scheduler
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
+from tests.jobs.dask_processes import DaskProcesses
 
-ROOT = Path(__file__).parents[2]
+PATH = os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)])
 
 RECIPE = """
 name = "many"
@@ -62,26 +62,6 @@ class ShortShard(Shard):
         for path in self.products:
             (out / path).parent.mkdir(parents=True, exist_ok=True)
             (out / path).write_text(self.id)
-
-
-@contextmanager
-def scheduler(folder: Path) -> Iterator[Scheduler]:
-    """Start a scheduler and two workers in processes of their own."""
-    file = folder / "scheduler.json"
-    path = os.pathsep.join([str(ROOT), str(Path(__file__).parent)])
-    common = {"env": os.environ | {"PYTHONPATH": path}, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "8"]
-    processes = [subprocess.Popen([*dask, "--scheduler-file", str(file), "--no-dashboard"], **common)]
-    try:
-        while not file.exists():
-            time.sleep(0.1)
-        processes += [subprocess.Popen([*worker, "--no-dashboard", "--no-nanny"], **common) for _ in range(2)]
-        yield Scheduler(str(file))
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
 
 
 def timed(count: int, function: Callable[[], object]) -> dict[str, float]:
@@ -127,7 +107,10 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
             connection = Scheduler()
             result["run"] = timed(count, run)
         else:
-            with scheduler(folder) as connection:
+            with DaskProcesses(folder) as dask:
+                for _ in range(2):
+                    dask.add("--nthreads", "8", PYTHONPATH=PATH)
+                connection = dask.given
                 result["run"] = timed(count, run)
         result["resume"] = timed(count, run)
     return result

@@ -28,19 +28,7 @@ from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 from pipeline.storage import place
 from tests.jobs.s3_server import serving
-
-RECIPE = """
-name = "many"
-[dataset]
-seen = ["denim"]
-shard_rows = 64
-[dataset.rows]
-train = {train}
-validation = 64
-test = 64
-[[models]]
-model = "woven"
-"""
+from tests.scale.measure_driver import RECIPE
 
 
 def fill(tasks: list[Shard], folder: Path, address: str) -> None:

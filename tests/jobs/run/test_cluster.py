@@ -11,13 +11,12 @@ import time
 import urllib.request
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from itertools import product
-from pathlib import Path
 from types import SimpleNamespace
 
 import distributed
 import psutil
 import pytest
-from distributed import Client, LocalCluster
+from distributed import LocalCluster
 from rich.console import Console
 
 from jobs.run import executor
@@ -25,56 +24,18 @@ from jobs.run.cluster import HERE, Scheduler, connected
 from jobs.run.crew import Crew
 from jobs.run.ledger import Ledger
 from tests.jobs import fake_stages as fake
+from tests.jobs.dask_processes import ENVIRONMENT, DaskProcesses
 from weaves.errors import BadInput, WorkFailed
 
 pytestmark = pytest.mark.external  # clusters of dask
 
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
 SHARDS = [fake.task(f"shard {index}", breaks=True) for index in range(3)]
-
-
-class Processes:
-    """A scheduler and its workers, each in a process of its own."""
-
-    def __init__(self, folder):
-        self.folder, self.file = folder, folder / "scheduler.json"
-        self.common = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
-        command = [*dask, "--scheduler-file", str(self.file), "--no-dashboard"]
-        self.processes = [subprocess.Popen(command, env=ENVIRONMENT, **self.common)]
-        deadline = time.monotonic() + 300
-        while not self.file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        self.given = Scheduler(str(self.file))
-
-    def add(self, preload="", **environment):
-        """Start a worker that lives in another folder; `preload` is code that it runs first."""
-        elsewhere = self.folder / f"worker-{len(self.processes)}"
-        elsewhere.mkdir()
-        worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(self.file)]
-        command = [*worker, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        if preload:
-            (elsewhere / "preload.py").write_text(preload)
-            command += ["--preload", str(elsewhere / "preload.py")]
-        self.processes.append(subprocess.Popen(command, cwd=elsewhere, env=ENVIRONMENT | environment, **self.common))
-
-    def wait_for(self, count):
-        """Wait until so many workers are there."""
-        with Client(scheduler_file=str(self.file)) as client:
-            client.wait_for_workers(count, timeout=300)
-
-    def close(self):
-        for process in self.processes:
-            process.kill()
-            process.wait()
 
 
 @pytest.fixture
 def processes(tmp_path):
-    found = Processes(tmp_path)
-    yield found
-    found.close()
+    with DaskProcesses(tmp_path) as started:
+        yield started
 
 
 @pytest.fixture
@@ -126,7 +87,7 @@ sys.modules["jobs"] = None
 
 def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, processes, shown):
     for preload in (OTHER_NUMBA, NO_PACKAGE):
-        processes.add(preload)
+        processes.add(preload=preload)
     processes.wait_for(2)
     refusal = r"worker tcp://127\.0\.0\.1:\d+ gets no task: it has "
     with pytest.raises(WorkFailed, match=rf"^every worker is refused; {refusal}"):
@@ -143,7 +104,7 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, pro
 
     def join(task):
         if len(before) == 2:  # the manifests were saved, and one task is done
-            processes.add(OTHER_NUMBA)
+            processes.add(preload=OTHER_NUMBA)
             processes.wait_for(2)
 
     before = fake.Heard(join)
