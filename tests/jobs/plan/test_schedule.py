@@ -7,26 +7,8 @@ import pytest
 
 from jobs.plan.ready import chains
 from jobs.plan.schedule import Estimate, Schedule, doublings
-from jobs.plan.task import Task
 from tests.jobs.fake_stages import FakeTraining, task
-
-
-class Step(Task):
-    stage: ClassVar = "generate"
-
-    name: int
-    after: tuple[str, ...] = ()
-
-    @property
-    def needs(self):
-        return self.after
-
-    def versions(self):
-        return {}
-
-
-class Alone(Step):
-    slots: ClassVar = "all"
+from tests.jobs.plan.test_ready import Alone, Step
 
 
 def of(tasks, seconds):
