@@ -3,6 +3,8 @@ from contextlib import nullcontext, suppress
 import pytest
 
 from jobs.cli import main
+from jobs.plan.plan import plan
+from jobs.recipe.load import load_recipe
 from jobs.run import executor
 from jobs.run.outcome import work
 
@@ -72,6 +74,7 @@ class Files:
     """A recipe and a fabric of its own in a folder; text may be exchanged before they are read."""
 
     recipe = RECIPE
+    plans = {}  # noqa: RUF012, of all tests: equal files are planned once
 
     def __init__(self, folder):
         self.folder = folder
@@ -88,6 +91,13 @@ class Files:
         assert self.text.count(old) + self.fabric.count(old) == 1, old
         self.text, self.fabric = self.text.replace(old, new), self.fabric.replace(old, new)
         return self
+
+    def plan(self):
+        """Return the tasks of the recipe, which nobody changes."""
+        key = self.text, self.fabric
+        if key not in self.plans:
+            self.plans[key] = plan(load_recipe(self.write()))
+        return self.plans[key]
 
 
 @pytest.fixture

@@ -5,14 +5,11 @@ import pytest
 
 import jobs.verbs.run
 import jobs.verbs.show
-from pipeline.fingerprint import file_sha256
-from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of, write_columns
+from pipeline.shards.manifest import Manifest
 from pipeline.truth import invariants
 from pipeline.truth.invariants import exact, worst
-from pipeline.truth.query import Answers
 from reports.images.exr import read_exr
+from tests.jobs import made_up
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
@@ -29,21 +26,9 @@ def test_help_lists_the_verbs_in_the_order_of_work(twillight):
     code, text, _ = twillight("--help")
     verbs = [line.split()[1] for line in text.splitlines() if line.startswith("│") and line.split()[1].isalpha()]
     order = [
-        "list",
-        "import",
-        "show",
-        "export",
-        "render",
-        "plan",
-        "generate",
-        "evaluate",
-        "check",
-        "train",
-        "bench",
-        "report",
-        "run",
+        *("list", "import", "show", "export", "render", "plan", "generate", "evaluate"),
+        *("check", "train", "bench", "report", "run", "status", "compare"),
     ]
-    order += ["status", "compare"]
     assert code == 0 and [verb for verb in verbs if verb in order] == order
 
 
@@ -98,28 +83,19 @@ def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code
         assert "twillight run quick" in crash.read_text() and "Traceback" in crash.read_text()
 
 
+RECIPE = """
+name = "made-up"
+dataset = { seen = ["denim"], rows = { train = 100, test = 100 } }
+models = [{ model = "point_sampled" }]
+"""
+
+
 @pytest.fixture
 def dataset(tmp_path):
     """A data set of one shard with made-up answers."""
-    folder = tmp_path / "data"
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 100)
-    answers = Answers.opaque(
-        np.ones((100, 4), np.float32), np.ones((100, 4), np.float32) / 100, np.full(100, 64, np.int32)
-    )
-    write_columns(folder / "part-a.parquet", "components", "denim", columns_of(queries, answers), {})
-    entry = ShardEntry(
-        file="part-a.parquet",
-        fabric="denim",
-        split="test",
-        start=0,
-        rows=100,
-        sha256=file_sha256(folder / "part-a.parquet"),
-    )
-    Manifest(
-        name="made up", fingerprint="0", roles={"seen": ["denim"]}, fabrics={"denim": fabric}, about={}, shards=[entry]
-    ).save(folder)
-    return folder
+    (tmp_path / "made-up.toml").write_text(RECIPE)
+    (task, *_) = made_up.finished(tmp_path / "made-up.toml", tmp_path / "out", ["generate"])
+    return (tmp_path / "out" / task.products[0]).parent
 
 
 def test_check_finds_a_sound_data_set_sound(twillight, dataset):
@@ -128,17 +104,17 @@ def test_check_finds_a_sound_data_set_sound(twillight, dataset):
 
 
 def test_no_shards_are_not_sound(twillight, dataset):
-    Manifest.load(dataset).without({"part-a.parquet"}).save(dataset)
+    Manifest.load(dataset).without({path.name for path in dataset.glob("*.parquet")}).save(dataset)
     code, text, told = twillight("check", str(dataset))
     assert code == 2 and "sound" not in text and "lists no shards" in told
 
 
 def test_check_tells_of_a_shard_cut_in_half(twillight, dataset):
-    shard = dataset / "part-a.parquet"
+    (shard,) = dataset.glob("*.parquet")
     shard.write_bytes(shard.read_bytes()[: shard.stat().st_size // 2])
     code, _, told = twillight("check", str(dataset))
     assert code == 2 and "Traceback" not in told
-    assert all("part-a.parquet" in line for line in told.splitlines()) and "whole" in told
+    assert all(shard.name in line for line in told.splitlines()) and "whole" in told
 
 
 def test_check_of_a_fabric_shows_its_invariants_and_fails_if_one_is_broken(twillight, tmp_path, monkeypatch):

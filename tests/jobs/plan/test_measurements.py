@@ -45,16 +45,11 @@ def test_a_measurement_is_read_back_from_its_own_dump(tasks):
         assert again.products == task.products and again.needs == task.needs
 
 
-def test_no_path_of_another_tasks_product_is_part_of_an_identity(tasks):
-    for task in tasks:
-        text = str(task.identity())
-        assert not any(folder in text for folder in ("models/", "records/", "datasets/")), task.title
-
-
-def test_what_a_measurement_needs_is_part_of_its_identity(tasks):
+def test_an_identity_has_what_a_measurement_needs_and_no_path(tasks):
     """Of the rows their ids; so no result outlives what it was made from."""
     for task in tasks:
         text = str(task.identity())
+        assert not any(folder in text for folder in ("models/", "records/", "datasets/")), task.title
         assert all(need in text for need in task.needs), task.title
 
 

@@ -12,11 +12,11 @@ def ids(tasks, stage, word=""):
 
 @pytest.fixture
 def tasks(files):
-    return plan(load_recipe(files.write()))
+    return files.plan()
 
 
 def edited(files, old, new):
-    return plan(load_recipe(files.exchange(old, new).write()))
+    return files.exchange(old, new).plan()
 
 
 def test_every_row_once_in_tasks_of_shard_rows(tasks):
@@ -35,7 +35,7 @@ SPLITS = {"train": 2500, "validation": 100, "test": 500}
 
 
 def test_plans_are_pure_and_in_order_of_need(files, tasks):
-    assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.path))]
+    assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.write()))]
     assert len({task.id for task in tasks}) == len(tasks)
     before = set()
     for task in tasks:
@@ -168,7 +168,7 @@ def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tas
 def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks):
     """One task a model, on test rows alone; all that is about the other fabrics is as it was, but for the data set."""
     unseen = '[dataset.unseen_population]\ncount = 2\nfamilies = ["irregular"]\n\n[dataset.queries]'
-    planned = plan(load_recipe(files.exchange("[dataset.queries]", unseen).write()))
+    planned = edited(files, "[dataset.queries]", unseen)
     added = [task for task in planned if getattr(task, "kind", "") == "errors on random fabrics"]
     assert [task.model.options.name for task in added] == ["woven", "point_sampled"]
     rows = [task for task in planned if getattr(task, "role", "") == "unseen_population"]

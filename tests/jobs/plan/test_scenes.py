@@ -1,4 +1,4 @@
-"""The tasks on scenes: what is made anew when what is measured on them changes."""
+"""What is made anew when a version is raised."""
 
 import pytest
 
@@ -17,29 +17,27 @@ def changed_by(version, path, monkeypatch):
     return [one.title for one, two in zip(before, after, strict=True) if one.id != two.id]
 
 
-def test_what_is_measured_on_scenes_has_a_version_of_its_own(files, monkeypatch):
-    path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
+@pytest.fixture
+def path(files):
+    more = 'bounds = true\nlive = { fabrics = ["denim"] }\nscenes = { names = ["sphere"] }'
+    return files.exchange("frames = 4", f"frames = 4\n{more}").write()
+
+
+def test_what_is_measured_on_scenes_has_a_version_of_its_own(path, monkeypatch):
     changed = changed_by("SCENE_BENCH", path, monkeypatch)
     assert "scene truth of sphere" in changed and "scene errors of point_sampled, sphere, k = 1" in changed
     assert all("scene" in title or "frame time" in title or title.startswith("page") for title in changed)
 
 
-def test_answers_of_the_fallback_have_a_version_of_their_own(files, monkeypatch):
-    path = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["sphere"] }').write()
+def test_answers_of_the_fallback_have_a_version_of_their_own(path, monkeypatch):
     changed = changed_by("FALLBACK", path, monkeypatch)
     expected = {"scene truth of sphere", "scene errors of point_sampled, sphere, k = 1", "frame time of sphere"}
     assert expected < set(changed) and "errors of point_sampled, denim" not in changed
 
 
-def test_a_live_page_has_the_version_of_its_scripts(files, monkeypatch):
-    path = files.exchange("frames = 4", 'frames = 4\nlive = { fabrics = ["denim"] }').write()
-    assert changed_by("VIEWER", path, monkeypatch)[0] == "live page of denim"
-
-
 @pytest.mark.parametrize(
     "version", ["BENCH", *(name for name in vars(versions) if name.isupper() and name != "MODELS")]
 )
-def test_every_version_changes_some_identity(files, monkeypatch, version):
-    more = 'bounds = true\nlive = { fabrics = ["denim"] }\nscenes = { names = ["sphere"] }'
-    path = files.exchange("frames = 4", f"frames = 4\n{more}").write()
-    assert changed_by(version, path, monkeypatch)
+def test_every_version_changes_some_identity(path, monkeypatch, version):
+    changed = changed_by(version, path, monkeypatch)
+    assert changed[0] == "live page of denim" if version == "VIEWER" else changed

@@ -6,9 +6,7 @@ from jobs.plan.measurements.fabrics import ErrorsBySize, OnFabric
 from jobs.plan.measurements.models import AtExtremes, Latents
 from jobs.plan.measurements.scenes import FrameTime, OnScene
 from jobs.plan.measurements.timing import TimeOfMethods
-from jobs.plan.plan import plan
 from jobs.plan.training import Training
-from jobs.recipe.load import load_recipe
 
 SEEDS = ('model = "woven"\nhidden = 32', 'model = "woven"\nhidden = 32\nseeds = 3')
 
@@ -17,13 +15,13 @@ SEEDS = ('model = "woven"\nhidden = 32', 'model = "woven"\nhidden = 32\nseeds = 
 def one(files):
     """The tasks of the recipe with one training of each model."""
     files.exchange("frames = 4", 'frames = 4\nruntimes = ["onnx"]\n[bench.scenes]\nnames = ["curtain", "drape"]')
-    return plan(load_recipe(files.write()))
+    return files.plan()
 
 
 @pytest.fixture
 def three(one, files):
     """The tasks of the recipe with three trainings of `woven`."""
-    return plan(load_recipe(files.exchange(*SEEDS).write()))
+    return files.exchange(*SEEDS).plan()
 
 
 def of(tasks, kind, name="woven"):
@@ -51,11 +49,11 @@ def test_more_seeds_add_trainings_and_change_none(one, three):
 
 def test_seeds_follow_that_of_the_training(one, files):
     files.exchange(*SEEDS).exchange("steps = 10", "steps = 10\nseed = 5")
-    assert list(of(plan(load_recipe(files.write())), Training)) == [5, 6, 7]
+    assert list(of(files.plan(), Training)) == [5, 6, 7]
 
 
 def test_each_training_of_one_material_has_every_seed(one, files):
-    tasks = plan(load_recipe(files.exchange('model = "neumip"', 'model = "neumip"\nseeds = 2').write()))
+    tasks = files.exchange('model = "neumip"', 'model = "neumip"\nseeds = 2').plan()
     found = of(tasks, Training, "neumip")
     assert {seed: [task.fabrics for task in same] for seed, same in found.items()} == {
         seed: [("denim",), ("own",), ("twill_4_4",)] for seed in (0, 1)
@@ -89,7 +87,7 @@ def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, thre
 
 
 def test_the_bound_is_measured_of_every_training(one, files):
-    tasks = plan(load_recipe(files.exchange(*SEEDS).exchange("frames = 4", "frames = 4\nbounds = true").write()))
+    tasks = files.exchange(*SEEDS).exchange("frames = 4", "frames = 4\nbounds = true").plan()
     assert {task.ways.bounds for same in of(tasks, OnFabric).values() for task in same} == {True}
 
 

@@ -145,15 +145,16 @@ def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, mon
     assert len({*pids.values()}) == 3
 
 
-@pytest.mark.parametrize("workers", [-3, 1025, 10**6])
-def test_an_impossible_number_of_workers_is_bad_input(tmp_path, plan, workers):
-    with pytest.raises(BadInput, match="--workers"):
-        fake.run(plan, tmp_path, workers=workers)
-
-
-def test_a_scheduler_that_does_not_answer_is_bad_input(tmp_path, plan):
-    with pytest.raises(BadInput, match="no dask scheduler answers"):
-        fake.run(plan, tmp_path, scheduler=Scheduler("nonsense://"))
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        *(({"workers": count}, "--workers") for count in (-3, 1025, 10**6)),
+        ({"scheduler": Scheduler("nonsense://")}, "no dask scheduler answers"),
+    ],
+)
+def test_a_number_of_workers_or_a_scheduler_that_cannot_be_used_is_bad_input(tmp_path, plan, options, words):
+    with pytest.raises(BadInput, match=words):
+        fake.run(plan, tmp_path, **options)
 
 
 @pytest.mark.external
