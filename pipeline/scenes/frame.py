@@ -27,7 +27,7 @@ from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, FilmWindow, Loaded
 from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted, unit
-from pipeline.scenes.rays import aovs_of, blocked, first_hits, off
+from pipeline.scenes.rays import aovs_of, first_hits, in_sight, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
 
@@ -122,12 +122,9 @@ def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats,
         direction, distance, irradiance = light.reach(places.position)
         wi = np.einsum("nij,nj->ni", places.frame, direction)
         facing = dot(places.outward, direction)
-        candidates = np.flatnonzero((wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6))
+        candidates = (wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6)
         start = places.position + (beside * np.sign(facing))[:, None] * places.outward
-        hidden = blocked(
-            loaded.mi, loaded.world, start[candidates], direction[candidates], distance[candidates] * (1.0 - 1e-4)
-        )
-        free = candidates[~hidden]
+        free = in_sight(loaded.mi, loaded.world, start, direction, distance, candidates)
         index.append(free)
         towards.append(wi[free])
         power.append(irradiance[free])
@@ -168,13 +165,11 @@ def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.N
     )
     viewer = camera.to_viewer(position)
     geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
-    total = np.zeros_like(position)
+    total, start = np.zeros_like(position), position + off(position)[:, None] * geometric
     for light in loaded.lights:
         direction, distance, irradiance = light.reach(position)
         cosine = np.maximum(dot(normal, direction), 0.0)
-        facing = np.flatnonzero((cosine > 0.0) & (dot(geometric, direction) > 0.0))
-        start = position[facing] + off(position[facing])[:, None] * geometric[facing]
-        free = facing[~blocked(mi, world, start, direction[facing], distance[facing] * (1.0 - 1e-4))]
+        free = in_sight(mi, world, start, direction, distance, (cosine > 0.0) & (dot(geometric, direction) > 0.0))
         total[free] += irradiance[free] * cosine[free, None]
     picture[mask] = albedo * total / math.pi
     return picture

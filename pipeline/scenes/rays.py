@@ -24,7 +24,15 @@ class FirstHits(NamedTuple):
     """Change of position with u, (N, 3)."""
 
 
-def blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
+def in_sight(
+    mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats, among: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.int64]:
+    """Return which rays `among` N, (N,), hit nothing nearer than `distance`, as indices."""
+    rays = np.flatnonzero(among)
+    return rays[~_blocked(mi, world, origin[rays], direction[rays], distance[rays] * (1.0 - 1e-4))]
+
+
+def _blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
     """Return which of N rays hit anything nearer than `distance` (inf: anything)."""
     if mi.variant().startswith("scalar") or not len(origin):
         # Points and vectors made here: Mitsuba takes longer to convert lists than to trace the ray.

@@ -97,9 +97,8 @@ def _read_twa(content: bytes, where: str) -> PatternData:
 
     text = _called(unpacked, where, "a TempoWeave draft")
     if len(text) > MOST_WIF_BYTES:
-        raise BadInput(
-            where, "", f"{WIF_FILE_NAME} has more than {MOST_WIF_BYTES:,} bytes", "at most so many are allowed"
-        )
+        large = f"{WIF_FILE_NAME} has more than {MOST_WIF_BYTES:,} bytes"
+        raise BadInput(where, "", large, "at most so many are allowed")
     return _read_wif(text, where)
 
 
@@ -119,10 +118,8 @@ def _read_dtx(content: bytes, where: str) -> PatternData:
     pattern = _called(lambda: read_dtx(io.StringIO(text), where), where, "a FiberWorks draft")
     for axis, threads in (("warp", "ends"), ("weft", "picks")):
         if f"{axis}_spacing" not in sections:
-            size = f"{dtx_reader.DefaultFiberSpacing:g} cm"
-            warnings.warn(
-                f"The file states no spacing of its {threads}: FiberWorks' default, {size}, is taken.", stacklevel=1
-            )
+            default = f"FiberWorks' default, {dtx_reader.DefaultFiberSpacing:g} cm, is taken"
+            warnings.warn(f"The file states no spacing of its {threads}: {default}.", stacklevel=1)
     return pattern
 
 

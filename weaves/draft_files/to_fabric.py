@@ -20,7 +20,6 @@ from weaves.draft_files.read import DraftFile, DraftThreads
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 from weaves.validation import validated
-from weaves.yarn import Yarn
 
 NARROWEST_YARN: Final = 0.05
 """Least width of a yarn, in yarn spacings."""
@@ -42,11 +41,7 @@ class Imported:
 
 
 def fabric_of(
-    draft: DraftFile,
-    like: Fabric,
-    name: str,
-    where: str,
-    given: Mapping[str, Mapping[str, float]],
+    draft: DraftFile, like: Fabric, name: str, where: str, given: Mapping[str, Mapping[str, float]]
 ) -> Imported:
     """Return the fabric of a draft file.
 
@@ -64,9 +59,9 @@ def fabric_of(
     if not woven.hangs_together():
         assumed.append("Some yarns lie loose on others, as in a double cloth: all are treated as one layer.")
     yarns = {}
-    for axis, threads, yarn in (("warp", draft.ends, like.warp), ("weft", draft.picks, like.weft)):
-        own = _width(axis, threads, yarn, like.name, given[axis], read, assumed)
-        yarns[axis] = yarn.model_dump(exclude={"width", "diffuse"}) | own | dict(given[axis])
+    for axis, threads in (("warp", draft.ends), ("weft", draft.picks)):
+        own = _width(axis, threads, like, given[axis], read, assumed)
+        yarns[axis] = getattr(like, axis).model_dump(exclude={"width", "diffuse"}) | own | dict(given[axis])
     colours = _colours(draft, like, yarns, where, read, assumed)
     size = None
     if draft.ends.per_cm and draft.picks.per_cm:
@@ -125,20 +120,14 @@ def _refuse_loose(matrix: Bools, where: str) -> None:
 
 
 def _width(
-    axis: str,
-    threads: DraftThreads,
-    yarn: Yarn,
-    like: str,
-    given: Mapping[str, float],
-    read: list[str],
-    assumed: list[str],
+    axis: str, threads: DraftThreads, like: Fabric, given: Mapping[str, float], read: list[str], assumed: list[str]
 ) -> dict[str, float]:
-    """Return the width of a yarn as the file states it, else that of `yarn`."""
-    title = axis.capitalize()
+    """Return the width of a yarn as the file states it, else that of `like`."""
+    title, yarn = axis.capitalize(), getattr(like, axis)
     if "width" in given:
         return {}
     if threads.width is None:
-        assumed.append(f"{title}: the file states no thickness; width {yarn.width:g} is that of {like}.")
+        assumed.append(f"{title}: the file states no thickness; width {yarn.width:g} is that of {like.name}.")
         return {"width": yarn.width}
     stated = round(threads.width, 4)
     width = min(max(stated, NARROWEST_YARN), 1.0)
@@ -151,12 +140,7 @@ def _width(
 
 
 def _colours(
-    draft: DraftFile,
-    like: Fabric,
-    yarns: Mapping[str, dict[str, Any]],
-    where: str,
-    read: list[str],
-    assumed: list[str],
+    draft: DraftFile, like: Fabric, yarns: dict[str, Any], where: str, read: list[str], assumed: list[str]
 ) -> dict[str, Any]:
     """Give each yarn its most frequent colour, and return the colour order; empty if each axis has one colour."""
     axes = (("warp", "ends", draft.ends.colours, like.warp), ("weft", "picks", draft.picks.colours, like.weft))
