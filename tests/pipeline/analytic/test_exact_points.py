@@ -10,6 +10,7 @@ from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
 from weaves.fabric import load_fabric
 
 EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
@@ -48,9 +49,7 @@ def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
 @pytest.mark.parametrize("theta", [0.0, 89.9])
 @pytest.mark.parametrize("roughness", [0.01, 1.0])
 def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
-    silk = load_fabric("silk_charmeuse")
-    yarns = {name: getattr(silk, name).model_copy(update={"roughness": roughness}) for name in ("warp", "weft")}
-    cloth = cloth_side(silk.model_copy(update=yarns), TruthOptions())
+    cloth = cloth_side(woven("silk_charmeuse", roughness=roughness), TruthOptions())
     for other in (0.0, 89.9):
         queries = _queries((theta, 13), (other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
         values = sample_points(cloth, queries, 1, 0)

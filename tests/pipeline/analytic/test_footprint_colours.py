@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from pipeline.analytic.footprint_colours import footprint_colours
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -78,6 +79,36 @@ def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
         found = footprint_colours(fabric, Queries.round(u, v, np.full(u.size, size), wi, wo))
         assert found.mean(axis=0) == pytest.approx(wide[0], abs=0.01)
     assert np.ptp(found, axis=0) == pytest.approx(np.zeros((4, 3)), abs=1e-4)
+
+
+@pytest.mark.parametrize("sigma", [0.03, 0.4, 1.5, 3.0])
+def test_stripes_have_the_mass_of_a_gaussian(sigma):
+    """Ends of two colours, three and two, in a footprint long along them: each end is seen half, whichever it is."""
+    fabric = coloured("polyester_lining", ends=[["red", 3], ["blue", 2]])
+    u, up = np.linspace(0.0, 10.0, 21), np.tile([0.0, 0.0, 1.0], (21, 1))
+    asked = Queries.round(u, np.zeros(21), np.full(21, sigma), -up, up)
+    found = footprint_colours(fabric, asked._replace(sigma_minor=np.full(21, 64.0, np.float32)))[:, 0]
+    first = 5.0 * np.arange(-8, 9)[:, None]
+    red = (norm.cdf(first + 3.0, u, sigma) - norm.cdf(first, u, sigma)).sum(axis=0)[:, None]
+    colours = fabric.thread_colours()[0].specular
+    np.testing.assert_allclose(found, red * colours[0] + (1.0 - red) * colours[3], atol=1e-4)
+    # The picks have one colour.
+    np.testing.assert_allclose(
+        footprint_colours(fabric, asked)[:, 1], np.tile(fabric.weft.specular_rgb, (21, 1)), atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
+    """The plain weave is its own half turn; ends and picks of two colours are not."""
+    fabric = coloured("voile", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    other = coloured("voile", ends=[["blue", 2], ["red", 3]], picks=[["red", 4], ["blue", 1]])
+    asked = queries(60, np.random.default_rng(2), 0.4, behind)
+    extent, signs = np.float32(fabric.repeat), np.float32([-1.0, -1.0, 1.0])
+    turned = asked._replace(u=extent[0] - asked.u, v=extent[1] - asked.v, wi=asked.wi * signs, wo=asked.wo * signs)
+    own, there = footprint_colours(fabric, asked), footprint_colours(other, turned)
+    assert np.ptp(own, axis=0)[[0, 1, 2 - behind, 3 - behind]].max() > 0.1
+    assert np.abs(own - there).max() < 0.05 and np.abs(own - there).mean() < 1e-3
 
 
 def test_light_from_behind_takes_the_transmission_colours():

@@ -1,3 +1,7 @@
+"""Rules against integrals in closed form, and the order in which they converge."""
+
+import math
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -44,3 +48,41 @@ def test_many_readings_damp_a_wave_as_a_gaussian_does():
     for wave in (0.5, 1.0, 2.0):
         expected = norm.expect(lambda z, wave=wave: np.cos(wave * z))
         assert np.cos(wave * places).mean() == pytest.approx(expected, abs=0.01)
+
+
+def test_a_rule_of_n_nodes_is_exact_to_degree_2n_minus_1_and_no_further():
+    for count in range(1, 7):
+        rule = gauss_rule(0.2, 0.9, count, 0.0)
+        errors = [
+            rule.weights @ rule.places**p - (0.9 ** (p + 1) - 0.2 ** (p + 1)) / (p + 1) for p in range(2 * count + 1)
+        ]
+        assert np.abs(errors[:-1]).max() < 1e-14 and abs(errors[-1]) > 1e-12
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.4])
+def test_rules_converge_faster_than_any_power(radius):
+    """On a Gaussian: each node more divides the error by two at least, however small it is already."""
+    counts = np.arange(2, 9)
+    rules = [gauss_rule(0.1, 0.9, int(n), radius) for n in counts]
+    exact = norm.cdf(0.9, 0.3, 0.25) - norm.cdf(0.1, 0.3, 0.25)
+    errors = [abs(rule.weights @ norm.pdf(rule.places, 0.3, 0.25) - exact) for rule in rules]
+    by_node = np.polyfit(counts, np.log(errors), 1)[0]
+    by_order = np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert by_node < -math.log(2.0) and by_order < -4.0, errors
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.5])
+def test_a_mirrored_extent_has_the_mirrored_rule(radius):
+    own, other = gauss_rule(0.1, 0.7, 5, radius), gauss_rule(0.3, 0.9, 5, radius)
+    for values, mirrored in ((own.places, other.places), (own.borders, other.borders), (own.shares, other.shares)):
+        np.testing.assert_allclose(1.0 - values[::-1], mirrored, atol=1e-14)
+    np.testing.assert_allclose(own.weights[::-1], other.weights, atol=1e-14)
+
+
+def test_readings_converge_to_the_gaussian():
+    """The error of a wave of length 2 pi deviations falls with their number, by order 1 nearly: tails are missing."""
+    counts = 2 ** np.arange(3, 8)
+    table = taps(128)
+    errors = [abs(np.cos(table[n, :n]).mean() - math.exp(-0.5)) for n in counts]
+    assert -1.5 < np.polyfit(np.log(counts), np.log(errors), 1)[0] < -0.7, errors
+    np.testing.assert_allclose(table[:, :1] + [[table[n, n - 1]] for n in range(129)], 0.0, atol=1e-12)

@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, answer, tabulate
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
 from weaves.fabric import load_fabric
 
 PER_YARN = 16
@@ -20,10 +21,7 @@ def unit(x, y):
 @pytest.mark.parametrize(("wi", "wo"), [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5))], ids=["apart", "near"])
 def test_a_texel_is_a_point(point_shares, wi, wo):
     """A tiny footprint at a texel's centre reads that texel alone."""
-    fabric = load_fabric("denim")
-    changes = {"relief": 1.2, "twist": 30.0}
-    yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
-    fabric = fabric.model_copy(update={**yarns, "optical_thickness": 0.4})
+    fabric = woven("denim", relief=1.2, twist=30.0).model_copy(update={"optical_thickness": 0.4})
     ends, picks = fabric.weave.repeat
     columns, rows = (1 << int(np.ceil(np.log2(extent * PER_YARN))) for extent in (ends, picks))
     x, y = np.meshgrid((np.arange(columns) + 0.5) * ends / columns, (np.arange(rows) + 0.5) * picks / rows)

@@ -63,6 +63,39 @@ def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
         assert abs((1.0 - turn) * table[low] + turn * table[high] - np.sin(angle + 0.3)) < 0.015
 
 
+def test_a_quarter_turn_is_a_quarter_of_the_azimuths():
+    """The diamond angle runs clockwise."""
+    for x, y in np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32):
+        low, high, turn = around(x, y)
+        low_turned, high_turned, turn_turned = around(y, -x)
+        assert ((low_turned - low) % AZIMUTHS, (high_turned - high) % AZIMUTHS) == (AZIMUTHS // 4, AZIMUTHS // 4)
+        assert turn_turned == pytest.approx(turn, abs=1e-5)
+
+
+def test_azimuths_even_in_the_angle_are_read_to_second_order():
+    """Linear interpolation: the error falls by four with twice the azimuths."""
+    t = np.arange(AZIMUTHS) * 4.0 / AZIMUTHS
+    y = np.where(t <= 2.0, 1.0 - t, t - 3.0)
+    angle = np.arctan2(y, np.where(t <= 2.0, 1.0, -1.0) * (1.0 - np.abs(y)))
+    counts, errors = [16, 32, 64, 128, 256], []
+    for count in counts:
+        even = np.sin(2.0 * np.pi * np.arange(count) / count + 0.3)[:, None]
+        errors.append(np.abs(from_even(even)[:, 0] - np.sin(angle + 0.3)).max())
+    assert -2.2 < np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.7, errors
+
+
+def test_what_two_directions_see_together_is_between_the_least_and_the_most_that_is_possible():
+    """Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything."""
+    random = np.random.default_rng(7)
+    for first, second, *xy in random.random((200, 6)).astype(np.float32):
+        ways = azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in xy))
+        both = seen_and_lit(first, second, *ways)
+        assert max(first + second - 1.0, 0.0) - 1e-6 <= both <= min(first, second) + 1e-6
+        assert both == pytest.approx(seen_and_lit(second, first, *ways), abs=1e-6)
+        assert seen_and_lit(first, np.float32(1.0), *ways) == pytest.approx(first, abs=1e-6)
+        assert azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in (*xy[2:], *xy[:2]))) == pytest.approx(ways, abs=1e-6)
+
+
 def test_no_azimuth_is_an_azimuth_too():
     low, _, turn = around(np.float32(0.0), np.float32(0.0))
     assert 0 <= low < AZIMUTHS and 0.0 <= turn <= 1.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.torus_frame import Angles, Fibre, bend, normal, tangent, turning
+from pipeline.analytic.torus_frame import Angles, Fibre, bend, normal, sigma, spread, tangent, turning
 from pipeline.truth.geometry.heightfield import (
     BEND_RADIUS,
     BETA,
@@ -19,16 +19,13 @@ from pipeline.truth.geometry.heightfield import (
     height_field,
     surface_at,
 )
-from weaves.fabric import load_fabric
+from pipeline.truth.scattering import slab
+from tests.pipeline.analytic.methods import woven
 
 
 @pytest.fixture(scope="module")
 def field():
-    fabric = load_fabric("cotton_twill")
-    changes = {"relief": 1.3, "twist": 25.0}
-    return height_field(
-        fabric.model_copy(update={key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")})
-    )
+    return height_field(woven("cotton_twill", relief=1.3, twist=25.0))
 
 
 @pytest.mark.parametrize(("kind", "rtol"), [(float, 1e-12), (np.float32, 2e-6)], ids=["float64", "float32"])
@@ -67,3 +64,59 @@ def test_turning_is_a_derivative(seed):
         (along(u, v + step)[0] - along(u, v - step)[0]) / (2 * step),
     ]
     np.testing.assert_allclose(along(u, v)[1], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_frames_are_those_of_the_surface_by_differentiation(seed):
+    """Points of a torus of R = 2.1, r = .4 stretched by beta; fibres wind about the yarn at the angle of the twist."""
+    v, u, twist, relief = np.random.default_rng(seed).uniform(-0.9, 0.9, 4).tolist()
+    radius, bend_radius, beta, step = 0.4, 2.1, 1.0 + 0.5 * relief, 1e-5
+
+    def point(u, v):
+        ring = bend_radius + radius * math.cos(v)
+        return np.array([radius * math.sin(v), ring * math.sin(u), beta * ring * math.cos(u)])
+
+    def derivative(du, dv):
+        return (point(u + step * du, v + step * dv) - point(u - step * du, v - step * dv)) / (2 * step)
+
+    along, across = derivative(1.0, 0.0), derivative(0.0, 1.0)
+    place = float(point(u, v)[1])
+    angles, curvature = bend(math.sin(v), math.cos(v), radius, place, 1.0 / bend_radius, 0.999)
+    assert (angles.sin_u, angles.cos_u) == pytest.approx((math.sin(u), math.cos(u)), abs=1e-12)
+    assert curvature == pytest.approx(1.0 / (bend_radius + radius * math.cos(v)))
+    outward = np.cross(across, along)
+    np.testing.assert_allclose(normal(angles, beta), outward / np.linalg.norm(outward), atol=1e-9)
+    # Equal lengths along and across, as on the yarn before it is stretched and bent.
+    fibre = math.cos(twist) * along * curvature - math.sin(twist) * across / radius
+    t = tangent(angles, Fibre(math.sin(twist), math.cos(twist), beta))
+    np.testing.assert_allclose(t[:3], fibre / np.linalg.norm(fibre), atol=1e-9)
+    assert t.inverse == pytest.approx(1.0 / np.linalg.norm(fibre), rel=1e-9)
+    assert np.dot(normal(angles, beta), t[:3]) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(("sine", "expected"), [(0.2, 0.2), (5.0, 0.999), (-5.0, -0.999)])
+def test_a_float_ends_at_its_steepest_place(sine, expected):
+    angles, _ = bend(0.0, 1.0, 0.4, sine * 2.5, 1.0 / 2.1, 0.999)
+    assert angles.sin_u == pytest.approx(expected) and math.hypot(angles.sin_u, angles.cos_u) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])
+def test_flakes_by_cosines_are_those_by_cross_products(alpha):
+    """Away from the fibre's axis, to the digits that a difference from 1 leaves; and D(h) has its projected area.
+
+    The integral of D(h) <w.h> over all h is sigma(w), by midpoints that err by their squared step.
+    """
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        i, o, t = (w / np.linalg.norm(w) for w in random.normal(size=(3, 3)))
+        square, size = alpha**2, 1.0 / float((i + o) @ (i + o))
+        assert sigma(float(i @ t), square) == pytest.approx(slab.sigma(*i, *t, alpha), rel=1e-6)
+        q = spread(float((i + o) @ t), size, square)
+        assert alpha**3 / (math.pi * q) == pytest.approx(slab.density(*(i + o), *t, alpha), rel=1e-5)
+    polar, azimuth = (np.arange(400) + 0.5) / 400 * math.pi, (np.arange(400) + 0.5) / 200 * math.pi
+    z, x = np.cos(polar)[:, None], np.sin(polar)[:, None] * np.cos(azimuth)
+    w = (math.sin(0.7), 0.0, math.cos(0.7))  # the axis is z
+    cosine = np.maximum(w[0] * x + w[2] * z, 0.0)
+    q = alpha**2 + (1.0 - alpha**2) * z**2
+    area = (alpha**3 / (math.pi * q**2) * cosine * np.sin(polar)[:, None]).sum() * 2.0 * math.pi**2 / 400**2
+    assert sigma(w[2], alpha**2) == pytest.approx(area, rel=2e-3)

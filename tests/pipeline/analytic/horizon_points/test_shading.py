@@ -21,7 +21,7 @@ from pipeline.analytic.horizon_points.horizon_map import (
 )
 from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade, uncover
 from pipeline.truth.geometry.heightfield import height_field
-from weaves.fabric import load_fabric
+from tests.pipeline.analytic.methods import woven
 
 COUNT = 1500
 
@@ -30,9 +30,7 @@ RTOL = 1e-4
 
 
 def cloth(name, **changes):
-    fabric = load_fabric(name)
-    yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
-    return fabric.model_copy(update={**yarns, "optical_thickness": 0.4})
+    return woven(name, **changes).model_copy(update={"optical_thickness": 0.4})
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,21 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance.mixture import sample_flake_scatter
+from pipeline.analytic.importance.lobes import (
+    FLAKE_ROWS,
+    POINT_ROWS,
+    SHARE,
+    STRAIGHT,
+    Lobes,
+    find_rows,
+    point_places,
+)
+from pipeline.analytic.importance.mixture import density_rows, draw_rows, sample_flake_scatter
+from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.sequences import independent_pair
 from pipeline.truth.scattering.slab import density, sigma
+from tests.pipeline.analytic.methods import woven
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
 ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell
@@ -166,3 +177,49 @@ def test_first_number_0_mirrors_in_the_axis_and_round_flakes_need_no_tangent():
     w, t = PAIRS["tilted"]
     assert sample_flake_scatter(*w, *t, 1.0, 0.0, 0.3) == pytest.approx(w, abs=1e-15)
     assert np.dot(sample_flake_scatter(*w, *t, 1.0, 0.5, 0.3), w) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.4, 8.0])
+def test_the_mixture_of_a_footprint_has_its_mass_and_its_samples(sigma):
+    """Probabilities add up to 1, the density to what does not go straight through; samples fall on both sides by it.
+
+    Midpoints on a sphere of 200 by 400 integrate lobes of alpha = .3 to 1e-3. Shares of 20,000 samples of each of eight
+    looks lie within the range that binomial counts leave with chance 1 - LEVEL, all together.
+    """
+    fabric, rng, looks, count = woven("voile", roughness=0.3, twist=20.0), np.random.default_rng(5), 8, 20_000
+    places, size = rng.random((looks, 2)) * 2.0, np.full(looks, sigma, np.float32)
+    wo = rng.normal(size=(looks, 3))
+    wo[:, 2] = np.abs(wo[:, 2]) + 0.3
+    wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
+    lobes = Lobes(np.empty((looks, FLAKE_ROWS, 10), np.float32), np.empty((looks, STRAIGHT + 1), np.float32))
+    u, v = (np.ascontiguousarray(axis, np.float32) for axis in places.T)
+    scratch = np.empty((POINT_ROWS, 8), np.float32)
+    footprints = (u, v, size, size, np.zeros_like(size))
+    find_rows(tabulate_surface(fabric), footprints, wo, point_places(8), np.float32(2.0), scratch, lobes)
+    np.testing.assert_allclose(lobes.flakes[:, SHARE].sum(axis=1) + lobes.rest.sum(axis=1), 1.0, atol=1e-5)
+
+    polar, azimuth = (np.arange(200) + 0.5) / 200 * math.pi, (np.arange(400) + 0.5) / 200 * math.pi
+    sphere = np.stack(
+        [axis.ravel() for axis in np.broadcast_arrays(
+            np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
+        )], axis=1,
+    ).astype(np.float32)  # fmt: skip
+    area = np.repeat(np.sin(polar), 400) * 2.0 * math.pi**2 / (200 * 400)
+    least = 1.0 - (1.0 - LEVEL) ** (1.0 / (3 * looks * 2))
+    for look in range(looks):
+        own = Lobes(*(np.repeat(part[look : look + 1], len(sphere), axis=0) for part in lobes))
+        pdf = np.empty(len(sphere), np.float32)
+        density_rows(own, sphere, np.repeat(wo[look : look + 1], len(sphere), axis=0), pdf)
+        mass = pdf * area
+        straight = float(lobes.rest[look, STRAIGHT])
+        assert mass.sum() == pytest.approx(1.0 - straight, abs=1e-3)
+        own, towards = Lobes(*(part[:count] for part in own)), np.repeat(wo[look : look + 1], count, axis=0)
+        wi, drawn, through = np.empty((count, 3), np.float32), np.empty(count, np.float32), np.empty(count, np.bool_)
+        draw_rows(own, towards, rng.random((count, 3)), wi, drawn, through)
+        again = np.empty(count, np.float32)
+        density_rows(own, wi, towards, again)
+        np.testing.assert_allclose(drawn[~through], again[~through], rtol=1e-5)
+        assert (wi[through] == -wo[look]).all()
+        shares = {straight: through, mass[sphere[:, 2] > 0.0].sum(): ~through & (wi[:, 2] > 0.0)}
+        for share, members in shares.items():
+            assert stats.binomtest(int(members.sum()), count, min(float(share), 1.0)).pvalue > least

@@ -16,18 +16,12 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
 from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
-
-
-def cloth(name, **changes):
-    fabric = load_fabric(name)
-    return fabric.model_copy(
-        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
-    )
 
 
 def bare(table, queries):
@@ -57,11 +51,11 @@ def test_without_shadows_they_are_quadrature(name, bound, sigma):
 
 
 CASES = {
-    "plain": (cloth("polyester_lining"), (0.08, 0.025, 0.025)),
-    "twill": (cloth("cotton_twill"), (0.15, 0.03, 0.025)),
-    "satin": (cloth("silk_charmeuse"), (0.25, 0.05, 0.03)),
-    "plain with gaps": (cloth("polyester_lining", width=0.7), (0.08, 0.025, 0.025)),
-    "twill with gaps": (cloth("cotton_twill", width=0.8), (0.15, 0.04, 0.025)),
+    "plain": (woven("polyester_lining"), (0.08, 0.025, 0.025)),
+    "twill": (woven("cotton_twill"), (0.15, 0.03, 0.025)),
+    "satin": (woven("silk_charmeuse"), (0.25, 0.05, 0.03)),
+    "plain with gaps": (woven("polyester_lining", width=0.7), (0.08, 0.025, 0.025)),
+    "twill with gaps": (woven("cotton_twill", width=0.8), (0.15, 0.04, 0.025)),
     "gauze": (load_fabric("gauze"), (0.15, 0.04, 0.025)),
 }
 
@@ -149,7 +143,7 @@ def test_translation_by_repeats_changes_nothing():
 
 @pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
 def test_extremes_stay_finite_and_not_negative(width):
-    fabric = cloth("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
+    fabric = woven("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
     table = tabulate(fabric)
     angles = np.radians([0.0, 60.0, 89.0, 89.9])
     sizes = np.float32([1e-3, 0.1, 0.249, 0.251, 0.7, 3.0, 1e4])
@@ -170,7 +164,7 @@ def test_irregular_drafts_of_many_floats(side):
     """Merged groups: wide footprints within 4 %."""
     random = np.random.default_rng(side)
     rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
-    fabric = cloth("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
+    fabric = woven("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
     truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
     assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.04
@@ -205,7 +199,7 @@ def test_light_and_viewer_change_places(sigma, stretch):
 
     Placed nodes do not depend on the directions either, so that only the order of float32 sums differs.
     """
-    fabric = cloth("cotton_twill", blend=1.0)
+    fabric = woven("cotton_twill", blend=1.0)
     queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=70.0), fabric.weave.repeat, 5, 0, 60)
     table = tabulate(fabric)
     there, _ = query_sums(table, queries)
@@ -216,22 +210,6 @@ def test_light_and_viewer_change_places(sigma, stretch):
     assert not np.allclose(
         back[:, :, AREA], there[:, :, AREA], rtol=1e-2
     )  # the shares of the area differ: no empty test
-
-
-@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
-def test_the_mirrored_cloth_answers_mirrored_queries(sigma, stretch):
-    """x -> -x turns the draft and the sense of the twists; ends keep their family."""
-    fabric = cloth("cotton_twill", twist=20.0)
-    ends, _ = fabric.weave.repeat
-    mirrored = cloth("cotton_twill", twist=-20.0)
-    rows = [row[::-1] for row in fabric.weave.rows()]
-    mirrored = mirrored.model_copy(update={"draft": Matrix(rows=rows)})
-    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=70.0), fabric.weave.repeat, 7, 0, 60)
-    flip = np.float32([-1.0, 1.0, 1.0])
-    other = queries._replace(u=ends - queries.u, wi=queries.wi * flip, wo=queries.wo * flip, angle=-queries.angle)
-    first, second = read_queries(tabulate(fabric), queries), read_queries(tabulate(mirrored), other)
-    error = np.abs(first.components - second.components).max(axis=0)
-    assert (error < 0.01 * first.components.max(axis=0)).all(), error
 
 
 @pytest.mark.parametrize("sigma", SIZES.values(), ids=SIZES)

@@ -8,7 +8,6 @@ import pytest
 from pipeline.analytic.soft_nodes.features import (
     EXCHANGED,
     EXCHANGED_SIGN,
-    FEATURES,
     OF_QUERY,
     cloth_features,
     read_behind,
@@ -18,8 +17,9 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.analytic.methods import soft_table
 from tests.presets import slow
-from weaves.draft import Matrix
+from weaves.draft import Draft, Matrix
 from weaves.fabric import load_fabric
 
 SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}
@@ -36,12 +36,39 @@ def lopsided():
 
 @pytest.fixture(scope="module")
 def table(lopsided):
-    return tabulate(lopsided)
+    return soft_table(lopsided)
 
 
-def test_exchanging_twice_changes_nothing():
-    np.testing.assert_array_equal(EXCHANGED[EXCHANGED], np.arange(FEATURES))
-    np.testing.assert_array_equal(EXCHANGED_SIGN[EXCHANGED] * EXCHANGED_SIGN, 1.0)
+def test_exchanging_warp_and_weft_permutes_the_features(lopsided, table):
+    """Against the cloth with its draft transposed, its yarns exchanged and its twists reversed."""
+    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), lopsided.weave.repeat, 5, 0, 150)
+    warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (lopsided.weft, lopsided.warp))
+    rows = tuple(Draft(~lopsided.weave.warp_over.T).rows())
+    other = lopsided.model_copy(update={"draft": Matrix(rows=rows), "warp": warp, "weft": weft})
+    order = [1, 0, 2]
+    there = queries._replace(u=queries.v, v=queries.u, wi=queries.wi[:, order], wo=queries.wo[:, order])
+    own, transposed = read_queries(table, queries).features, read_queries(soft_table(other), there).features
+    difference = np.abs(EXCHANGED_SIGN * own[:, EXCHANGED] - transposed)
+    # A node on the border of two cells of a grid may read either.
+    assert difference.max() < 0.05 and difference.mean() < 1e-4
+    assert np.abs(own[:, EXCHANGED] - transposed)[:, 28:30].min() > 0.1
+
+
+@pytest.mark.parametrize(("x", "y"), [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+def test_a_mirrored_cloth_has_the_features_of_mirrored_queries(lopsided, table, x, y):
+    """Except for the sense of the twists, which is that of the mirrored yarns, as the half vector sees it."""
+    ends, picks = lopsided.weave.repeat
+    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), (ends, picks), 5, 0, 150)
+    warp, weft = (yarn.model_copy(update={"twist": x * y * yarn.twist}) for yarn in (lopsided.warp, lopsided.weft))
+    over = lopsided.weave.warp_over[:: int(y), :: int(x)]
+    mirrored = lopsided.model_copy(update={"draft": Matrix(rows=tuple(Draft(over).rows())), "warp": warp, "weft": weft})
+    signs = np.float32([x, y, 1.0])
+    there = queries._replace(
+        u=queries.u if x > 0 else ends - queries.u, v=queries.v if y > 0 else picks - queries.v,
+        wi=queries.wi * signs, wo=queries.wo * signs,
+    )  # fmt: skip
+    difference = np.abs(read_queries(table, queries).features - read_queries(soft_table(mirrored), there).features)
+    assert difference.max() < 0.05 and difference.mean() < 1e-4
 
 
 def test_the_last_features_are_the_cloths_own(lopsided, table):

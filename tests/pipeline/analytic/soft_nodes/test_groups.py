@@ -9,6 +9,7 @@ from pipeline.analytic.gauss_rules import gauss_rule
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL, gather, piece_rows
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, height_field, surface_at
 from pipeline.truth.geometry.pieces import cell_pieces
+from tests.pipeline.analytic.methods import woven
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
@@ -52,11 +53,7 @@ def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
 
 
 def cloth(name, width):
-    fabric = load_fabric(name)
-    changes = {"width": width, "relief": 1.3, "twist": 25.0}
-    return fabric.model_copy(
-        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
-    )
+    return woven(name, width=width, relief=1.3, twist=25.0)
 
 
 def from_fabric(family, vector):

@@ -3,16 +3,14 @@ import pytest
 
 from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, tabulate
 from pipeline.compiled.arrays import nbytes
-from weaves.draft import Matrix
+from tests.pipeline.analytic.methods import woven
 from weaves.fabric import load_fabric
 
 
 def irregular(side, width):
     random = np.random.default_rng(4)
     rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
-    fabric = load_fabric("polyester_lining")
-    yarns = {key: getattr(fabric, key).model_copy(update={"width": width}) for key in ("warp", "weft")}
-    return fabric.model_copy(update={"draft": Matrix(rows=rows), **yarns})
+    return woven("polyester_lining", rows, width=width)
 
 
 @pytest.mark.parametrize(

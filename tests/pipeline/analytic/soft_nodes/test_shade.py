@@ -25,7 +25,7 @@ from pipeline.analytic.soft_nodes.shade import (
 )
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
 from pipeline.truth.scattering import slab
-from weaves.fabric import load_fabric
+from tests.pipeline.analytic.methods import woven
 
 DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5), (0.2, -0.3))]
 
@@ -40,10 +40,7 @@ def unit(x, y):
 
 @pytest.fixture(scope="module")
 def fabric():
-    fabric = load_fabric("denim")
-    changes = {"relief": 1.2, "twist": 30.0}
-    yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
-    return fabric.model_copy(update={**yarns, "optical_thickness": 0.4})
+    return woven("denim", relief=1.2, twist=30.0).model_copy(update={"optical_thickness": 0.4})
 
 
 @pytest.fixture(scope="module")

@@ -1,3 +1,7 @@
+"""Answers of tables against the truth: how far off, by how much less with more of them, and what must not matter."""
+
+from functools import lru_cache
+
 import numpy as np
 import pytest
 
@@ -22,20 +26,38 @@ def rmse(found, truth):
     return np.sqrt(np.mean(((found - truth) @ COLOUR) ** 2)) / np.mean(truth @ COLOUR)
 
 
-@pytest.mark.parametrize(("sigma", "bound"), [((0.25, 0.8), 0.05), ((0.8, 8.0), 0.035)])
+@lru_cache
+def asked(sigma):
+    """Return queries of a range of sizes, and the truth."""
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 3, 0, 200)
+    return queries, estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+
+
+NARROW, MIDDLE, WIDE = (0.1, 0.4), (0.25, 0.8), (0.8, 8.0)
+
+
+@pytest.mark.parametrize(("sigma", "bound"), [(MIDDLE, 0.05), (WIDE, 0.035)])
 def test_errors_are_a_few_per_cent(denim, sigma, bound):
     """RMSE of the colour over its mean, twice that of random cloths (reports/LOG.md)."""
-    fabric, tables = denim
-    queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 3, 0, 300)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
-    assert rmse(answer(tables, queries), truth) < bound
+    queries, truth = asked(sigma)
+    assert rmse(answer(denim[1], queries), truth) < bound
 
 
 def test_more_clusters_err_less(denim):
     fabric, tables = denim
-    queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 3, 0, 300)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+    queries, truth = asked(WIDE)
     assert rmse(answer(tables, queries), truth) < 0.8 * rmse(answer(tabulate(fabric, 16), queries), truth)
+
+
+def test_narrow_footprints_converge_with_the_texels_of_the_finest_level(monkeypatch, denim):
+    """A footprint narrower than those of the table is answered wider: order 1 at least, until clusters err more."""
+    queries, truth = asked(NARROW)
+    texels, errors = [2, 4, 8], []
+    for count in texels:
+        monkeypatch.setattr("pipeline.analytic.summed_area.tables._finest", lambda cells, count=count: count)
+        errors.append(rmse(answer(tabulate(denim[0], 64), queries), truth))
+    assert -np.polyfit(np.log(texels), np.log(errors), 1)[0] > 1.0, errors
 
 
 def test_the_repeat_repeats(denim):

@@ -1,0 +1,69 @@
+"""All methods that learn nothing, as functions of a cloth and queries, and the cloths on which they are compared."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from pipeline.analytic import exact_points, prefiltered
+from pipeline.analytic.horizon_points import sampler
+from pipeline.analytic.soft_nodes import features, nodes
+from pipeline.analytic.summed_area import answer, tables
+from pipeline.truth.cloth import cloth_side
+from pipeline.truth.options import TruthOptions
+from weaves.draft import Matrix
+from weaves.fabric import load_fabric
+
+
+def woven(name, rows=None, warp=(), weft=(), **changes):
+    """Return a preset with another draft and with other numbers of its yarns, `changes` of both families."""
+    fabric, own = load_fabric(name), {"warp": dict(warp), "weft": dict(weft)}
+    yarns = {family: getattr(fabric, family).model_copy(update=changes | own[family]) for family in own}
+    return fabric.model_copy(update=yarns | ({"draft": Matrix(rows=tuple(rows))} if rows else {}))
+
+
+@lru_cache(maxsize=64)
+def soft_table(fabric, level=2, behind=False):
+    """Return a table with grids of an eighth of the usual size: as exact in all that is compared here, and cheaper."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)
+        return nodes.tabulate(fabric, level=level, behind=behind)
+
+
+_clusters, _horizons, _maps = (
+    lru_cache(maxsize=32)(module.tabulate) for module in (tables, sampler, prefiltered)
+)  # fmt: skip
+
+
+def soft_nodes(fabric, queries, level=2):
+    return features.read_queries(soft_table(fabric, level), queries).components
+
+
+def soft_nodes_behind(fabric, queries):
+    """Return components and transparency with the light mirrored to the other side, (N, 5)."""
+    return features.read_behind(
+        soft_table(fabric, behind=True), queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
+    )
+
+
+def summed_area(fabric, queries):
+    return answer.answer(_clusters(fabric, 64), queries)
+
+
+def horizon_points(fabric, queries, count=256, grid=16):
+    return sampler.sample_horizons(_horizons(fabric, grid, 2 * grid), queries, count, True, 3)
+
+
+def points(fabric, queries, count=256):
+    return exact_points.sample_points(cloth_side(fabric, TruthOptions()), queries, count, 3, True)
+
+
+def averaged_normals(fabric, queries):
+    return prefiltered.answer(_maps(fabric, 16), queries, prefiltered.LEAN)
+
+
+PLACED = [soft_nodes, soft_nodes_behind, summed_area, averaged_normals]
+"""Methods without random numbers."""
+
+ALL = [soft_nodes, summed_area, horizon_points, points, averaged_normals]
+"""Methods that return the four components with the light in front."""

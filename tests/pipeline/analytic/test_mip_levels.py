@@ -1,0 +1,92 @@
+"""The kernel with which maps are read: read from a map of one bright texel, its moments are those of the Gaussian."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.mip_levels import add_mean, halved, mip_levels
+
+TEXELS = 64
+
+
+def levels_of(plane):
+    maps = [plane]
+    while maps[-1].shape[:2] != (1, 1):
+        maps.append(halved(maps[-1]))
+    return mip_levels(maps, (8, 8))
+
+
+def read(maps, u, v, sigma, weight=1.0):
+    sums = np.zeros(maps.texels.shape[1], np.float32)
+    add_mean(maps, u, v, sigma, weight, sums)
+    return sums.astype(np.float64)
+
+
+@pytest.fixture(scope="module")
+def noise():
+    return np.random.default_rng(3).random((TEXELS, TEXELS, 2))
+
+
+@pytest.mark.parametrize("octave", [0.0, 0.3, 0.5, 1.0, 1.6, 2.0])
+def test_the_kernel_has_the_mass_mean_and_variance_of_the_gaussian(octave):
+    """Texels of width h, read bilinearly, average with variance h^2 / 4: sigma^2 = 4^l h^2 / 4 at a whole level l.
+
+    Between two levels variances are mixed on a line, (1 + 3 s) in place of 4^s. A bright column is at all places
+    that it may have within a coarse texel; sums over an eighth of a texel are integrals to 1 % of the variance.
+    """
+    width, step = 8.0 / TEXELS, math.floor(octave)
+    sigma, expected = 0.5 * width * 2.0**octave, (0.5 * width * 2.0**step) ** 2 * (1.0 + 3.0 * (octave - step))
+    centres, mass, mean, variance = (np.arange(8 * TEXELS) + 0.5) * width / 8.0, 0.0, 0.0, 0.0
+    for column in range(28, 36):
+        bright = np.zeros((TEXELS, TEXELS, 1))
+        bright[:, column] = 1.0 / 64.0
+        maps, place = levels_of(bright), (column + 0.5) * width
+        kernel = np.array([read(maps, u, 0.3, sigma)[0] for u in centres])
+        mass += kernel.sum()
+        mean += kernel @ (centres - place)
+        # The column itself is a texel wide.
+        variance += kernel @ ((centres - place) ** 2 + width**2 / 12.0)
+    assert mass == pytest.approx(1.0, rel=1e-5) and mean == pytest.approx(0.0, abs=1e-6)
+    assert variance == pytest.approx(expected, rel=0.01)
+
+
+def test_a_constant_is_read_as_it_is_and_a_coarse_reading_is_the_mean(noise):
+    even, maps = levels_of(np.full((TEXELS, TEXELS, 1), 0.7)), levels_of(noise)
+    for sigma in (1e-3, 0.06, 0.11, 0.9, 30.0):
+        assert read(even, 3.3, -2.9, sigma)[0] == pytest.approx(0.7, rel=1e-6)
+    np.testing.assert_allclose(read(maps, 1.0, 2.0, 1e3), noise.mean(axis=(0, 1)), rtol=1e-6)
+    np.testing.assert_allclose(read(maps, 1.0, 2.0, 0.2, 2.5), 2.5 * read(maps, 1.0, 2.0, 0.2), rtol=1e-6)
+
+
+def test_a_narrow_reading_is_bilinear(noise):
+    """At centres of texels their values, halfway the means of two and of four."""
+    maps, width = levels_of(noise), 8.0 / TEXELS
+    expected = {(5.5, 9.5): noise[9, 5], (6.0, 9.5): noise[9, 5:7].mean(axis=0)}
+    expected |= {(6.0, 10.0): noise[9:11, 5:7].mean(axis=(0, 1)), (5.5, 0.0): noise[[-1, 0], 5].mean(axis=0)}
+    for (x, y), value in expected.items():
+        np.testing.assert_allclose(read(maps, x * width, y * width, 1e-3), value, rtol=1e-6)
+
+
+@pytest.mark.parametrize("sigma", [0.03, 0.1, 0.25])
+def test_a_moved_map_is_read_at_the_moved_place_and_a_mirrored_one_at_its_mirror_image(noise, sigma):
+    """Moves by eight texels, which are whole texels of the four finest levels."""
+    maps, moved, mirrored = (levels_of(map_) for map_ in (noise, np.roll(noise, (8, -16), (0, 1)), noise[:, ::-1]))
+    for u, v in np.random.default_rng(1).random((20, 2)) * 8.0:
+        own = read(maps, u, v, sigma)
+        np.testing.assert_allclose(read(moved, u - 2.0, v + 1.0, sigma), own, rtol=1e-4)
+        np.testing.assert_allclose(read(mirrored, 8.0 - u, v, sigma), own, rtol=1e-4)
+        np.testing.assert_allclose(read(maps, u + 800.0, v - 1600.0, sigma), own, rtol=1e-4)
+
+
+@pytest.mark.parametrize("periods", [1, 2, 4])
+def test_waves_are_damped_as_by_the_gaussian(periods):
+    """Within 5 % of the wave from half a texel to where a third of it is left; without filter it would be all."""
+    phase = 2.0 * math.pi * periods * (np.arange(TEXELS) + 0.5) / TEXELS
+    maps = levels_of(np.broadcast_to(np.cos(phase), (TEXELS, TEXELS))[..., None])
+    number = 2.0 * math.pi * periods / 8.0
+    for sigma in (0.0625, 0.125, 0.25, 0.5):
+        exact = math.exp(-0.5 * (number * sigma) ** 2)
+        if exact > 1.0 / 3.0:
+            peak = np.mean([read(maps, u, 1.0, sigma)[0] * math.cos(number * u) for u in np.arange(0.0, 8.0, 1 / 32)])
+            assert 2.0 * peak == pytest.approx(exact, abs=0.05)
