@@ -1,6 +1,5 @@
 """Colour orders: sequences, repeats, and what is refused."""
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,15 +38,6 @@ def test_a_fabric_without_an_order_has_no_such_key():
     assert "colours" not in denim.model_dump()
     assert coloured(picks=[["navy", 1]]).optics() == denim.optics()
     assert hash(coloured(picks=[["navy", 1]])) == hash(coloured(picks=[["navy", 1]])) != hash(denim)
-
-
-def test_a_coloured_fabric_reads_back_from_its_own_file(tmp_path):
-    fabric = coloured(ends=[["white", 2], ["navy", 1]], picks=[["white", 5], ["navy", 3]])
-    (tmp_path / "cloth.toml").write_text(fabric.to_toml(), encoding="utf-8", newline="")
-    again = load_fabric(tmp_path / "cloth.toml")
-    assert again == fabric
-    for ours, read in zip(fabric.thread_colours(), again.thread_colours(), strict=True):
-        np.testing.assert_array_equal(ours, read)
 
 
 @pytest.mark.parametrize(

@@ -67,14 +67,6 @@ def test_every_fault_is_one_sentence(body, tmp_path):
     assert ".cpp" not in sentence
 
 
-def test_an_xml_scene_is_worn_and_lit(tmp_path):
-    loaded = load(load_scene(written(tmp_path, BALL + SUN + CAMERA)), OPTIONS)
-    gbuffer = render(loaded).gbuffers["denim"]
-    assert gbuffer.mask.shape == (12, 16)
-    assert 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
-    assert loaded.cloths["denim"][1].name == "denim"
-
-
 FRESH = """
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
@@ -106,7 +98,10 @@ def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
     path.write_text('name = "a"\nsource = "scene.xml"\nframes = 30\n[cloths.trousers]\nfabric = "denim"\nturn = 5.0\n')
     scene = load_scene(path)
     assert (scene.frames, scene.cloths["trousers"].turn) == (30, 5.0)
-    assert load(scene, OPTIONS).cloths["trousers"][1].name == "denim"
+    loaded = load(scene, OPTIONS)
+    gbuffer = render(loaded).gbuffers["trousers"]
+    assert loaded.cloths["trousers"][1].name == "denim"
+    assert gbuffer.mask.shape == (12, 16) and 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
     path.write_text(path.read_text().replace("turn", "trun"))
     assert "trun" in refused(lambda: load_scene(path))
 

@@ -39,13 +39,6 @@ def test_grazing_rows_are_mean_and_variance_of_cosines(footprint):
     assert column["grazing_variance"].mean() == pytest.approx(cosines.var(axis=1).mean(), rel=0.2)
 
 
-@pytest.mark.parametrize("rows", [OPACITY, GRAZING.model_copy(update={"points": 64})])
-def test_rows_are_the_same_in_any_cut(rows):
-    whole, first, rest = (rows.answer(DENIM, *cut) for cut in ((0, 40), (0, 7), (7, 33)))
-    for name, column in whole.items():
-        np.testing.assert_array_equal(np.concatenate([first[name], rest[name]]), column)
-
-
 def test_fabrics_and_seeds_draw_other_queries():
     basket, other = load_fabric("basket"), OPACITY.model_copy(update={"seed": 1})
     drawn = [
