@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from weaves.draft import Loom, cells
-from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill, valid_moves
+from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill
 
 steps = st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4)), min_size=1, max_size=3)
 
@@ -38,8 +38,7 @@ def test_herringbone_is_cut_where_it_turns():
     assert over.shape == (4, 8)
     assert np.array_equal(over[:, :4], Twill(over=2, under=2).build().warp_over)
     # Either side of a cut, every pick changes side: opposite ends.
-    assert np.array_equal(over[:, 4], ~over[:, 3])
-    assert np.array_equal(over[:, 0], ~over[:, 7])
+    assert np.array_equal(over[:, [4, 0]], ~over[:, [3, 7]])
     # The second stripe falls to the right.
     assert np.array_equal(over[:, 5], np.roll(over[:, 4], -1))
     assert Herringbone(over=2, under=2, width=6).build().repeat == (12, 4)
@@ -52,24 +51,15 @@ LOOM = {"threading": (1,), "tie_up": ((1, 0),), "treadling": (1,)}
     ("family", "numbers", "key"),
     [
         (Twill, {"over": (3, 1), "under": 1}, "under"),
-        (Twill, {"over": (), "under": ()}, "over"),
-        (Twill, {"over": 0, "under": 1}, "over"),
         (Twill, {"over": (50, 20), "under": (50, 20)}, "over"),
         (Twill, {"family": "broken_twill", "over": 2, "under": 1}, "over"),
-        (Herringbone, {"over": 2, "under": 2, "width": 1}, "width"),
-        (Herringbone, {"over": 2, "under": 2, "width": 1000}, "width"),
         (Herringbone, {"over": 64, "under": 2}, "width"),
-        (Satin, {"ends": 4, "move": 2}, "ends"),
         (Satin, {"ends": 6, "move": 3}, "move = 3: .*6 ends allow none; try 5 or 7 ends"),
         (Satin, {"ends": 8, "move": 2}, "8 ends allow 3, 5"),
         (Rib, {"ends": 1, "picks": 1}, "picks"),
         (Rib, {"ends": 2, "picks": 2}, "picks"),
-        (Rib, {"ends": 0, "picks": 1}, "ends"),
-        (Basket, {"ends": 1, "picks": 2}, "ends"),
-        (Basket, {"ends": 2, "picks": 1}, "picks"),
         (Loom, LOOM | {"threading": (1, 3)}, "threading"),
         (Loom, LOOM | {"treadling": (0,)}, "treadling"),
-        (Loom, LOOM | {"threading": ()}, "threading"),
         (Loom, LOOM | {"tie_up": ()}, "tie_up"),
         (Loom, LOOM | {"tie_up": ((1, 0), (1,))}, "tie_up"),
     ],
@@ -95,10 +85,6 @@ def test_a_satin_binds_every_end_once_apart_from_its_neighbours_or_is_refused(en
     assert (bound.sum(axis=0) == 1).all()
     assert [int(np.flatnonzero(pick)[0]) for pick in bound] == points
     assert np.array_equal(Satin(family="sateen", ends=ends, move=move).build().warp_over, bound)
-
-
-def test_classical_moves():
-    assert [valid_moves(ends) for ends in (5, 6, 7, 8)] == [[2, 3], [], [2, 3, 4, 5], [3, 5]]
 
 
 @pytest.mark.parametrize(
