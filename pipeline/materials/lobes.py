@@ -19,6 +19,7 @@ proportional to (h_x^2 / alpha^2 + h_y^2 + h_z^2)^-2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -86,16 +87,14 @@ def even_sky(count: int) -> Float64:
 def reflectance(fabric: Fabric) -> Reflectance:
     """Integrate the ground truth of a fabric; colours do not matter."""
     wi = even_sky(SKY_DIRECTIONS)
-    sine, cosine = math.sin(math.radians(GRAZING_VIEW)), math.cos(math.radians(GRAZING_VIEW))
-    above = _components(fabric, wi, (0.0, 0.0, 1.0))
-    through = _components(fabric, wi * (1.0, 1.0, -1.0), (0.0, 0.0, 1.0))
-    grazing = np.mean(
-        [_components(fabric, wi, (sine * math.cos(a), sine * math.sin(a), cosine)) for a in _AZIMUTHS], axis=0
-    )
+    normal = np.array([0.0, 0.0, 1.0])
+    above = _components(fabric, wi, normal)
+    through = _components(fabric, wi * (1.0, 1.0, -1.0), normal)
+    grazing = np.mean([_components(fabric, wi, viewer) for viewer in grazing_views(_AZIMUTHS)], axis=0)
     return Reflectance(_coverage(fabric), above[2:], above[:2], through[2:], grazing[2:], grazing[:2])
 
 
-def _components(fabric: Fabric, wi: Float64, viewer: tuple[float, float, float]) -> Float64:
+def _components(fabric: Fabric, wi: Float64, viewer: Float64) -> Float64:
     """Return the reflectance of the four components."""
     # A Gaussian of a standard deviation of one repeat or more averages over the repeat.
     sigma = 2.0 * max(fabric.weave.repeat)
@@ -161,9 +160,8 @@ def charlie(wi: Float64, wo: Float64) -> Float64:
 def ggx_reflectance(along: float, across: float, f0: Float64) -> Float64:
     """Return the hemispherical reflectance of GGX at the grazing view, the mean over azimuths, (3,)."""
     wi = even_sky(_LOBE_DIRECTIONS)
-    return np.asarray(
-        math.pi * np.mean([ggx(wi, wo, along, across, f0).mean(axis=0) for wo in grazing_views()], axis=0)
-    )
+    shares = [ggx(wi, wo, along, across, f0).mean(axis=0) for wo in grazing_views()]
+    return np.asarray(math.pi * np.mean(shares, axis=0))
 
 
 def white_f0(fabric: Fabric, share: Reflectance) -> Float64:
@@ -178,7 +176,7 @@ def sheen_reflectance(wo: Float64) -> float:
     return float(math.pi * charlie(even_sky(_LOBE_DIRECTIONS), wo).mean())
 
 
-def grazing_views() -> list[Float64]:
-    """Return viewers at `GRAZING_VIEW`, by azimuth."""
+def grazing_views(azimuths: Sequence[float] = _SKY_VIEWS) -> list[Float64]:
+    """Return viewers at `GRAZING_VIEW` and at azimuths in radians."""
     sine, cosine = math.sin(math.radians(GRAZING_VIEW)), math.cos(math.radians(GRAZING_VIEW))
-    return [np.array([sine * math.cos(turn), sine * math.sin(turn), cosine]) for turn in _SKY_VIEWS]
+    return [np.array([sine * math.cos(turn), sine * math.sin(turn), cosine]) for turn in azimuths]

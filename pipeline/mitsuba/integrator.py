@@ -128,8 +128,7 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
             """Return the radiance along rays, whether they hit anything, and no further channels."""
             # Mitsuba has divided differentials by the root of the samples.
             ray.scale_differential(self._deviation / PIXEL * math.sqrt(sampler.sample_count()))
-            options = self._options
-            path = _Path(mi, dr, scene, sampler, options.max_depth, options.rr_depth, options.hide_emitters)
+            path = _Path(mi, dr, scene, sampler, self._options)
             return (*path.trace(ray, mi.Bool(active)), [])
 
         def to_string(self) -> str:
@@ -178,11 +177,8 @@ class _Bounce(NamedTuple):
 class _Path:
     """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once."""
 
-    def __init__(
-        self, mi: Any, dr: Any, scene: Any, sampler: Any, max_depth: int, rr_depth: int, hide_emitters: bool
-    ) -> None:
-        self._mi, self._dr, self._scene, self._sampler = mi, dr, scene, sampler
-        self._max_depth, self._rr_depth, self._hide = max_depth, rr_depth, hide_emitters
+    def __init__(self, mi: Any, dr: Any, scene: Any, sampler: Any, options: PathOptions) -> None:
+        self._mi, self._dr, self._scene, self._sampler, self._options = mi, dr, scene, sampler, options
         self._scalar = mi.variant().startswith("scalar")
         self._context = mi.BSDFContext()
 
@@ -197,11 +193,11 @@ class _Path:
             si = self._scene.ray_intersect(ray, active)
             if depth == 0:
                 valid = si.is_valid()
-            if depth > 0 or not self._hide:
+            if depth > 0 or not self._options.hide_emitters:
                 light += throughput * self._emitted(si, before, active)
             depth += 1
             active = active & si.is_valid()
-            if depth == self._max_depth or not dr.any(active):
+            if depth == self._options.max_depth or not dr.any(active):
                 break
             cone.meet(ray, si)
             to_light, lobe, direction, end = sampler.next_2d(), sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
@@ -214,7 +210,7 @@ class _Path:
             ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
             largest = dr.max(throughput)
             active = active & (largest > 0.0)
-            if depth >= self._rr_depth:
+            if depth >= self._options.rr_depth:
                 kept = dr.minimum(largest, 0.95)
                 active = active & (end < kept)
                 throughput /= dr.maximum(kept, 1e-8)
@@ -260,29 +256,22 @@ class _Path:
 
 
 class _Cone:
-    """Footprints of rays along their paths."""
+    """Footprints of rays along their paths: `state` is width, spread, blur and scatter, empty before the first hit."""
 
     def __init__(self, mi: Any, dr: Any) -> None:
         self._mi, self._dr = mi, dr
-        self._width: Any = None
-        self._spread: Any = None
-        self._blur: Any = None
-        self._scatter: Any = None
-
-    @property
-    def state(self) -> tuple[Any, ...]:
-        """Width, spread, blur and scatter."""
-        return (self._width, self._spread, self._blur, self._scatter)
+        self.state: tuple[Any, ...] = ()
 
     def meet(self, ray: Any, si: Any) -> None:
         """Set the partial derivatives of what rays meet; those of the first rays are their own."""
         mi, dr = self._mi, self._dr
-        if self._width is None:
-            self._start(ray, si)
+        if not self.state:
+            self.state = self._start(ray, si)
             return
-        self._width = self._width + self._spread * si.t
-        self._blur = self._blur + self._scatter * si.t
-        size = dr.sqrt(self._width * self._width + self._blur * self._blur) / PIXEL
+        width, spread, blur, scatter = self.state
+        width, blur = width + spread * si.t, blur + scatter * si.t
+        self.state = (width, spread, blur, scatter)
+        size = dr.sqrt(width * width + blur * blur) / PIXEL
         across, along = mi.coordinate_system(ray.d)
         # Parallel rays through the disc: their places on the tangent plane are its footprint.
         beside = mi.RayDifferential3f(ray)
@@ -293,19 +282,19 @@ class _Cone:
 
     def scatter(self, pdf: Any, delta: Any) -> None:
         """Widen the rays by a bounce into a direction of this density."""
-        dr = self._dr
+        dr, (*others, scatter) = self._dr, self.state
         added = dr.minimum(1.0 / (4.0 * math.pi * dr.maximum(pdf, 1e-6)), MOST_SCATTER)
-        square = self._scatter * self._scatter + dr.select(delta, 0.0, added)
-        self._scatter = dr.sqrt(dr.minimum(square, MOST_SCATTER))
+        square = scatter * scatter + dr.select(delta, 0.0, added)
+        self.state = (*others, dr.sqrt(dr.minimum(square, MOST_SCATTER)))
 
-    def _start(self, ray: Any, si: Any) -> None:
+    def _start(self, ray: Any, si: Any) -> tuple[Any, ...]:
         mi, dr = self._mi, self._dr
-        self._width = self._spread = self._blur = self._scatter = mi.Float(0.0)
+        none = mi.Float(0.0)
         if not ray.has_differentials:
-            return
+            return (none,) * 4
         si.compute_uv_partials(ray)
         right, down = (si.dp_du * change.x + si.dp_dv * change.y for change in (si.duv_dx, si.duv_dy))
         width = PIXEL * dr.sqrt(dr.abs(dr.dot(dr.cross(right, down), ray.d)))
         known = dr.isfinite(width) & (si.t > 0.0)
-        self._width = dr.select(known, width, 0.0)
-        self._spread = dr.select(known, width / dr.maximum(si.t, 1e-12), 0.0)
+        spread = dr.select(known, width / dr.maximum(si.t, 1e-12), 0.0)
+        return (dr.select(known, width, 0.0), spread, none, none)

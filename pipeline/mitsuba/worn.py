@@ -117,11 +117,6 @@ class Footprints(NamedTuple):
         size = _cut(sigma)
         return cls(size, size, np.zeros_like(size))
 
-    @classmethod
-    def joined(cls, chosen: Mask, one: Footprints, other: Footprints) -> Footprints:
-        """Return `one` where chosen, (N,), and `other` elsewhere."""
-        return cls(*(np.where(chosen, a, b) for a, b in zip(one, other, strict=True)))
-
 
 def _cut(deviation: Float64) -> Float32:
     """Return deviations cut to the sizes that queries may have."""
@@ -190,7 +185,7 @@ class Worn:
             lambda task: self._bsdf.sample(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks
         )
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
-        light = np.where(straight[:, None], -hits.viewer, self._from_cloth(wi.astype(np.float64)))
+        light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
@@ -201,7 +196,7 @@ class Worn:
         return np.concatenate(parts)
 
     def _queries(self, hits: RayHits, light: Float64) -> Queries:
-        towards = self._to_cloth(light)
+        towards = _turned(light, self._turn.T)
         # A light in the plane has no answer; it counts as dark (`_lit`).
         towards[:, 2] = np.where(np.abs(towards[:, 2]) < _FLAT, _FLAT, towards[:, 2])
         return self._looks(hits)._replace(wi=towards.astype(np.float32))
@@ -212,7 +207,7 @@ class Worn:
         place = (hits.uv * yarns) @ self._turn.T
         facing = np.einsum("ni,ni->n", hits.outward, hits.viewer)
         side = np.where(np.where(facing == 0.0, hits.viewer[:, 2], facing) < 0.0, -1.0, 1.0)
-        wo = tilted(self._to_cloth(hits.viewer), side, _LARGEST_ANGLE).astype(np.float32)
+        wo = tilted(_turned(hits.viewer, self._turn.T), side, _LARGEST_ANGLE).astype(np.float32)
         footprints = self._footprints(hits, yarns)
         ends, picks = self.fabric.repeat
         return Queries(
@@ -239,7 +234,8 @@ class Worn:
                 "twillight_path, or state pixel_angle or sigma",
             )  # fmt: skip
         width = PIXEL * self.options.pixel_angle * hits.spread * self.options.yarns
-        return Footprints.joined(traced, of_rays, Footprints.round(np.nan_to_num(width, nan=LARGEST_FOOTPRINT)))
+        others = Footprints.round(np.nan_to_num(width, nan=LARGEST_FOOTPRINT))
+        return Footprints(*(np.where(traced, a, b) for a, b in zip(of_rays, others, strict=True)))
 
     def _lobes(self, hits: RayHits) -> list[Lobes]:
         """Return the lobes of each run; those of the last call if its hits were the same."""
@@ -262,15 +258,12 @@ class Worn:
         tasks = list(zip(runs, known, strict=True))
         return _on_all_cores(lambda task: answer(task[0], _seed(task[0].u, task[0].wi), task[1]), tasks)
 
-    def _to_cloth(self, direction: Float64) -> Float64:
-        result = direction.copy()
-        result[:, :2] = direction[:, :2] @ self._turn.T
-        return result
 
-    def _from_cloth(self, direction: Float64) -> Float64:
-        result = direction.copy()
-        result[:, :2] = direction[:, :2] @ self._turn
-        return result
+def _turned(direction: Float64, turn: Float64) -> Float64:
+    """Return directions, (N, 3), turned about z by a matrix, (2, 2)."""
+    result = direction.copy()
+    result[:, :2] = direction[:, :2] @ turn
+    return result
 
 
 def _lit(hits: RayHits, light: Float64) -> Mask:

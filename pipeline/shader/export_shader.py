@@ -61,22 +61,18 @@ def write_shader(
     wanted = made(language)
     compiler = compiler_for(wanted) if wanted else None
     shader = shader_of(model, fabric, level, known)
-    onnx = _onnx(shader, language)
+    source, network = _source(shader), _network(shader, language)
+    golden = json.dumps(vectors(shader.golden), separators=(",", ":")) + "\n"
     listing = f"{shader.name}.json"
     entries = ("evaluate", "draw", *(("scatter",) if shader.sampled else ()))
     with own_files(folder, listing) as here:
-        source = here / SOURCE
-        source.mkdir()
-        names = _write_source(shader, source)
-        files = translate(wanted, compiler, source, here, entries) if compiler else {}
-        contents = shader.files | ({} if onnx is None else {f"{ONNX}/network.onnx": onnx})
-        for name, content in contents.items():
+        for name, content in {**source, **shader.files, **network, GOLDEN: golden.encode()}.items():
             (here / name).parent.mkdir(exist_ok=True)
             (here / name).write_bytes(content)
-        if onnx is not None:
-            files[ONNX] = [f"{ONNX}/network.onnx"]
-        (here / GOLDEN).write_text(json.dumps(vectors(shader.golden), separators=(",", ":")) + "\n", encoding="utf-8")
-        about = shader.about.model_copy(update={"source": names, "languages": files})
+        files = translate(wanted, compiler, here / SOURCE, here, entries) if compiler else {}
+        if network:
+            files[ONNX] = list(network)
+        about = shader.about.model_copy(update={"source": list(source), "languages": files})
         (here / listing).write_text(about.model_dump_json(), encoding="utf-8")
         size = sum(path.stat().st_size for path in here.rglob("*") if path.is_file())
     outside = about.network.outside if about.network else ""
@@ -84,19 +80,19 @@ def write_shader(
     return f"{folder}: {', '.join((SOURCE, *files, *sorted(known)))}; {shader.size}, {size / 1e3:,.0f} kB{warning}"
 
 
-def _onnx(shader: Shader, languages: Sequence[str]) -> bytes | None:
-    """Return the network of a model as ONNX, if it is wished."""
+def _network(shader: Shader, languages: Sequence[str]) -> dict[str, bytes]:
+    """Return the file of the network of a model as ONNX, if it is wished."""
     if ONNX not in languages and (ALL not in languages or shader.onnx is None):
-        return None
+        return {}
     if shader.onnx is None:
         raise BadInput("export", "language", ONNX, f"{shader.name} has no network; choose another model")
     if missing := no_onnx():
         raise BadInput("export", "language", ONNX, missing)
-    return shader.onnx()
+    return {f"{ONNX}/network.onnx": shader.onnx()}
 
 
-def _write_source(shader: Shader, folder: Path) -> list[str]:
-    """Write the source, and return its files."""
+def _source(shader: Shader) -> dict[str, bytes]:
+    """Return the files of the source."""
     texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
     name = shader.name
     lines = ["// The model of this folder.", "", f'#include "{name}.slang"']
@@ -104,9 +100,7 @@ def _write_source(shader: Shader, folder: Path) -> list[str]:
         lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
     lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]
     texts |= {**shader.generated, "model.slang": "\n".join(lines)}
-    for file, text in texts.items():
-        (folder / file).write_text(text, encoding="utf-8")
-    return [f"{SOURCE}/{file}" for file in texts]
+    return {f"{SOURCE}/{file}": text.encode() for file, text in texts.items()}
 
 
 def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:

@@ -70,8 +70,8 @@ _ES: Final = (
     (r"layout\(row_major\) (?:uniform|buffer);\n", ""),
     (r"layout\(binding = \d+\)\n", ""),
 )
-"""Replacements that make GLSL ES 3.00 of GLSL 4.50: version and precision; the layout of matrices, of which there are
-none; bindings, which a program sets by name."""
+"""Replacements that make GLSL ES 3.00 of GLSL 4.50 without storage buffers: version and precision; the layout of
+matrices, of which there are none; bindings, which a program sets by name."""
 
 
 def refuse_unknown(languages: Sequence[str]) -> None:
@@ -133,28 +133,20 @@ def compile_program(compiler: Path, source: Path, program: Program, target: str,
     for entry in program.entries:
         options += ["-entry", entry, "-stage", program.stage]
     command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
-    _run([*command, "-line-directive-mode", "none"])
+    command += ["-line-directive-mode", "none"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise WorkFailed(f"{compiler}: {one_line(str(error), 200)}") from error
+    if done.returncode != 0:
+        raise WorkFailed(f"{compiler}: {one_line(done.stderr or done.stdout, 300)}")
     text = path.read_text(encoding="utf-8")
-    path.write_text(_dense(_as_es(text) if program.textures else text), encoding="utf-8")
+    for pattern, other in _ES if program.textures else ():
+        text = re.sub(pattern, other, text)
+    path.write_text(_dense(text), encoding="utf-8")
 
 
 def _dense(text: str) -> str:
     """Return a program without indentation, comments on lines of their own and empty lines: a fifth shorter."""
     without = re.sub(r"^[ \t]+|[ \t]+$|/\*.*?\*/", "", text, flags=re.M | re.S)
     return re.sub(r"^(?://.*)?\n", "", without, flags=re.M)
-
-
-def _as_es(text: str) -> str:
-    """Return GLSL 4.50 without storage buffers as GLSL ES 3.00."""
-    for pattern, other in _ES:
-        text = re.sub(pattern, other, text)
-    return text
-
-
-def _run(command: list[str]) -> None:
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
-    except (OSError, subprocess.SubprocessError) as error:
-        raise WorkFailed(f"{command[0]}: {one_line(str(error), 200)}") from error
-    if done.returncode != 0:
-        raise WorkFailed(f"{command[0]}: {one_line(done.stderr or done.stdout, 300)}")

@@ -196,7 +196,6 @@ def _side(table: SoftNodeTable) -> _Side:
     """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
-    gauss_places, gauss_weights, hermite = _rules()
     waves, behind, curvatures = len(table.waves), int(len(table.behind_grid) > 0), len(table.grid_falls)
     integers: dict[str, int | float] = {
         "ends": int(table.repeat[0]),
@@ -230,19 +229,8 @@ def _side(table: SoftNodeTable) -> _Side:
         "pieces": table.pieces,
         "wave_periods": table.waves,
     }
-    of_numbers: dict[str, npt.NDArray[Any]] = {
-        "yarn": table.yarn,
-        "bounds": table.bounds,
-        "places_x": table.places_x,
-        "weights_x": table.weights_x,
-        "places_y": table.places_y,
-        "weights_y": table.weights_y,
-        "wave_size": table.wave_size,
-        "gauss_places": gauss_places,
-        "gauss_weights": gauss_weights,
-        "hermite_places": hermite[0],
-        "hermite_weights": hermite[1],
-    }
+    names = ("yarn", "bounds", "places_x", "weights_x", "places_y", "weights_y", "wave_size")
+    of_numbers = {name: getattr(table, name) for name in names} | _rules()
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
 
@@ -333,12 +321,13 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
     return np.column_stack([table.groups, first, counts]).astype(np.int32), cells.astype(np.int32)
 
 
-def _rules() -> tuple[Float32, Float32, Float32]:
-    """Return places and weights of the rules of Gauss and Legendre, (7, 8), and the rule of Hermite, (2, 4)."""
+def _rules() -> dict[str, Float32]:
+    """Return places and weights of the rules of Gauss and Legendre, (7, 8), and of the rule of Hermite, (4,)."""
     own = vars(footprint_nodes)
-    count = footprint_nodes.HERMITE
-    hermite = np.stack([own["_HERMITE_PLACES"][:count], own["_HERMITE_WEIGHTS"][:count]])
-    return own["_GAUSS_PLACES"], own["_GAUSS_WEIGHTS"], hermite
+    rules = {f"gauss_{part}": own[f"_GAUSS_{part.upper()}"] for part in ("places", "weights")}
+    return rules | {
+        f"hermite_{part}": own[f"_HERMITE_{part.upper()}"][: footprint_nodes.HERMITE] for part in ("places", "weights")
+    }
 
 
 def table_files(cloth: ClothTables) -> dict[str, bytes]:

@@ -63,47 +63,49 @@ def write_openpbr(path: Path, name: str, material: Constants) -> None:
     identifier = MaterialX.createValidName(name)
     shader = document.addNode("open_pbr_surface", f"{identifier}_surface", "surfaceshader")
 
-    def connect(key: str, kind: str, node: Any) -> None:
-        shader.addInput(key, kind).setConnectedNode(node)
-
-    def value(key: str, number: Any, kind: str) -> None:
-        shader.setInputValue(key, number, kind)
-
     base = _image(document, "base_color", "color3")
     if material.transmitted > 0.0:
-        left = document.addNode("divide", "base_left", "color3")
-        left.addInput("in1", "color3").setConnectedNode(base)
-        left.setInputValue("in2", max(1.0 - material.transmitted, 1e-3), "float")
-        base = left
-        value("geometry_thin_walled", True, "boolean")
-        value("subsurface_weight", material.transmitted, "float")
-        value("subsurface_scatter_anisotropy", 1.0, "float")
-        through = document.addNode("divide", "transmission_left", "color3")
-        through.addInput("in1", "color3").setConnectedNode(_image(document, "transmission_color", "color3"))
-        through.setInputValue("in2", max(material.transmitted, 1e-3), "float")
-        connect("subsurface_color", "color3", through)
-    connect("base_color", "color3", base)
-    connect("specular_color", "color3", _image(document, "specular_color", "color3"))
-    connect("specular_roughness", "float", _image(document, "roughness", "float"))
-    connect("specular_roughness_anisotropy", "float", _image(document, "anisotropy", "float"))
-    value("specular_ior", material.ior, "float")
+        base = _divided(document.addNode("divide", "base_left", "color3"), base, 1.0 - material.transmitted)
+        shader.setInputValue("geometry_thin_walled", True, "boolean")
+        shader.setInputValue("subsurface_weight", material.transmitted, "float")
+        shader.setInputValue("subsurface_scatter_anisotropy", 1.0, "float")
+        left = document.addNode("divide", "transmission_left", "color3")
+        through = _image(document, "transmission_color", "color3")
+        _connect(shader, "subsurface_color", _divided(left, through, material.transmitted))
+    _connect(shader, "base_color", base)
+    _connect(shader, "specular_color", _image(document, "specular_color", "color3"))
+    _connect(shader, "specular_roughness", _image(document, "roughness", "float"))
+    _connect(shader, "specular_roughness_anisotropy", _image(document, "anisotropy", "float"))
+    shader.setInputValue("specular_ior", material.ior, "float")
     if material.open_cloth:
-        connect("geometry_opacity", "float", _image(document, "opacity", "float"))
+        _connect(shader, "geometry_opacity", _image(document, "opacity", "float"))
     normal, fibre = (_in_world(document, name) for name in ("normal_opengl", "tangent"))
     across = document.addNode("crossproduct", "across", "vector3")
-    across.addInput("in1", "vector3").setConnectedNode(normal)
-    across.addInput("in2", "vector3").setConnectedNode(fibre)
-    connect("geometry_normal", "vector3", normal)
-    connect("geometry_tangent", "vector3", across)
+    _connect(across, "in1", normal)
+    _connect(across, "in2", fibre)
+    _connect(shader, "geometry_normal", normal)
+    _connect(shader, "geometry_tangent", across)
     if (weight := float(material.sheen.max())) > 0.0:
-        value("fuzz_weight", weight, "float")
-        value("fuzz_color", MaterialX.Color3(*(material.sheen / weight).tolist()), "color3")
-        value("fuzz_roughness", SHEEN_ROUGHNESS, "float")
+        shader.setInputValue("fuzz_weight", weight, "float")
+        shader.setInputValue("fuzz_color", MaterialX.Color3(*(material.sheen / weight).tolist()), "color3")
+        shader.setInputValue("fuzz_roughness", SHEEN_ROUGHNESS, "float")
     document.addMaterialNode(identifier, shader)
     valid, reason = document.validate()
     if not valid:
         raise ValueError(f"MaterialX refuses the document: {reason}")
     MaterialX.writeToXmlFile(document, str(path))
+
+
+def _connect(node: Any, key: str, source: Any) -> None:
+    """Make the output of a node an input of another."""
+    node.addInput(key, source.getType()).setConnectedNode(source)
+
+
+def _divided(node: Any, colour: Any, number: float) -> Any:
+    """Return a node of division, which gets a colour and a number of at least 1e-3."""
+    _connect(node, "in1", colour)
+    node.setInputValue("in2", max(number, 1e-3), "float")
+    return node
 
 
 def _image(document: Any, name: str, kind: str) -> Any:
@@ -118,7 +120,7 @@ def _image(document: Any, name: str, kind: str) -> Any:
 def _in_world(document: Any, name: str) -> Any:
     """Add the nodes that read a map of directions and turn them into the world's."""
     node = document.addNode("normalmap", f"{name}_world", "vector3")
-    node.addInput("in", "vector3").setConnectedNode(_image(document, name, "vector3"))
+    _connect(node, "in", _image(document, name, "vector3"))
     return node
 
 
@@ -154,7 +156,8 @@ def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, mat
         TANGENT=file.vertices(mesh.tangents, gltf.VEC4),
         TEXCOORD_0=file.vertices(mesh.uv, gltf.VEC2),
     )
-    primitive = gltf.Primitive(attributes=attributes, indices=file.triangles(mesh.faces), material=0)
+    corners = file.array(mesh.faces.reshape(-1, 1), gltf.SCALAR, gltf.UNSIGNED_INT, gltf.ELEMENT_ARRAY_BUFFER)
+    primitive = gltf.Primitive(attributes=attributes, indices=corners, material=0)
     document = file.document
     document.meshes.append(gltf.Mesh(name=fabric.name, primitives=[primitive]))
     document.nodes.append(gltf.Node(name=fabric.name, mesh=0))
@@ -215,16 +218,16 @@ class _File:
 
     def vertices(self, values: Floats, kind: str) -> int:
         """Add an attribute of the vertices, and return its index."""
-        single = np.ascontiguousarray(values, np.float32)
-        view = self._view(single.tobytes(), self.gltf.ARRAY_BUFFER)
-        low, high = (single.min(axis=0).tolist(), single.max(axis=0).tolist())
-        return self._accessor(view, self.gltf.FLOAT, len(single), kind, low, high)
+        return self.array(values.astype(np.float32), kind, self.gltf.FLOAT, self.gltf.ARRAY_BUFFER)
 
-    def triangles(self, faces: npt.NDArray[np.uint32]) -> int:
-        """Add the corners of the triangles, and return their index."""
-        view = self._view(np.ascontiguousarray(faces, np.uint32).tobytes(), self.gltf.ELEMENT_ARRAY_BUFFER)
-        low, high = [int(faces.min())], [int(faces.max())]
-        return self._accessor(view, self.gltf.UNSIGNED_INT, faces.size, self.gltf.SCALAR, low, high)
+    def array(self, values: npt.NDArray[Any], kind: str, component: int, target: int) -> int:
+        """Add an array (N, n), and return its index."""
+        accessor = self.gltf.Accessor(
+            bufferView=self._view(values.tobytes(), target), componentType=component, count=len(values), type=kind,
+            min=values.min(axis=0).tolist(), max=values.max(axis=0).tolist(),
+        )  # fmt: skip
+        self.document.accessors.append(accessor)
+        return len(self.document.accessors) - 1
 
     def texture(self, name: str, png: bytes) -> int:
         """Add a picture as a texture, and return its index."""
@@ -245,13 +248,6 @@ class _File:
         self.document.bufferViews.append(view)
         self._bytes += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
         return len(self.document.bufferViews) - 1
-
-    def _accessor(self, view: int, component: int, count: int, kind: str, low: list[Any], high: list[Any]) -> int:
-        accessor = self.gltf.Accessor(
-            bufferView=view, componentType=component, count=count, type=kind, min=low, max=high
-        )
-        self.document.accessors.append(accessor)
-        return len(self.document.accessors) - 1
 
 
 def _draped(fabric: Fabric, shown: Layout) -> _Mesh:
