@@ -158,13 +158,7 @@ def _sample_rows(
 
 @fast_kernel
 def _place(
-    out: Float32,
-    centre: np.float32,
-    sigma: np.float32,
-    repeat: np.float32,
-    seed: np.uint32,
-    step: np.uint32,
-    r2: bool,
+    out: Float32, centre: np.float32, sigma: np.float32, repeat: np.float32, seed: np.uint32, step: np.uint32, r2: bool
 ) -> None:
     """Write the positions of the points of a query on one axis, in [0, repeat]."""
     even = sigma >= np.float32(EVENLY) * repeat

@@ -182,13 +182,7 @@ def shade(table: HorizonMap, count: int, weight: Float32, points: Float32) -> No
 
 @fast_kernel
 def gather(
-    count: int,
-    first: int,
-    area: Float32,
-    diffuse: Float32,
-    specular: Float32,
-    warpness: Float32,
-    weftness: Float32,
+    count: int, first: int, area: Float32, diffuse: Float32, specular: Float32, warpness: Float32, weftness: Float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
     """Return the sums of area and of the four components over `count` points from `first` on."""
     a, s_warp, s_weft, c_warp, c_weft = _0, _0, _0, _0, _0

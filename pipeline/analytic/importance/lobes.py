@@ -23,18 +23,7 @@ import numpy as np
 
 from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, LobeSurface
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, around, ramp
-from pipeline.analytic.soft_nodes.nodes import (
-    BLOCK,
-    BOUND,
-    CURVE,
-    FAMILY,
-    LEVELS,
-    SHIFT,
-    X_HIGH,
-    X_LOW,
-    Y_HIGH,
-    Y_LOW,
-)
+from pipeline.analytic.soft_nodes.nodes import BLOCK, BOUND, CURVE, FAMILY, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, tangent
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel

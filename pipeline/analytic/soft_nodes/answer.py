@@ -47,13 +47,8 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
     """Return what `sum_queries` returns for N queries, the viewer in front."""
-    return sum_queries(table, *_columns(queries))
-
-
-def _columns(queries: Queries) -> tuple[Float32, ...]:
-    """Return the columns of `sum_queries`."""
     columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo, queries.curvature)
-    return tuple(np.ascontiguousarray(column, np.float32) for column in columns)
+    return sum_queries(table, *(np.ascontiguousarray(column, np.float32) for column in columns))
 
 
 @allocating_kernel

@@ -151,7 +151,7 @@ def _merged(groups: list[PieceGroup], most: int) -> list[PieceGroup]:
             (_distance(first, second), i, j)
             for j, second in enumerate(groups)
             for i, first in enumerate(groups[:j])
-            if _mergeable(first, second)
+            if first.piece[:4] == second.piece[:4] and first.lines == second.lines and first.piece.family != GAP
         ]
         if not pairs:
             break
@@ -159,11 +159,6 @@ def _merged(groups: list[PieceGroup], most: int) -> list[PieceGroup]:
         second = groups.pop(j)
         groups[i] = _together(groups[i], second)
     return groups
-
-
-def _mergeable(first: PieceGroup, second: PieceGroup) -> bool:
-    one, other = first.piece, second.piece
-    return one[:4] == other[:4] and first.lines == second.lines and one.family != GAP
 
 
 def _distance(first: PieceGroup, second: PieceGroup) -> float:
@@ -230,17 +225,8 @@ def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Fl
     bound = min(piece.steepest, LARGEST_SINE)
     fibre = Fibre(float(own[SIN_TWIST]), float(own[COS_TWIST]), float(own[BETA]))
     found = np.zeros((SURFACE_ROWS, len(sines)))
-    _fill_rows(
-        sines,
-        places,
-        half_across,
-        half_along,
-        float(radius),
-        float(piece.sign * piece.curve),
-        float(bound),
-        fibre,
-        found,
-    )
+    curvature = float(piece.sign * piece.curve)
+    _fill_rows(sines, places, half_across, half_along, float(radius), curvature, float(bound), fibre, found)
     return found
 
 

@@ -177,7 +177,8 @@ def tabulate(
     grid = _grids(sines, size)
     grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)
     for own, curvature in zip(grid_falls, CURVATURES, strict=False):
-        own[:] = _falls(sines, horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature), curvature, size)
+        bent = horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature)
+        own[:] = _grids(np.clip((sines - bent) / (FALL * curvature), 0.0, 1.0), size)
     behind_grid = grid[:0]
     if behind:
         slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
@@ -198,8 +199,8 @@ def tabulate(
         stop += -stop % BLOCK_NODES
     starts.append(stop // BLOCK_NODES)
     nodes = np.tile(FLAT[:, None], stop)
-    evenly, (mean, variance) = np.zeros(stop), _no_horizons(stop)
-    behind_mean, behind_variance = _no_horizons(stop if behind else 0)
+    evenly, mean, variance = np.zeros(stop), np.zeros((AZIMUTHS, stop)), np.ones((AZIMUTHS, stop))
+    behind_mean, behind_variance = (part[:, : stop if behind else 0].copy() for part in (mean, variance))
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
     for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
         indices = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
@@ -317,11 +318,6 @@ def _together(waves: Float32) -> Float32:
     return np.ascontiguousarray(blocks.transpose(2, 0, 1, 3))
 
 
-def _no_horizons(nodes: int) -> tuple[Float64, Float64]:
-    """Return mean and variance of the horizons of nodes that nothing hides, to be filled."""
-    return np.zeros((AZIMUTHS, nodes)), np.ones((AZIMUTHS, nodes))
-
-
 def _sharpness(variance: Float64) -> Float64:
     """Return 1 over the width of the ramp of a horizon."""
     return np.asarray(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2)))
@@ -371,11 +367,6 @@ def _grids(sines: Float64, size: int) -> npt.NDArray[np.uint8]:
     """Return grids from the sines of horizons at azimuths even in the angle."""
     grids = from_even(sines).reshape(AZIMUTHS, -1, size, size).transpose(1, 0, 2, 3)
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
-
-
-def _falls(flat: Float64, bent: Float64, curvature: float, size: int) -> npt.NDArray[np.uint8]:
-    """Return grids of falls from the sines of horizons over a flat and a curved base, as shares."""
-    return _grids(np.clip((flat - bent) / (FALL * curvature), 0.0, 1.0), size)
 
 
 def _soft_horizons(

@@ -16,14 +16,7 @@ import numpy as np
 from pipeline.analytic.gauss_rules import taps
 from pipeline.analytic.soft_horizons import around, ramp
 from pipeline.analytic.soft_nodes.shade import directions
-from pipeline.analytic.summed_area.shade import (
-    CORNERS,
-    Azimuth,
-    Slots,
-    corner,
-    over_horizon,
-    sum_clusters,
-)
+from pipeline.analytic.summed_area.shade import CORNERS, Azimuth, Slots, corner, over_horizon, sum_clusters
 from pipeline.analytic.summed_area.tables import OCTAVE_STEPS, TEXEL_AZIMUTHS, ClusterTables
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
