@@ -116,8 +116,5 @@ class ColourOrder(Frozen):
 
 def colours_of_yarns(yarns: list[Yarn]) -> ThreadColours:
     """Return the colours of some yarns, one row each."""
-    return ThreadColours(
-        np.array([linear_rgb(yarn.specular) for yarn in yarns]),
-        np.array([linear_rgb(yarn.diffuse) for yarn in yarns]),
-        np.array([linear_rgb(yarn.diffuse_transmission) for yarn in yarns]),
-    )
+    columns = (np.array([linear_rgb(getattr(yarn, name)) for yarn in yarns]) for name in ThreadColours._fields)
+    return ThreadColours(*columns)

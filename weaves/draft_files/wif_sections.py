@@ -12,7 +12,7 @@ from configparser import ConfigParser, ParsingError
 from typing import Annotated, Any, Final
 
 from dtx_to_wif import PatternData, WarpWeftData
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from weaves.colour_order import MOST_THREADS
 from weaves.errors import BadInput
@@ -55,26 +55,22 @@ Table = Annotated[
 ]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="ignore")
-
-
-class _Text(_Section):
+class _Text(BaseModel):
     title: str | None = None
 
 
-class _Program(_Section):
+class _Program(BaseModel):
     source_program: Annotated[str | None, Field(alias="source program")] = None
     source_version: Annotated[str | None, Field(alias="source version")] = None
 
 
-class _Weaving(_Section):
+class _Weaving(BaseModel):
     shafts: Annotated[int | None, Field(ge=1, le=MOST_THREADS)] = None
     treadles: Count | None = None
     rising_shed: Annotated[bool | None, Field(alias="rising shed")] = None
 
 
-class _Yarns(_Section):
+class _Yarns(BaseModel):
     threads: Annotated[int | None, Field(ge=1, le=MOST_THREADS)] = None
     color: Annotated[tuple[Annotated[int, Field(ge=0, le=65536)], ...] | None, BeforeValidator(_parts)] = None
     spacing: Length | None = None
@@ -82,14 +78,14 @@ class _Yarns(_Section):
     units: str | None = None
 
 
-class _Palette(_Section):
+class _Palette(BaseModel):
     range: Annotated[tuple[Level, Level] | None, BeforeValidator(_parts)] = None
 
 
 Filled = BeforeValidator(_filled)
 
 
-class _Wif(_Section):
+class _Wif(BaseModel):
     """The sections that are read; their names in lower case with _."""
 
     wif: Annotated[_Program, Filled] = _Program()
