@@ -48,7 +48,7 @@ from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.soft_nodes import Level, SoftNodes, soft_tables
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.fallback import fallback_answers
-from pipeline.models.method import CHUNK_ROWS, refuse_other, row_by_row
+from pipeline.models.method import CHUNK_ROWS, Around, refuse_other, row_by_row
 from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, loaded
 from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.per_fabric import PerFabric
@@ -348,7 +348,7 @@ class Selvage:
         return _Cloth(table, self._correction.bias(own), self._estimate.bias(own))
 
 
-class Adaptive:
+class Adaptive(Around):
     """A trained `selvage` that answers by more nodes where its error would exceed the wished one.
 
     Parameters
@@ -368,13 +368,9 @@ class Adaptive:
     def __init__(self, selvage: Selvage, finest: Level, error: float) -> None:
         if not 0.0 < error < 1.0:
             raise BadInput(selvage.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
-        self.name, self.setting, self.domain = selvage.name, f"error {100 * error:g} %", selvage.domain
-        self.error = error
+        super().__init__(selvage, f"error {100 * error:g} %")
+        self.domain, self.error = selvage.domain, error
         self._selvage, self._finest = selvage, SoftNodes(finest, selvage.name)
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return True: any fabric can be tabulated."""
-        return True
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""

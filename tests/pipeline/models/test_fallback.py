@@ -4,17 +4,15 @@ import numpy as np
 import pytest
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
-from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import FakeMethod
 from tests.presets import slow
 from weaves.fabric import load_fabric
@@ -30,28 +28,23 @@ def mixed(count=60):
     return queries._replace(wo=wo, curvature=np.where(wo[:, 2] > 0, queries.curvature, np.float32(0.0)))
 
 
-def test_ellipses_become_round_ones_of_the_same_area_and_curvature_is_left_out():
-    queries, method = mixed(), FakeMethod()
-    Fallback(method, {"behind"}).predict(load_fabric("voile"), queries)
-    (asked,) = method.asked
+def test_a_method_is_asked_in_the_nearest_form_that_it_knows():
+    """Round footprints of the same area, or of the major axis, which never alias; curvature is left out."""
+    queries = mixed()
     own = queries.take(queries.wo[:, 2] > 0)
-    np.testing.assert_allclose(asked.sigma**2, own.sigma * own.sigma_minor, rtol=1e-6)
-    np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
-    assert not asked.curvature.any() and not asked.angle.any()
 
+    def asked(kinds, *footprint):
+        method = FakeMethod()
+        Fallback(method, kinds, *footprint).predict(load_fabric("voile"), queries)
+        return method.asked[0]
 
-def test_the_major_axis_never_aliases():
-    queries, method = mixed(), FakeMethod()
-    Fallback(method, {"behind"}, "major").predict(load_fabric("voile"), queries)
-    np.testing.assert_array_equal(method.asked[0].sigma, queries.take(queries.wo[:, 2] > 0).sigma)
-
-
-def test_what_a_method_knows_reaches_it_unchanged():
-    queries, method = mixed(), FakeMethod()
-    Fallback(method, {"behind", "stretch", "curvature"}).predict(load_fabric("voile"), queries)
-    own = queries.take(queries.wo[:, 2] > 0)
-    for name in Queries._fields:
-        np.testing.assert_array_equal(getattr(method.asked[0], name), getattr(own, name))
+    plain = asked({"behind"})
+    np.testing.assert_allclose(plain.sigma**2, own.sigma * own.sigma_minor, rtol=1e-6)
+    np.testing.assert_array_equal(plain.sigma, plain.sigma_minor)
+    assert not plain.curvature.any() and not plain.angle.any()
+    np.testing.assert_array_equal(asked({"behind"}, "major").sigma, own.sigma)
+    for known, expected in zip(asked({"behind", "stretch", "curvature"}), own, strict=True):
+        np.testing.assert_array_equal(known, expected)
 
 
 def test_what_no_form_stands_for_is_answered_by_quadrature():
@@ -172,14 +165,10 @@ def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own()
 def test_plain_queries_are_the_methods_alone(rows):
     fabric, sums = load_fabric("denim"), SoftNodes()
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, rows)
-    np.testing.assert_array_equal(Fallback(sums, ()).predict(fabric, queries), sums.predict(fabric, queries))
-
-
-def test_it_is_called_as_its_method():
-    (points,) = load_methods(PointSampledOptions(counts=[4]))
-    fallback = Fallback(points, ())
-    assert (fallback.name, fallback.setting) == (points.name, points.setting)
-    assert fallback.bytes_stored(load_fabric("denim")) == points.bytes_stored(load_fabric("denim"))
+    fallback = Fallback(sums, ())
+    np.testing.assert_array_equal(fallback.predict(fabric, queries), sums.predict(fabric, queries))
+    assert (fallback.name, fallback.setting) == (sums.name, sums.setting)
+    assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)
 
 
 def test_cloth_steeper_than_was_taught_is_quadratures():

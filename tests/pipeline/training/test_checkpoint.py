@@ -16,6 +16,7 @@ def state(path, seed=0):
         loss.backward()
         learner.optimiser.step()
         learner.add(step, loss.detach(), torch.tensor(1.0))
+        learner.offer(step, abs(step - 1.0))
     learner.mark(3)
     return learner
 
@@ -32,8 +33,11 @@ def test_a_checkpoint_gives_all_state_back(saved):
     assert other.restore(torch.device("cpu")) == 3
     expected = state(saved)
     assert other.curve == expected.curve
+    assert other.best == expected.best == {"step": 1, "held_out_loss": 0.0}
     for name, tensor in expected.weights().items():
         assert torch.equal(other.weights()[name], tensor)
+        assert torch.equal(other.best_weights()[name], expected.best_weights()[name])
+        assert not torch.equal(other.best_weights()[name], tensor)
 
 
 @given(st.data())

@@ -74,18 +74,12 @@ def test_batches_hold_the_rows_of_their_fabrics():
 
 
 def test_columns_are_where_batches_look_for_them(tmp_path):
-    numbers = iter(np.arange(17, dtype=np.float32))
-    column = lambda width: np.array([[next(numbers) for _ in range(width)]], np.float32)  # noqa: E731
-    scalar = lambda: column(1)[0]  # noqa: E731
-    queries = Queries(scalar(), scalar(), scalar(), column(3), column(3), scalar(), scalar(), scalar())
-    answers = Answers.opaque(column(4), np.zeros((1, 4), np.float32), np.ones(1, np.int32))
-    write_columns(
-        tmp_path / "one.parquet",
-        "components",
-        "denim",
-        columns_of(queries, answers._replace(transparency=scalar())),
-        {},
-    )
+    numbers = np.split(np.arange(17, dtype=np.float32)[None], [1, 2, 3, 6, 9, 10, 11, 12, 16], axis=1)
+    *columns, mean, transparency = (part[0] if part.size == 1 else part for part in numbers)
+    queries = Queries(*columns)
+    answers = Answers.opaque(mean, np.zeros((1, 4), np.float32), np.ones(1, np.int32))
+    columns = columns_of(queries, answers._replace(transparency=transparency))
+    write_columns(tmp_path / "one.parquet", "components", "denim", columns, {})
     shard = ShardEntry(file="one.parquet", fabric="denim", split="train", start=0, rows=1, sha256="0" * 64)
     manifest = Manifest(name="one", fingerprint="0", roles={}, fabrics={}, about={}, shards=[shard])
     rows = load_rows(manifest, tmp_path, ["denim"], tmp_path / "rows.npy")
@@ -95,14 +89,6 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
         np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
     np.testing.assert_array_equal(batch.target[0], answers.mean)
     assert batch.transparency.item() == 16
-
-
-@pytest.mark.parametrize("step", [0, 11])
-def test_random_numbers_of_a_step_do_not_depend_on_the_past(step):
-    order = Order([10], 5, 1, seed=2)
-    first = order.random(step).integers(1 << 30, size=4)
-    order.random(step + 1)
-    np.testing.assert_array_equal(order.random(step).integers(1 << 30, size=4), first)
 
 
 NAMES = ["cotton_twill", "polyester_lining"]

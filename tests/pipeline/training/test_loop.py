@@ -178,10 +178,10 @@ def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tm
 def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
     """Held-out mean squared error against the variance of the truth, over all four components.
 
-    A model that ignores its inputs leaves all of the variance unexplained; 300 steps leave .18 (woven) and .28 (neumip)
+    A model that ignores its inputs leaves all of the variance unexplained; 300 steps leave .18 (woven) and .27 (neumip)
     of the closed form of conftest. Half is the bar.
     """
-    training = TrainingOptions(steps=300, batch=1024, fabrics=2, learning_rate=3e-3, device="cpu")
+    training = TrainingOptions(steps=300, batch=256, fabrics=2, learning_rate=3e-3, device="cpu")
     train(OPTIONS[model], training, folder, FABRICS[model], tmp_path)
     (method,) = load_methods(OPTIONS[model], [tmp_path])
     manifest = Manifest.load(folder)
@@ -266,20 +266,6 @@ def test_the_average_follows_its_closed_form(tmp_path):
         keep = min(0.5, (1 + step) / (10 + step))
         expected = keep * expected + (1 - keep) * (step + 1)
     assert state.weights()["weight"].item() == pytest.approx(expected, rel=1e-6)
-
-
-def test_the_best_state_survives_a_checkpoint(tmp_path):
-    network = torch.nn.Linear(1, 1)
-    states = [State(network, torch.optim.AdamW(network.parameters()), 0.0, "one", tmp_path / "file") for _ in range(2)]
-    for step, (weight, loss) in enumerate([(1.0, 3.0), (2.0, 1.0), (3.0, 2.0)]):
-        torch.nn.init.constant_(network.weight, weight)
-        states[0].add(step, torch.tensor(1.0), torch.tensor(1.0))
-        states[0].offer(step, loss)
-    states[0].save(3)
-    assert states[1].restore(torch.device("cpu")) == 3
-    assert states[1].best == {"step": 1, "held_out_loss": 1.0}
-    assert states[1].best_weights()["weight"].item() == 2.0
-    assert states[1].weights()["weight"].item() == 3.0
 
 
 def test_a_diverging_training_stops_and_keeps_its_checkpoint(folder, tmp_path, monkeypatch):

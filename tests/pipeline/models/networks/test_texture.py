@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from pipeline.models.networks.texture import blurred, level_shapes, read_pyramid, read_texture, shifted
+from pipeline.models.networks.texture import blurred, level_shapes, read_pyramid, read_texture
 
 
 def test_pyramid_halves_down_to_one_texel():
@@ -49,14 +49,6 @@ def test_every_level_is_blurred_by_its_own_texels():
     torch.testing.assert_close(read, blurred(coarse, 2.0)[:, 2, 2][None])
     read = read_pyramid([fine], place, place, sigma, 4, blur=4.0)
     torch.testing.assert_close(read, blurred(fine, 4.0)[:, 4, 4][None])
-
-
-def test_shift_is_clamped_at_grazing_views():
-    wo = torch.tensor([[0.6, 0.0, 0.8], [0.0, 0.96, 0.28]])
-    half = torch.full((2,), 0.5)
-    u, v = shifted(torch.full((2, 1), 1.5), half, half, wo, (4, 1))
-    torch.testing.assert_close(u, torch.tensor([0.5 + 0.15 * 0.6 / 0.8 * 2 / 4, 0.5]))
-    torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + 0.15 * 0.96 / 0.6 * 2 / 1]))
 
 
 def test_what_is_exported_reads_the_same(monkeypatch):

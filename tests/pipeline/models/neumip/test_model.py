@@ -33,7 +33,7 @@ def test_blur_halves_and_the_offset_freezes():
 
 def test_offset_shifts_along_the_view():
     """With the published clamp: r wo.xy / max(wo.z, 0.6), here r fixed by the perceptron's last bias."""
-    network = NeumipNetwork(SMALL, (2, 2)).eval()
+    network = NeumipNetwork(SMALL, (4, 1)).eval()
     seen = []
     network.read = lambda levels, u, v, sigma: seen.append((u, v)) or torch.zeros(len(u), 7)
     with torch.no_grad():
@@ -44,8 +44,8 @@ def test_offset_shifts_along_the_view():
     half = torch.full((2,), 0.5)
     network(half, half, half, wo, wo)
     (u, v), depth = seen[1], 0.1 * 1.5
-    torch.testing.assert_close(u, torch.tensor([0.5 + depth * 0.6 / 0.8, 0.5]))
-    torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + depth * 0.96 / 0.6]))
+    torch.testing.assert_close(u, torch.tensor([0.5 + depth * 0.6 / 0.8 * 2 / 4, 0.5]))
+    torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + depth * 0.96 / 0.6 * 2 / 1]))
 
 
 def test_textures_learn_faster():

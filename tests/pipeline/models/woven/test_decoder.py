@@ -1,7 +1,5 @@
 """The decoder: published counts, one-blobs."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
@@ -57,13 +55,6 @@ def test_periodic_blob_does_not_see_whole_turns():
         torch.testing.assert_close(periodic_blob(x + turns, 0.1, 8), periodic_blob(x, 0.1, 8), rtol=0, atol=1e-12)
 
 
-def test_periodic_blob_turns_with_its_argument():
-    """Moving x by one bin moves the code by one bin, around the edge too."""
-    x = numbers(2)
-    moved = periodic_blob(x + 1 / 8, 0.1, 8)
-    torch.testing.assert_close(moved, periodic_blob(x, 0.1, 8).roll(1, dims=-1), rtol=0, atol=1e-12)
-
-
 def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
     """The series ends at m = 7; at the deviation 1/8 what is left out is e^{-2 pi^2} = 3e-9."""
     x, deviation = numbers(3)[:16], 1 / 8
@@ -84,24 +75,12 @@ def test_wide_blobs_fill_all_bins_alike():
 
 
 def test_plain_blob_holds_the_integral_of_a_gaussian_over_each_bin():
-    expected = np.diff(norm.cdf(np.linspace(0, 1, 9), loc=0.3, scale=1 / 8))
-    np.testing.assert_allclose(one_blob(torch.tensor([0.3]), 8)[0], expected, atol=1e-6)
-
-
-def test_plain_blob_loses_half_at_an_edge():
-    torch.testing.assert_close(one_blob(torch.tensor([0.0, 1.0]), 8).sum(-1), torch.full((2,), 0.5))
-
-
-def test_plain_and_periodic_agree_far_from_the_edges():
-    x = torch.tensor([0.5])
-    torch.testing.assert_close(one_blob(x, 8), periodic_blob(x, 1 / 8, 8), rtol=0, atol=1e-4)
+    """Half of it is lost at an edge."""
+    x = np.array([[0.0], [0.3], [1.0]])
+    expected = np.diff(norm.cdf(np.linspace(0, 1, 9), loc=x, scale=1 / 8))
+    np.testing.assert_allclose(one_blob(torch.tensor([0.0, 0.3, 1.0]), 8), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(("sigma", "expected"), [(1e-9, 0.0), (0.01, 0.0), (0.1, 0.5), (1.0, 1.0), (1e9, 1.0)])
 def test_size_is_the_clamped_logarithm(sigma, expected):
     assert encoded_size(torch.tensor(sigma), 0.01, 1.0).item() == pytest.approx(expected, abs=1e-6)
-
-
-def test_size_grows_by_equal_steps_for_equal_ratios():
-    sizes = encoded_size(torch.tensor([0.02, 0.04, 0.08]), 0.01, 1.0)
-    assert sizes.diff().numpy() == pytest.approx(math.log10(2) / 2, abs=1e-6)
