@@ -7,14 +7,11 @@ from weaves.errors import BadInput
 
 
 def test_without_llvm_the_scalar_variant_is_used_and_said(monkeypatch):
+    monkeypatch.setattr(module, "llvm_works", lambda: True)
+    assert module.best_variant() == "llvm_ad_rgb"
     monkeypatch.setattr(module, "llvm_works", lambda: False)
     with pytest.warns(UserWarning, match=r"apt install libllvm19.*DRJIT_LIBLLVM_PATH"):
         assert module.best_variant() == "scalar_rgb"
-
-
-def test_with_llvm_nothing_is_said(monkeypatch):
-    monkeypatch.setattr(module, "llvm_works", lambda: True)
-    assert module.best_variant() == "llvm_ad_rgb"
 
 
 def test_the_plugins_are_there_again_after_a_change_of_variant(use):

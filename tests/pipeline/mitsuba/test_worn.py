@@ -49,9 +49,8 @@ def test_derivatives_are_in_yarns_of_both_sphere():
     jacobian = np.array([[[0.004, 0.0], [0.0, 0.004]]])
     cloth = Worn(ClothOptions(fabric="denim", yarns=100.0, yarns_v=50.0))
     value = cloth.eval(hits_of(viewer, uv=(0.0062, 0.0114), jacobian=jacobian), light[None])
-    number = lambda x: np.array([x], np.float32)  # noqa: E731
-    wi, wo = (w[None].astype(np.float32) for w in (light, viewer))
-    query = Queries(number(0.62), number(0.57), number(0.2), wi, wo, number(0.1), number(0.0), number(0.0))
+    columns = ([0.62], [0.57], [0.2], [light], [viewer], [0.1], [0.0], [0.0])
+    query = Queries(*(np.array(column, np.float32) for column in columns))
     np.testing.assert_allclose(value, PatchBSDF(load_fabric("denim")).eval(query), rtol=1e-4)
 
 

@@ -1,4 +1,4 @@
-"""The examples of docs/shader.md, word for word: the picture in a browser and the node in C++."""
+"""The examples of docs/shader_examples.md, word for word: the picture in a browser and the node in C++."""
 
 import re
 import shutil
@@ -17,7 +17,7 @@ from tests.pipeline.shader.conftest import ALLOWED, read
 
 pytestmark = pytest.mark.external  # slangc, g++ and Chromium
 
-PAGE = Path(__file__).parents[3] / "docs" / "shader.md"
+PAGE = Path(__file__).parents[3] / "docs" / "shader_examples.md"
 
 
 def example(language):
