@@ -19,23 +19,13 @@ name = "bent"
 seen = ["denim", "own.toml", "voile"]
 shard_rows = 1000
 seed = 9
-
-[dataset.rows]
-train = 1500
-validation = 200
-test = 300
-
-[dataset.queries]
-curvature = [0.01, 0.4]
-behind = 0.25
-
-[dataset.truth]
-relative_error = 0.1
+rows = { train = 1500, validation = 200, test = 300 }
+queries = { curvature = [0.01, 0.4], behind = 0.25 }
+truth = { relative_error = 0.1 }
 
 [[models]]
 model = "curved"
-[models.training]
-steps = 20
+training = { steps = 20 }
 
 [[models]]
 model = "neumip"
@@ -53,18 +43,9 @@ name = "sheer"
 seen = ["denim", "own.toml", "organza"]
 shard_rows = 1000
 seed = 9
-
-[dataset.rows]
-train = 1500
-validation = 200
-test = 300
-
-[dataset.queries]
-sigma = [0.05, 8.0]
-behind = 0.25
-
-[dataset.truth]
-relative_error = 0.1
+rows = { train = 1500, validation = 200, test = 300 }
+queries = { sigma = [0.05, 8.0], behind = 0.25 }
+truth = { relative_error = 0.1 }
 
 [[models]]
 model = "woven"
@@ -104,8 +85,7 @@ def test_seeds_are_those_of_the_other_recipe(asks, files):
 
 def test_the_other_recipe_says_everything(asks, files):
     recipe = asks()
-    bent = load_recipe(files.folder / "bent.toml")
-    assert recipe.models[-1] == bent.models[0]
+    assert recipe.models[-1] == load_recipe(files.folder / "bent.toml").models[0]
     assert recipe.trained_by.keys() == {"curved"} and recipe.trained_by["curved"].name == "bent"
     assert [model.options.name for model in recipe.own_models] == ["woven", "neumip", "point_sampled"]
 
@@ -117,9 +97,7 @@ def test_the_trainings_are_those_of_the_other_recipe(asks, files):
     trainings = {task.id: task for task in tasks if task.stage == "train"}
     theirs = {task.id: task for task in own}
     for key in taught:
-        assert trainings[key].products == theirs[key].products
-        assert trainings[key] == theirs[key]
-        assert trainings[key].dataset.startswith("datasets/bent-")
+        assert trainings[key] == theirs[key] and trainings[key].dataset.startswith("datasets/bent-")
     # Of its rows those alone that are learnt from.
     there = {task.id for task in tasks if task.stage == "generate" and task.products[0].startswith("datasets/bent-")}
     assert there == {need for key in taught for need in trainings[key].needs}
@@ -166,11 +144,8 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     files.recipe += '\n[bench.scenes]\nnames = ["curtain", "dinner_table"]\n'
     tasks = plan(asks())
     titles = {task.title: task for task in tasks if task.stage == "bench"}
-    assert (
-        "errors of curved, denim" in titles
-        and "errors of curved, own" in titles
-        and "errors of curved, twill_4_4" not in titles
-    )
+    measured = [name for name in ("denim", "own", "twill_4_4") if f"errors of curved, {name}" in titles]
+    assert measured == ["denim", "own"]
     assert list(titles["errors of curved, denim"].model.needs) == ids(tasks, "train", "curved on denim")
     assert "scene errors of curved, curtain" in titles and "errors in the scene of curved, dinner_table" not in titles
     assert [fabric.name for fabric, _ in titles["extremes of curved"].fabrics] == ["denim"]
@@ -264,9 +239,7 @@ def test_ways_to_run_are_nothing_to_methods_without_a_network(files):
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ('model = "curved"\nrecipe = "bendt"', ["models.3.recipe = 'bendt'", "a recipe's name or the path"]),
         ('model = "curved"\nrecipe = "quik"', ["models.3.recipe = 'quik'", "did you mean 'quick'"]),
-        ('model = "curved"\nrecipe = 3', ["models.3.recipe = 3"]),
         ('model = "curved"\nrecipe = []', ["models.3.recipe = []"]),
         ('model = "curved"\nrecipe = "none.toml"', ["models.3.recipe = 'none.toml'"]),
         ('model = "curvd"\nrecipe = "bent.toml"', ["models.3.model = 'curvd'", "recipe bent", "did you mean 'curved'"]),
@@ -285,10 +258,7 @@ def test_ways_to_run_are_nothing_to_methods_without_a_network(files):
 def test_bad_input_is_one_sentence(asks, entry, words):
     with pytest.raises(BadInput) as caught:
         asks(entry=f"\n[[models]]\n{entry}\n")
-    sentence = str(caught.value)
-    assert "\n" not in sentence
-    for word in words:
-        assert word in sentence
+    assert "\n" not in str(caught.value) and all(word in str(caught.value) for word in words)
 
 
 def test_recipes_that_wait_for_one_another(asks):
@@ -304,17 +274,11 @@ def test_another_cloth_of_the_same_name(asks, files):
         asks(TRAINER.replace('"own.toml"', '"other/own.toml"'))
 
 
-BENCH_WITHOUT_SHADOWS = """
-[bench]
-truth = { shadows = false }
-frame_truth = { shadows = false }
-"""
-
-
 def test_other_physics(asks):
+    shadowless = GENERAL.replace("relative_error = 0.1", "shadows = false")
+    shadowless += "\n[bench]\ntruth = { shadows = false }\nframe_truth = { shadows = false }\n"
     with pytest.raises(BadInput, match="shadows = True: must be that of the recipe sheer, False"):
-        shadowless = GENERAL.replace("relative_error = 0.1", "shadows = false")
-        asks(shadowless + BENCH_WITHOUT_SHADOWS, SHEER, "sheer")
+        asks(shadowless, SHEER, "sheer")
 
 
 def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):
@@ -324,22 +288,11 @@ def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):
         assert list(task.model.needs) == ids(tasks, "train", "woven_sheer")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('"own.toml", ', "", "trained there on own, which is seen here"),
-        ('"organza"]', '"twill_4_4"]', "trained there on twill_4_4, of the draft of twill_4_4, unseen here"),
-    ],
-)
-def test_what_is_seen_and_unseen_holds_for_a_general_model_too(asks, old, new, words):
-    with pytest.raises(BadInput, match=words):
-        asks(GENERAL.replace(old, new), SHEER, "sheer")
-
-
-def test_a_general_model_must_know_yarns_like_those_unseen(asks, files):
-    files.recipe = files.recipe.replace('unseen = ["twill_4_4"]', 'unseen = ["voile"]').replace("twill 4/4", "plain")
-    with pytest.raises(BadInput, match="woven_sheer was trained on"):
-        asks(GENERAL.replace('"organza"]', '"crepe"]'), SHEER, "sheer")
+def test_what_is_seen_and_unseen_holds_for_a_general_model_too(asks):
+    with pytest.raises(BadInput, match="trained there on own, which is seen here"):
+        asks(GENERAL.replace('"own.toml", ', ""), SHEER, "sheer")
+    with pytest.raises(BadInput, match="trained there on twill_4_4, of the draft of twill_4_4, unseen here"):
+        asks(GENERAL.replace('"organza"]', '"twill_4_4"]'), SHEER, "sheer")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import shutil
 
 import pytest
 
-from jobs.cli import main
 from jobs.plan.dataset import Shard
 from jobs.plan.page import Page
 from jobs.plan.training import Training
@@ -18,10 +17,7 @@ name = "tiny"
 [dataset]
 seen = ["denim"]
 shard_rows = 64
-[dataset.rows]
-train = 128
-validation = 32
-test = 64
+rows = { train = 128, validation = 32, test = 64 }
 [[models]]
 model = "woven"
 [[models]]
@@ -41,16 +37,15 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def run(whole, tmp_path, monkeypatch, capsys):
+def run(whole, tmp_path, monkeypatch, twillight):
     """Return a copy of that folder, and the command line on it: code and both outputs."""
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     monkeypatch.setattr("jobs.verbs.run.execute", made_up.execute)
     monkeypatch.setattr("jobs.verbs.run._print_methods", lambda records: None)
 
     def run(*more):
-        code = main(["check", str(tmp_path / "tiny.toml"), "--out", str(tmp_path / "out"), *more])
-        told = capsys.readouterr()
-        return code, told.out.replace("\n", " "), told.err
+        code, said, told = twillight("check", tmp_path / "tiny.toml", "--out", tmp_path / "out", *more)
+        return code, said.replace("\n", " "), told
 
     run.out = tmp_path / "out"
     run.tasks = made_up.plan(made_up.load_recipe(tmp_path / "tiny.toml"))
@@ -72,13 +67,10 @@ def same(found, expected, but=()):
     assert changed <= set(but), changed
 
 
-def test_a_finished_recipe_is_sound(run):
+def test_a_finished_recipe_is_sound_and_an_empty_folder_is_not(run):
     code, said, told = run()
     assert code == 0 and told == ""
     assert "4 shards with 224 rows, 2 models" in said and "are sound" in said
-
-
-def test_an_empty_folder_is_not_sound(run):
     shutil.rmtree(run.out)
     code, said, told = run()
     assert code == 1 and "sound" not in said
@@ -148,24 +140,22 @@ def test_values_that_were_never_right_are_odd(run):
 
 
 def test_a_measurement_of_time_is_taken_again_and_shown(run):
-    timing = next(task for task in run.tasks if task.slots == "all")
+    timing, page = next(task for task in run.tasks if task.slots == "all"), run.of(Page)
     expected = made_up.contents(run.out)
     flip(run.out / timing.records)
     assert run("--repair")[0] == 0
-    found, page = made_up.contents(run.out), run.of(Page)
+    found = made_up.contents(run.out)
     changed = [timing.records, page.products[0], f"ledger/{timing.id}.json", f"ledger/{page.id}.json"]
     same(found, expected, but=changed)
     assert found[page.products[0]] != expected[page.products[0]]
 
 
-def test_a_run_writes_the_page_again_if_times_are_missing(run, capsys):
+def test_a_run_writes_the_page_again_if_times_are_missing(run, twillight):
     timing, page = next(task for task in run.tasks if task.slots == "all"), run.of(Page)
     before = (run.out / page.products[0]).read_bytes()
     (run.out / timing.records).unlink()
-    command = [str(run.out.parent / "tiny.toml"), "--out", str(run.out)]
-    assert main(["bench", *command]) == 0 and not (run.out / page.products[0]).exists()
-    assert main(["report", *command]) == 0 and (run.out / page.products[0]).read_bytes() != before
-    capsys.readouterr()
+    assert twillight("bench", "tiny.toml")[0] == 0 and not (run.out / page.products[0]).exists()
+    assert twillight("report", "tiny.toml")[0] == 0 and (run.out / page.products[0]).read_bytes() != before
     assert run()[0] == 0
 
 

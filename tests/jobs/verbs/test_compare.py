@@ -2,7 +2,6 @@
 
 import pytest
 
-from jobs.cli import main
 from reports.record import OF_A_PAGE, Record, machine_path, this_machine, write_records
 
 
@@ -27,13 +26,10 @@ def write(tmp_path):
 
 
 @pytest.fixture
-def compare(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
-
+def compare(twillight):
     def call(*tokens):
-        code = main(["compare", *map(str, tokens)])
-        captured = capsys.readouterr()
-        return code, " ".join(captured.out.split()), captured.err
+        code, text, told = twillight("compare", *tokens)
+        return code, " ".join(text.split()), told
 
     return call
 

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import pipeline.shards.evaluate
-from jobs.cli import main
 from jobs.verbs.evaluate import truth_options
 from pipeline.truth.options import TruthOptions
 
@@ -27,22 +27,14 @@ def query_columns():
 
 
 @pytest.fixture
-def twillight(capsys, monkeypatch, tmp_path):
-    """Run the verb in a folder with a file of queries; return exit code, output and complaint."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    pq.write_table(pa.table(query_columns()), "queries.parquet")
-
-    def call(*tokens, fabric="denim"):
-        code = main(["evaluate", fabric, *tokens])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
+def evaluate(twillight, tmp_path):
+    """Run the verb on a file of queries; return exit code, output and complaint."""
+    pq.write_table(pa.table(query_columns()), tmp_path / "queries.parquet")
+    return partial(twillight, "evaluate", "denim", "queries.parquet", "--out")
 
 
-def test_a_summary_tells_what_was_done(twillight, tmp_path):
-    code, text, complaint = twillight("queries.parquet", "--out", "deep/result.parquet", "--relative-error", "0.1")
+def test_a_summary_tells_what_was_done(evaluate, tmp_path):
+    code, text, complaint = evaluate("deep/result.parquet", "--relative-error", "0.1")
     assert (code, complaint) == (0, "")
     table = pq.read_table(tmp_path / "deep" / "result.parquet")
     assert table["id"].to_pylist() == list(range(ROWS))
@@ -52,34 +44,34 @@ def test_a_summary_tells_what_was_done(twillight, tmp_path):
     assert "deep/result.parquet" in text
     # The same command writes the same bytes on any number of threads; another seed, estimator or footprint does not.
     first = (tmp_path / "deep" / "result.parquet").read_bytes()
-    twillight("queries.parquet", "--out", "deep/one.parquet", "--relative-error", "0.1", "--workers", "1")
+    evaluate("deep/one.parquet", "--relative-error", "0.1", "--workers", "1")
     assert (tmp_path / "deep" / "one.parquet").read_bytes() == first
     for choice in ((), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
-        twillight("queries.parquet", "--out", "deep/result.parquet", "--relative-error", "0.1", *choice)
+        evaluate("deep/result.parquet", "--relative-error", "0.1", *choice)
         assert ((tmp_path / "deep" / "result.parquet").read_bytes() == first) == (not choice), choice
 
 
-def test_bad_rows_are_listed_when_skipped(twillight, tmp_path):
+def test_bad_rows_are_listed_when_skipped(evaluate, tmp_path):
     columns = query_columns()
     columns["sigma"][3] = 0.0
     pq.write_table(pa.table(columns), tmp_path / "queries.parquet")
-    code, text, complaint = twillight("queries.parquet", "--out", "result.parquet", "--skip-bad")
+    code, text, complaint = evaluate("result.parquet", "--skip-bad")
     assert (code, complaint) == (0, "") and "1 bad row has no answer; see result.bad.csv" in text
     listed = (tmp_path / "result.bad.csv").read_text().splitlines()
     assert listed == ["row,column,value,reason", "3,sigma,0.0,must be greater than 0"]
 
 
-def test_ctrl_c_says_that_nothing_was_written(twillight, tmp_path, monkeypatch):
+def test_ctrl_c_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch):
     def stop(*arguments, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pipeline.shards.evaluate, "estimate", stop)
-    code, _, complaint = twillight("queries.parquet", "--out", "result.parquet")
+    code, _, complaint = evaluate("result.parquet")
     assert code == 130 and complaint == "stopped; result.parquet was not written\n"
     assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
 
 
-def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(twillight, tmp_path):
+def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(evaluate, tmp_path):
     """The process kills itself after half of the rows, with rows already handed to the writer."""
     code = (
         "import os, signal, pipeline.shards.query_file as q, pipeline.shards.evaluate as e\n"
@@ -98,7 +90,7 @@ def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(twillight, tmp_pa
     assert done.returncode == -signal.SIGKILL
     left = {path.name for path in tmp_path.iterdir()}
     assert left <= {"queries.parquet", ".tmp-result.parquet", ".tmp-result.bad.csv"} and ".tmp-result.parquet" in left
-    assert twillight("queries.parquet", "--out", "result.parquet", "--skip-bad")[0] == 0
+    assert evaluate("result.parquet", "--skip-bad")[0] == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["queries.parquet", "result.bad.csv", "result.parquet"]
     assert pq.read_table(tmp_path / "result.parquet").num_rows == ROWS
 

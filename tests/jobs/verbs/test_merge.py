@@ -4,7 +4,6 @@ import shutil
 
 import pytest
 
-from jobs.cli import main
 from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
@@ -16,9 +15,8 @@ from tests.jobs.verbs.test_prune import RECIPE
 
 
 @pytest.fixture
-def parts(tmp_path, monkeypatch, capsys):
+def parts(tmp_path, twillight):
     """Return the command line on two folders, each with every other shard of a data set."""
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "wide.toml").write_text(RECIPE.format(name="wide", train=512, model="woven"))
     recipe = load_recipe("wide.toml")
     tasks = made_up.plan(recipe)
@@ -28,9 +26,8 @@ def parts(tmp_path, monkeypatch, capsys):
         ManifestFile(DataSet(recipe), Ledger(out)).save()
 
     def merge(*tokens):
-        code = main(["merge", *tokens])
-        told = capsys.readouterr()
-        return code, " ".join(told.out.split()), told.err
+        code, said, told = twillight("merge", *tokens)
+        return code, " ".join(said.split()), told
 
     merge.tasks, merge.folder = tasks, DataSet(recipe).folder
     return merge

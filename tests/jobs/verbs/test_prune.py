@@ -2,7 +2,6 @@
 
 import pytest
 
-from jobs.cli import main
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from tests.jobs import made_up
@@ -12,10 +11,7 @@ name = "{name}"
 [dataset]
 seen = ["denim"]
 shard_rows = 64
-[dataset.rows]
-train = {train}
-validation = 32
-test = 64
+rows = {{ train = {train}, validation = 32, test = 64 }}
 [[models]]
 model = "{model}"
 [bench]
@@ -26,9 +22,8 @@ FOREIGN = ("crash-0.txt", "recipes/require-x.toml", "records/by-hand.json", "dat
 
 
 @pytest.fixture
-def two(tmp_path, monkeypatch, capsys):
+def two(tmp_path, twillight):
     """Return the command line on a folder with two finished recipes that share shards, and with foreign files."""
-    monkeypatch.chdir(tmp_path)
     for name, train, model in (("narrow", 128, "woven"), ("wide", 256, "neumip")):
         (tmp_path / f"{name}.toml").write_text(RECIPE.format(name=name, train=train, model=model))
         made_up.finished(tmp_path / f"{name}.toml", tmp_path / "out")
@@ -37,9 +32,8 @@ def two(tmp_path, monkeypatch, capsys):
         (tmp_path / "out" / path).write_text("x")
 
     def prune(*tokens):
-        code = main(["prune", *tokens])
-        told = capsys.readouterr()
-        return code, " ".join(told.out.split()), told.err
+        code, said, told = twillight("prune", *tokens)
+        return code, " ".join(said.split()), told
 
     return prune
 
@@ -48,25 +42,18 @@ def done(recipe, out):
     return all(Ledger(out).state(task) == "done" for task in made_up.plan(load_recipe(recipe)))
 
 
-def test_nothing_is_removed_that_a_named_recipe_needs(two, tmp_path):
+def test_nothing_is_removed_that_a_named_recipe_needs_nor_by_a_list(two, tmp_path):
     before = made_up.contents(tmp_path / "out")
     code, said, _ = two("narrow.toml", "wide.toml", "--delete")
     assert code == 0 and "nothing to remove" in said
-    assert made_up.contents(tmp_path / "out") == before
-
-
-def test_a_list_removes_nothing_and_names_what_is_kept(two, tmp_path):
-    before = made_up.contents(tmp_path / "out")
     code, said, _ = two("wide.toml")
-    assert code == 0 and "--delete removes them" in said
-    assert all(path in said for path in FOREIGN)
+    assert code == 0 and "--delete removes them" in said and all(path in said for path in FOREIGN)
     assert made_up.contents(tmp_path / "out") == before
 
 
 @pytest.mark.parametrize(("kept", "gone"), [("narrow", "wide"), ("wide", "narrow")])
 def test_the_other_recipe_goes_with_receipts_and_folders(two, tmp_path, kept, gone):
-    out = tmp_path / "out"
-    alone = tmp_path / "alone"
+    out, alone = tmp_path / "out", tmp_path / "alone"
     made_up.finished(f"{kept}.toml", alone)
     code, said, _ = two(f"{kept}.toml", "--delete")
     assert code == 0 and "files removed" in said

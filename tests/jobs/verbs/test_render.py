@@ -2,6 +2,7 @@
 
 import re
 import sys
+from functools import partial
 
 import matplotlib.image
 import numpy as np
@@ -26,17 +27,8 @@ COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
 
 
 @pytest.fixture
-def render(capsys, monkeypatch, tmp_path):
-    """Run the verb in a folder of its own; return exit code, output and complaint."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*tokens):
-        code = main(["render", *tokens])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
+def render(twillight):
+    return partial(twillight, "render")
 
 
 def codes_of(path):

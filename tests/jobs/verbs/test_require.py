@@ -2,8 +2,8 @@
 
 import pytest
 
-from jobs.cli import main
 from jobs.recipe.load import load_recipe
+from jobs.verbs import require as verb
 from reports.measure.by_size import EDGES
 from reports.record import OF_A_PAGE, Record, read_records, this_machine, write_records
 
@@ -11,17 +11,12 @@ RECIPE = """
 name = "wide"
 [dataset]
 seen = ["denim", "silk_charmeuse", "polyester_lining", "basket"]
-[dataset.rows]
-train = 8192
-[dataset.queries]
-sigma = [0.05, 8.0]
-max_angle = 80.0
-[dataset.training_truth]
-estimator = "node_table"
+rows = { train = 8192 }
+queries = { sigma = [0.05, 8.0], max_angle = 80.0 }
+training_truth = { estimator = "node_table" }
 [[models]]
 model = "woven"
-[models.training]
-steps = 400
+training = { steps = 400 }
 [[models]]
 model = "neumip"
 [[models]]
@@ -40,10 +35,9 @@ ERRORS = {
 
 
 @pytest.fixture
-def require(tmp_path, capsys, monkeypatch):
+def require(tmp_path, twillight):
     """Call the command in a folder that holds a page with errors and times by size."""
-    monkeypatch.setenv("COLUMNS", "160")
-    monkeypatch.chdir(tmp_path)
+    pytest.importorskip("mitsuba")
     (tmp_path / "wide.toml").write_text(RECIPE)
     records = []
     for (method, setting), (error, ns) in ERRORS.items():
@@ -55,15 +49,13 @@ def require(tmp_path, capsys, monkeypatch):
     write_records(folder / OF_A_PAGE, records, this_machine(1))
 
     def call(*tokens):
-        code = main(["require", *tokens, "--recipe", "wide.toml", "--frames", "1"])
-        captured = capsys.readouterr()
-        return code, " ".join(captured.out.split()), captured.err
+        code, text, told = twillight("require", *tokens, "--recipe", "wide.toml", "--frames", "1")
+        return code, " ".join(text.split()), told
 
     return call
 
 
 def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
-    pytest.importorskip("mitsuba")
     code, text, _ = require("plane", "--error", ".3")
     assert code == 0
     assert "denim 100 %" in text and "light from behind 0.0 %" in text
@@ -75,7 +67,6 @@ def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, 
 
 
 def test_a_method_may_be_wished_for(require, tmp_path):
-    pytest.importorskip("mitsuba")
     code, text, _ = require("plane", "--method", "woven", "--effort", ".5", "--set", "hidden=16")
     assert code == 0 and "(from its footprints)" in text
     own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
@@ -85,20 +76,15 @@ def test_a_method_may_be_wished_for(require, tmp_path):
 
 def test_what_lies_beyond_the_general_domain_counts_as_quadratures(require, monkeypatch):
     """The plane reaches the horizon: of a model trained up to 80 degrees, what is seen steeper is not its own."""
-    pytest.importorskip("mitsuba")
-    import jobs.verbs.require as module
-
-    seen = {}
-    before = module._fallback_share
+    seen, share = {}, verb._fallback_share
     monkeypatch.setattr(
-        module, "_fallback_share", lambda model, *rest: seen.setdefault(model.options.name, before(model, *rest))
+        verb, "_fallback_share", lambda model, *rest: seen.setdefault(model.options.name, share(model, *rest))
     )
     assert require("plane")[0] == 0
     assert 0.1 < seen["woven"] < 0.9 and seen["woven"] == seen["neumip"] and seen["point_sampled"] == 0.0
 
 
 def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
-    pytest.importorskip("mitsuba")
     code, _, told = require("plane", "--error", ".01", "--time", ".001")
     assert code == 2 and told.count("\n") == 1
     assert "no method meets them" in told and "point_sampled k = 2" in told
@@ -107,13 +93,11 @@ def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
 
 
 def test_a_method_that_was_not_measured_is_refused(require):
-    pytest.importorskip("mitsuba")
     code, _, told = require("plane", "--method", "neumip")
     assert code == 2 and told.count("\n") == 1 and "--method = 'neumip': it was not measured" in told
 
 
 def test_a_method_that_only_an_old_page_has_is_refused(require, tmp_path):
-    pytest.importorskip("mitsuba")
     path = tmp_path / "out" / "report" / "wide" / OF_A_PAGE
     best = Record(method="sums", scene="plane", threads=1)
     numbers = {"mse": 1e-6, "colour_rrmse": 0.001, "fallback_share": 0.0, "frame_time": 1e-6}

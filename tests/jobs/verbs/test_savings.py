@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jobs.cli import main
 from jobs.plan.measurements.scenes import OnScene, SceneShot
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
@@ -30,20 +29,13 @@ name = "wide"
 [dataset]
 seen = ["silk_charmeuse", "denim", "basket"]
 shard_rows = 4096
-[dataset.rows]
-train = 8192
-validation = 512
-test = 1024
+rows = { train = 8192, validation = 512, test = 1024 }
 [[models]]
 model = "neumip"
-[models.training]
-steps = 400
-batch = 64
+training = { steps = 400, batch = 64 }
 [[models]]
 model = "woven"
-[models.training]
-steps = 100
-batch = 32
+training = { steps = 100, batch = 32 }
 [[models]]
 model = "point_sampled"
 counts = [2, 4]
@@ -70,19 +62,21 @@ class Runs:
 
     def run(self, recipe, seconds):
         """Write receipts of all shards and trainings, each of which took so many seconds."""
-        ledger = Ledger(self.out)
         for task in plan(load_recipe(recipe)):
             if task.stage not in ("generate", "train"):
                 continue
-            for path in task.products:
-                file = self.out / path
+            for file in map(self.out.joinpath, task.products):
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_text("1234567")
             if task.stage == "train":
                 write_model(self.out / task.folder, b"1234567", {"steps_taken": task.training.steps})
-            files = {(self.out / path).name: Product.of(self.out / path) for path in task.products}
-            ledger.finish(task, files, seconds)
+            self.finish(task, seconds)
         return self
+
+    def finish(self, task, seconds=1.0):
+        """Write the receipt of a task whose products are there."""
+        files = {Path(path).name: Product.of(self.out / path) for path in task.products}
+        Ledger(self.out).finish(task, files, seconds)
 
     def page(self, name, mse, ms, method="neumip", setting=""):
         """Write a page's Records of a method and of 2 points, whose frame takes 10 ms."""
@@ -104,15 +98,11 @@ class Runs:
         folder.mkdir(parents=True, exist_ok=True)
         write_records(folder / OF_A_PAGE, records, this_machine(1))
         if name != "wide":
-            self.finish_page()
+            page = plan(load_recipe(self.own))[-1]
+            (self.out / page.products[0]).write_text("<html>")
+            write_files(self.out / page.folder, [])
+            self.finish(page)
         return self
-
-    def finish_page(self):
-        """Write the receipt of the page of the scene's recipe."""
-        page = plan(load_recipe(self.own))[-1]
-        (self.out / page.products[0]).write_text("<html>")
-        write_files(self.out / page.folder, [])
-        Ledger(self.out).finish(page, {Path(path).name: Product.of(self.out / path) for path in page.products}, 1.0)
 
 
 @pytest.fixture
@@ -197,8 +187,7 @@ def test_pictures_of_both_recipes_are_paired_where_they_are_there(runs):
                 continue
             for path in map(runs.out.joinpath, task.products):
                 path.touch()
-            files = {Path(path).name: Product.of(runs.out / path) for path in task.products}
-            Ledger(runs.out).finish(task, files, 1.0)
+            runs.finish(task)
     row = by_quantity(runs)[DIFFERENCE]
     assert row.narrow == pytest.approx((-0.03, -0.03, -0.03), rel=1e-5) and math.isnan(row.ratio)
     for path in runs.out.glob("records/scene-truth-sphere-*.npz"):  # of the right size, with other bytes
@@ -218,16 +207,16 @@ def write_frames(path, fabric):
     np.savez(path, about=np.array(json.dumps(about)), base=np.zeros((1, 8, 8, 3), np.float32), **arrays)
 
 
-def test_less_than_the_aim_is_said(runs):
+def test_less_than_the_aim_is_said():
     few, same = Value(2.0), Value(1.0)
     rows = [SceneSaving("s", "m", name, "1", few, same) for name in ("queries generated", "queries learnt from", "mse")]
     assert conclusion(rows).endswith("less than 3 times.")
 
 
-def test_the_command_prints_and_writes_all_of_it(runs, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
-    assert main(["savings", str(both(runs).general), "sphere", "--out", str(runs.out)]) == 0
-    text = " ".join(capsys.readouterr().out.split())
+def test_the_command_prints_and_writes_all_of_it(runs, twillight):
+    code, text, _ = twillight("savings", both(runs).general, "sphere", "--out", runs.out)
+    text = " ".join(text.split())
+    assert code == 0
     assert "queries generated 29,184 3.58e+03 8.14" in text
     assert "sphere, neumip: 8.1 times fewer queries to generate, 12.0 times fewer to learn from" in text
     with (runs.out / "report" / "savings.csv").open(newline="") as file:
@@ -237,11 +226,9 @@ def test_the_command_prints_and_writes_all_of_it(runs, capsys, monkeypatch):
 
 
 def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):
-    general = load_recipe(runs.general)
-
     def refused():
         with pytest.raises(BadInput) as caught:
-            saved("sphere", runs.out, general)
+            by_quantity(runs)
         assert "\n" not in str(caught.value)
         return str(caught.value)
 
