@@ -28,7 +28,11 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     x, y = (axis.ravel()[::7].astype(np.float32) for axis in (x, y))
     wi, wo = (np.tile(unit(*w), (len(x), 1)) for w in (wi, wo))
     queries = Queries.round(x, y, np.full(len(x), 1e-4, np.float32), wi, wo)
-    found = answer(tabulate(fabric, PER_YARN), queries, NONE)
+    tables = tabulate(fabric, PER_YARN)
+    found = answer(tables, queries, NONE)
+    # One tangent has no variance.
+    for widening in (TOKSVIG, LEAN):
+        np.testing.assert_allclose(answer(tables, queries, widening), found, rtol=RTOL, atol=RTOL * found.max())
 
     area, specular, diffuse = point_shares(fabric, x, y, wi[0], wo[0])
     whole = area.sum(axis=1, keepdims=True)
