@@ -2,6 +2,7 @@
 
 import random
 import time
+from contextlib import nullcontext
 
 import psutil
 import pytest
@@ -34,23 +35,27 @@ def finish(recipe, out, undisturbed, *arguments):
     assert_no_leftovers(out)
 
 
-def test_killed_drivers(recipe, undisturbed, tmp_path):
-    seeded, kills, out = random.Random(1), 0, tmp_path / "0"
-    while kills < KILLS:
-        out.mkdir(exist_ok=True)
-        process = start(recipe, out)
-        alive = wait_for_a_moment(process, out, seeded)
-        children = family(process)
-        if alive:
-            process.kill()
-            kills += 1
-        found = end(process)
-        assert not gone(children), "a killed driver leaves no process"
-        if not alive:
-            assert found.code == 0, found.stderr
-            assert hashes(recipe, out) == undisturbed[1]
-            out = tmp_path / str(kills)
-    finish(recipe, out, undisturbed)
+@pytest.mark.parametrize("theirs", [False, True], ids=["own cluster", "scheduler"])
+def test_killed_drivers(recipe, undisturbed, tmp_path, theirs):
+    """A killed driver leaves no process; workers of a scheduler may still be at its tasks when the next one starts."""
+    seeded, kills, out = random.Random(1 + 3 * theirs), 0, tmp_path / "0"
+    with cluster(tmp_path, 0) if theirs else nullcontext((None, None)) as (_, file):
+        flags = ["--scheduler", str(file)] if theirs else []
+        while kills < KILLS:
+            out.mkdir(exist_ok=True)
+            process = start(recipe, out, *flags)
+            alive = wait_for_a_moment(process, out, seeded)
+            children = family(process)
+            if alive:
+                process.kill()
+                kills += 1
+            found = end(process)
+            assert not gone(children)
+            if not alive:
+                assert found.code == 0, found.stderr
+                assert hashes(recipe, out) == undisturbed[1]
+                out = tmp_path / str(kills)
+        finish(recipe, out, undisturbed, *flags)
 
 
 def test_killed_workers(recipe, undisturbed, tmp_path):
@@ -92,25 +97,6 @@ def test_killed_schedulers(recipe, undisturbed, tmp_path):
             assert hashes(recipe, out) == undisturbed[1]
             out = tmp_path / str(kills)
     finish(recipe, out, undisturbed)
-
-
-def test_killed_clients(recipe, undisturbed, tmp_path):
-    """Workers may still be at the tasks of a killed client when the next one hands them out again."""
-    seeded, out, kills = random.Random(4), tmp_path / "0", 0
-    with cluster(tmp_path, 0) as (_, file):
-        while kills < KILLS:
-            out.mkdir(exist_ok=True)
-            process = start(recipe, out, "--scheduler", str(file))
-            alive = wait_for_a_moment(process, out, seeded)
-            if alive:
-                process.kill()
-                kills += 1
-            found = end(process)
-            if not alive:
-                assert found.code == 0, found.stderr
-                assert hashes(recipe, out) == undisturbed[1]
-                out = tmp_path / str(kills)
-        finish(recipe, out, undisturbed, "--scheduler", str(file))
 
 
 def works(process):
