@@ -94,11 +94,6 @@ class Crew:
         return max(1, sum(self._threads[address] for address in self.accepted))
 
     @property
-    def running(self) -> list[Task]:
-        """Tasks that have not ended."""
-        return [task for task, _ in self._running.values()]
-
-    @property
     def dashboard(self) -> str | None:
         """Address of the dashboard of somebody else's scheduler; None if it has none that this machine can open."""
         if not self._external:

@@ -162,7 +162,7 @@ class _Driver:
             self._start(alone=False)  # workers have something to do while receipts are written
             for task, outcome in ended:
                 self._take(task, _verified(task, outcome, self._ledger))
-            self._board.waiting_for(self._crew.running)
+            self._board.waiting_for(self._ready.running)
 
     def settle(self) -> None:
         """Write what the manifests have put off."""

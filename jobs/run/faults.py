@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -16,7 +17,7 @@ from jobs.recipe.recipe import Recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.reasons import CHANGED, NEVER, reasons
-from jobs.run.receipt import Product
+from jobs.run.receipt import Product, Receipt
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
@@ -92,13 +93,7 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
         wrong += _page_faults(task, ledger)
     if wrong:
         return wrong
-    if isinstance(task, Shard):
-        return [
-            Fault("odd", path, fault.removeprefix(f"{ledger.out / path}: "), task)
-            for path in task.products[:1]
-            for fault in _value_faults(task, ledger.out / path, receipt.files[Path(path).name].sha256)
-        ]
-    return []
+    return list(_value_faults(task, ledger.out, receipt)) if isinstance(task, Shard) else []
 
 
 def _product_fault(ledger: Ledger, path: str, expected: Product | None, task: Task) -> Fault | None:
@@ -139,10 +134,13 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
             yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
 
 
-def _value_faults(part: Shard, path: Path, sha256: str) -> list[str]:
+def _value_faults(part: Shard, out: Path, receipt: Receipt) -> Iterator[Fault]:
+    """Yield the values of a shard that are not allowed."""
     from pipeline.shards.check import check_values
 
-    return check_values(path, part.entry(sha256), part.shard.fabric.weave.repeat)
+    path = out / part.products[0]
+    for fault in check_values(path, part.entry(receipt.files[path.name].sha256), part.shard.fabric.weave.repeat):
+        yield Fault("odd", part.products[0], fault.removeprefix(f"{path}: "), part)
 
 
 def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[Fault]:
@@ -219,7 +217,6 @@ def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, faulty: Set[
 def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]:
     """Yield the files of a recipe's data sets, models, measurements and page, whether they exist or not."""
     from pipeline.shards.manifest import FILE
-    from reports.page.files import read_files
 
     for dataset in map(DataSet, recipe.together):
         yield from (path for part in dataset.shards for path in part.products)
@@ -228,10 +225,8 @@ def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]
         yield from task.products
         if isinstance(task, Page):
             yield f"{task.folder}/{RESULTS}"
-            try:
-                yield from (f"{task.folder}/{name}" for name in read_files(out / task.folder))
-            except BadInput:
-                continue
+            with suppress(BadInput):  # its list of files is damaged
+                yield from task.written(out)
 
 
 def is_leftover(name: str) -> bool:

@@ -126,7 +126,7 @@ class Here:
     dashboard, threads, slots = None, 1, 1
 
     def __init__(self, client, external, hear):
-        self.hear, self.accepted, self.running, self.outcomes = hear, ["here"], [], []
+        self.hear, self.accepted, self.outcomes = hear, ["here"], []
 
     def look(self):
         pass
