@@ -62,9 +62,10 @@ def require(
     from reports.measure.by_size import EDGES, SIZES
     from reports.record import read_records
     from reports.tables.equal_time import size_table
-    from reports.tables.method_choice import cheapest, nearest, of_method, predictions, with_measured
+    from reports.tables.method_choice import nearest, of_method, predictions, with_measured
     from reports.tables.number_format import display
     from reports.tables.summary import rows, scene_table
+    from reports.tables.tradeoff import cheapest
 
     _refuse_limits(error=error, time=time, frames=frames, margin=margin, effort=effort)
     general = load_recipe(recipe, add)
@@ -98,7 +99,7 @@ def require(
     if method and (table := of_method(table, method)).empty:
         allowed = "it was not measured on footprints of these sizes, or does not cover the fabrics of the scene"
         raise BadInput("require", "--method", method, allowed)
-    chosen = cheapest(table, error, time)
+    chosen = cheapest(table, "error" if math.isinf(error) else "ms", error=error, ms=time)
     if chosen is None:
         near = "; ".join(
             f"{row.method} {row.setting}".strip() + f": {100 * row.error:.2g} % in {row.ms:.3g} ms"

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -51,12 +50,9 @@ FAR: Final = 1e6
 
 Array = npt.NDArray[np.float64]
 
-_SHINY = f", alpha = {LUSTROUS:g}"  # ending of the names of lustrous fabrics
-_WORST: Final[dict[str, Metric]] = {
-    "rounding": "extreme_rounding",
-    "far": "extreme_far",
-    "large": "extreme_large",
-}
+SHINY: Final = f", alpha = {LUSTROUS:g}"
+"""Ending of the names of lustrous fabrics."""
+
 _AZIMUTHS = (0.4, 2.1)  # of light and viewer
 _PLACES = 2
 _SIXTEENTH = 16
@@ -65,7 +61,7 @@ _SIXTEENTH = 16
 def lustrous(fabric: Fabric) -> Fabric:
     """Return the fabric with the shiniest yarns that may be."""
     yarns = {name: getattr(fabric, name).model_copy(update={"roughness": LUSTROUS}) for name in ("warp", "weft")}
-    return fabric.model_copy(update={"name": fabric.name + _SHINY, **yarns})
+    return fabric.model_copy(update={"name": fabric.name + SHINY, **yarns})
 
 
 class ExtremeInputs(NamedTuple):
@@ -177,37 +173,6 @@ def _largest(answers: Array, others: Array) -> float:
     finite = np.isfinite(answers).all(axis=1) & np.isfinite(others).all(axis=1)
     largest = float(np.abs(others[finite]).max(initial=0.0))
     return float(np.abs(answers[finite] - others[finite]).max(initial=0.0)) / largest if largest else math.nan
-
-
-def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the extremes, one row a method: the worst over its fabrics and trainings, those of alpha = .01 apart.
-
-    Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
-    footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,
-    `answers` (their number).
-    """
-    found: dict[tuple[str, str], list[Record]] = {}
-    for record in records:
-        if record.metric.startswith("extreme_"):
-            found.setdefault((record.method, record.setting), []).append(record)
-    return pd.DataFrame([_row(*key, group) for key, group in found.items()])
-
-
-def _row(method: str, setting: str, records: Sequence[Record]) -> dict[str, object]:
-    def worst(metric: Metric, shiny: bool | None = None) -> float:
-        values = [r.value for r in records if r.metric == metric and shiny in (None, r.fabric.endswith(_SHINY))]
-        return max(values, default=math.nan)
-
-    def total(metric: Metric) -> int:
-        return int(sum(record.value for record in records if record.metric == metric))
-
-    plain = [dict(r.curve) for r in records if r.metric == "extreme_error" and not r.fabric.endswith(_SHINY)]
-    row: dict[str, object] = {"method": method, "setting": setting, "fabrics": len({r.fabric for r in records})}
-    row |= {error_name(size): max((c[size] for c in plain if size in c), default=math.nan) for size in FOOTPRINTS}
-    row |= {"grazing": worst("extreme_grazing", False), "lustrous": worst("extreme_error", True)}
-    row |= {name: worst(metric) for name, metric in _WORST.items()}
-    row |= {"not_finite": total("extreme_not_finite"), "negative": total("extreme_negative")}
-    return row | {"answers": sum(record.count for record in records if record.metric == "extreme_not_finite")}
 
 
 def error_name(size: float) -> str:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import pandas as pd
 
@@ -92,18 +91,6 @@ def _with_front(table: pd.DataFrame) -> pd.DataFrame:
 def of_method(table: pd.DataFrame, method: str) -> pd.DataFrame:
     """Return the rows of one method, which is on its own front."""
     return _with_front(table.loc[table["method"] == method, list(_COLUMNS)])
-
-
-def cheapest(table: pd.DataFrame, error: float = math.inf, ms: float = math.inf) -> Any | None:
-    """Return the row within both limits that has the least time, or the least error if only time is limited.
-
-    None if there is none.
-    """
-    within = table[(table["error"] <= error) & (table["ms"] <= ms)]
-    if within.empty:
-        return None
-    order = ["error", "ms"] if math.isinf(error) else ["ms", "error"]
-    return next(rows(within.sort_values(order, kind="stable")))
 
 
 def nearest(table: pd.DataFrame, error: float, ms: float) -> pd.DataFrame:

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from reports.catalogue import METRICS, OTHER, metric_row
-from reports.measure.extremes import FOOTPRINTS, error_name, extremes_table
+from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.over_seeds import MOST
 from reports.record import Record, to_table
 from reports.tables import summary
@@ -68,7 +68,7 @@ _FRAMES: Final = {
 _WHERE_MEASURED: Final = {
     "between": summary.path_table,
     OTHER: summary.other_table,
-    "extremes": extremes_table,
+    "extremes": summary.extremes_table,
 }
 
 

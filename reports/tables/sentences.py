@@ -36,7 +36,7 @@ def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
     figures: list[dict[str, str]] = []
     reached: dict[str, list[str]] = {}
     for limit in LIMITS[:3]:
-        best = cheapest(part, limit)
+        best = cheapest(part, "ns", error=limit)
         name = display(best.method, best.setting) if best else "no method"
         ratio = times(best.ns / base.ns) if best else NONE
         note = f"{name}: {'the cheapest ' if best else ''}within {100 * limit:g} % error, in times of two points"
@@ -155,7 +155,7 @@ def _cheapest(table: pd.DataFrame, fault: Fault, cost: str, most: int | None = N
     """Return the cheapest method within each limit of a fault; limits with the same method are named together."""
     reached: dict[str, list[str]] = {}
     for limit in FAULTS[fault][:most]:
-        best = cheapest(table, limit, cost, fault)
+        best = cheapest(table, cost, **{fault: limit})
         text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
         name = f"{100 * limit:g} %" if fault == "error" else f"{limit:g}".removeprefix("0")
         reached.setdefault(text, []).append(name)

@@ -26,6 +26,7 @@ from scipy.special import stdtrit
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
+from reports.measure.extremes import FOOTPRINTS, SHINY, error_name
 from reports.over_seeds import Statistic, first_training, mean, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 
@@ -227,6 +228,37 @@ def other_table(records: Sequence[Record]) -> pd.DataFrame:
     chosen = table[table["metric"].isin(names)]
     wide = chosen.pivot_table("value", _KEYS, "metric", "mean", sort=False)[names]
     return wide.reset_index().rename_axis(columns=None)
+
+
+def extremes_table(records: Sequence[Record]) -> pd.DataFrame:
+    """Return the extremes, one row a method: the worst over its fabrics and trainings, those of alpha = .01 apart.
+
+    Columns: method, setting, fabrics; error_<footprint> for each of `FOOTPRINTS`, grazing, lustrous (worst of all
+    footprints on the cloths of alpha = .01); rounding, far, large (NaN where not measured); not_finite, negative,
+    `answers` (their number).
+    """
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record.metric.startswith("extreme_"):
+            groups.setdefault((record.method, record.setting), []).append(record)
+    return pd.DataFrame([_extremes(*key, group) for key, group in groups.items()])
+
+
+def _extremes(method: str, setting: str, records: Sequence[Record]) -> dict[str, object]:
+    def worst(metric: Metric, shiny: bool | None = None) -> float:
+        values = [r.value for r in records if r.metric == metric and shiny in (None, r.fabric.endswith(SHINY))]
+        return max(values, default=math.nan)
+
+    def total(metric: Metric) -> int:
+        return int(sum(record.value for record in records if record.metric == metric))
+
+    plain = [dict(r.curve) for r in records if r.metric == "extreme_error" and not r.fabric.endswith(SHINY)]
+    row: dict[str, object] = {"method": method, "setting": setting, "fabrics": len({r.fabric for r in records})}
+    row |= {error_name(size): max((c[size] for c in plain if size in c), default=math.nan) for size in FOOTPRINTS}
+    row |= {"grazing": worst("extreme_grazing", False), "lustrous": worst("extreme_error", True)}
+    row |= {name: worst(f"extreme_{name}") for name in ("rounding", "far", "large")}
+    row |= {"not_finite": total("extreme_not_finite"), "negative": total("extreme_negative")}
+    return row | {"answers": sum(record.count for record in records if record.metric == "extreme_not_finite")}
 
 
 def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float, float]]]:

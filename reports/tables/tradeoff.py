@@ -60,7 +60,10 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
     return pd.concat(parts, ignore_index=True)
 
 
-def cheapest(table: pd.DataFrame, limit: float, cost: str = "ns", fault: str = "error") -> Any | None:
-    """Return the row of least cost among those whose fault is at most a limit; None if there is none."""
-    within = table[(table[fault] <= limit) & table[cost].notna()]
-    return None if within.empty else next(rows(within.sort_values([cost, fault], kind="stable")))
+def cheapest(table: pd.DataFrame, cost: str, **limits: float) -> Any | None:
+    """Return the row of least cost whose columns are within all `limits`; None if there is none.
+
+    Of equal costs the least of the limited columns counts, in their order.
+    """
+    within = table[table[cost].notna() & (table[[*limits]] <= pd.Series(limits)).all(axis=1)]
+    return next(rows(within.sort_values([cost, *limits], kind="stable")), None)

@@ -9,12 +9,6 @@ from pipeline.models.runtimes import RUNTIMES
 from reports.options import BenchOptions, RuntimeName
 
 
-def test_sizes_belong_to_their_scenes():
-    options = BenchOptions(sphere_size=(20, 30), plane_size=(40, 50))
-    assert options.size("sphere") == (20, 30)
-    assert options.size("plane") == (40, 50)
-
-
 @pytest.mark.parametrize(
     "change",
     [{"timing_repeats": 19}, {"frames": 2}, {"views": ()}, {"views": ("sofa",)}, {"sphere_size": (0, 8)}, {"x": 1}],

@@ -94,8 +94,3 @@ def test_a_number_that_is_not_linear_has_a_mean_of_its_own():
     table = worst([*records, Record(method="points", fabric="denim", value=0.5)]).set_index("method")
     assert table.loc["a", ["worst", "worst_least", "worst_most"]].tolist() == [5.0, 5.0, 5.0]
     assert table["worst"]["points"] == 0.5
-
-
-def test_one_training_changes_no_number_of_a_table():
-    table = ratios(RECORDS[4:])
-    assert table["ratio"].tolist() == [1.0, 1.0] and table["ratio_least"].isna().all()

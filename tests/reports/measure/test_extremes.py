@@ -21,12 +21,12 @@ from reports.measure.extremes import (
     LUSTROUS,
     error_name,
     extremes,
-    extremes_table,
     lustrous,
     measure_extremes,
 )
 from reports.options import EXTREME_PRECISIONS
 from reports.record import Record
+from reports.tables.summary import extremes_table
 from weaves.fabric import load_fabric
 
 LINING = load_fabric("polyester_lining")

@@ -2,12 +2,6 @@ import pytest
 
 from reports.page.colours import DARK, LIGHT, OF_MARKS, OF_TEXT, contrast, readable
 
-SCHEMES = pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
-
-
-def grounds(scheme):
-    return scheme.ground, scheme.card, scheme.tint
-
 
 def test_contrast_of_known_pairs():
     """Black on white is 21; #767676 is the lightest grey that passes 4.5 on white [Campbell2023WCAG]."""
@@ -17,23 +11,13 @@ def test_contrast_of_known_pairs():
     assert contrast("#123456", "#fedcba") == contrast("#fedcba", "#123456")
 
 
-@SCHEMES
-def test_text_can_be_read_on_every_ground(scheme):
-    for ground in grounds(scheme):
-        assert contrast(scheme.ink, ground) >= OF_TEXT
-        assert contrast(scheme.muted, ground) >= OF_TEXT
-
-
-@SCHEMES
-def test_marks_and_the_focus_stand_out_on_every_ground(scheme):
-    for colour in (*scheme.methods.values(), *scheme.others, scheme.focus):
-        assert all(contrast(colour, ground) >= OF_MARKS for ground in grounds(scheme)), colour
-
-
-@SCHEMES
-def test_coloured_text_of_plots_can_be_read(scheme):
-    for colour in (*scheme.methods.values(), *scheme.others):
-        assert contrast(scheme.text(colour), scheme.ground) >= OF_TEXT
+@pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
+def test_text_marks_and_the_focus_stand_out_on_every_ground(scheme):
+    own = (*scheme.methods.values(), *scheme.others)
+    for ground in (scheme.ground, scheme.card, scheme.tint):
+        assert min(contrast(colour, ground) for colour in (scheme.ink, scheme.muted)) >= OF_TEXT
+        assert min(contrast(colour, ground) for colour in (*own, scheme.focus)) >= OF_MARKS
+    assert min(contrast(scheme.text(colour), scheme.ground) for colour in own) >= OF_TEXT
 
 
 def test_a_colour_that_can_be_read_stays():

@@ -239,14 +239,6 @@ def test_the_style_has_no_motion_and_takes_its_colours_from_the_schemes(page):
     assert "outline: none" not in style and ":focus-visible" in style
 
 
-def test_words_of_earlier_versions_are_gone(page):
-    words = page.all("body")[0]["text"] + " ".join(picture["alt"] for picture in page.all("img"))
-    for word in ("stand in", "stands in", "asked", "errs", "left to quadrature", "not its own", "knob", "leftover"):
-        assert not re.search(rf"\b{word}\b", words), word
-    headings = page.all("h1", "h2", "h3", "caption")
-    assert not [heading["text"] for heading in headings if heading["text"].startswith("What")]
-
-
 def test_words_are_escaped_and_code_is_marked():
     assert prose("a < b in `c`") == "a &lt; b in <code>c</code>"
 

@@ -5,7 +5,8 @@ import math
 import pandas as pd
 import pytest
 
-from reports.tables.method_choice import MEASURED, PREDICTED, cheapest, nearest, predictions, with_measured
+from reports.tables.method_choice import MEASURED, PREDICTED, nearest, predictions, with_measured
+from reports.tables.tradeoff import cheapest
 
 SIZES = pd.DataFrame(
     [
@@ -42,11 +43,9 @@ def test_what_falls_back_costs_what_quadrature_costs():
 
 def test_a_wish_is_met_by_the_cheapest_or_answered_by_its_neighbours_on_the_front():
     table = found()
-    assert cheapest(table, error=0.05).method == "exact"
-    assert cheapest(table, error=0.5).method == "fast"
-    assert cheapest(table, ms=5.0).method == "fast"
-    assert cheapest(table).method == "exact"  # without limits, the least error
-    assert cheapest(table, error=1e-9, ms=1e-3) is None
+    assert [cheapest(table, "ms", error=limit).method for limit in (0.05, 0.5)] == ["exact", "fast"]
+    assert [cheapest(table, "error", error=math.inf, ms=limit).method for limit in (5.0, math.inf)] == ["fast", "exact"]
+    assert cheapest(table, "ms", error=1e-9, ms=1e-3) is None
     assert set(nearest(table, 1e-9, 1e-3)["method"]) == {"fast", "exact"}
     assert list(nearest(table, 0.05, 2.0)["method"]) == ["fast", "exact"]
 

@@ -104,21 +104,13 @@ def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=ma
     return pd.DataFrame([errors]), pd.DataFrame([timing])
 
 
-def test_headline_admits_a_defeat():
-    text = headline("woven", "", *tables(0.5, 1.66), paper=False)
-    assert text == (
-        "Woven reaches 2.0× higher MSE than point sampling at 2 points on the 8 seen fabrics, at 1.7× its time."
-    )
-
-
-def test_one_training_is_called_one():
-    text = headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
-    assert text == (
-        "Woven reaches 9.1× lower MSE than point sampling at 2 points on the 8 seen fabrics, at 0.8× its time "
-        "(one training)."
-    )
-    text = headline("woven", "", *tables(9.13, seeds=1))
-    assert "8 seen fabrics (one training); the paper" in text
+def test_the_headline_admits_a_defeat_and_calls_one_training_one():
+    defeat = headline("woven", "", *tables(0.5, 1.66), paper=False)
+    once = headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
+    where = "than point sampling at 2 points on the 8 seen fabrics"
+    assert defeat == f"Woven reaches 2.0× higher MSE {where}, at 1.7× its time."
+    assert once == f"Woven reaches 9.1× lower MSE {where}, at 0.8× its time (one training)."
+    assert "8 seen fabrics (one training); the paper" in headline("woven", "", *tables(9.13, seeds=1))
 
 
 def test_several_trainings_have_a_range():
@@ -152,23 +144,12 @@ def test_headline_says_only_what_was_measured():
     assert "on one unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
 
 
-def test_learnt_leaves_points_out():
-    errors = pd.DataFrame(
-        {"method": ["point_sampled", "point_sampled", "woven"], "setting": ["k = 1", "k = 2", ""], "role": "seen"}
-    )
-    assert learnt(errors) == [("woven", "")]
-    assert learnt(errors, {"woven"}) == [("point_sampled", "k = 1")]
-
-
-def test_the_headline_names_the_bounded_form_where_it_was_measured():
-    errors = pd.DataFrame(
-        {
-            "method": ["woven", "neumip", "woven", "selvage", "selvage"],
-            "setting": ["", "", "bounded", "", "unbounded"],
-            "role": "seen",
-        }
-    )
+def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured():
+    methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
+    methods += [("woven", "bounded"), ("selvage", ""), ("selvage", "unbounded")]
+    errors = pd.DataFrame(methods, columns=["method", "setting"])
     assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
+    assert learnt(errors, {"woven", "neumip", "selvage"}) == [("point_sampled", "k = 1")]
     assert Bounded(SoftNodes()).setting == f"k = 2 {BOUNDED}"
 
 
