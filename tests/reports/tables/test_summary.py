@@ -8,12 +8,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from reports.measure.extremes import LUSTROUS, error_name, lustrous
 from reports.record import Provenance, Record
 from reports.tables.summary import (
     aliasing_table,
     columns_over_fabrics,
     energy_table,
     error_table,
+    extremes_table,
     fabric_table,
     front,
     over_fabrics,
@@ -25,6 +27,7 @@ from reports.tables.summary import (
     timing_table,
     unranged,
 )
+from weaves.fabric import load_fabric
 
 
 def error(method, setting, fabric, role, mse, noise=0.0, spread=0.0):
@@ -129,6 +132,22 @@ def test_spectra_are_averaged():
     curves = [((0.1, 1.0), (0.2, 2.0)), ((0.1, 3.0), (0.2, 4.0))]
     records = [Record(method="m", metric="spectrum", fabric=f"f{i}", curve=curve) for i, curve in enumerate(curves)]
     assert spectra(records) == {("m", ""): [(0.1, 2.0), (0.2, 3.0)]}
+
+
+def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
+    shiny = lustrous(load_fabric("polyester_lining"))
+    assert (shiny.warp.roughness, shiny.weft.roughness) == (LUSTROUS, LUSTROUS)
+    subject = Record(method="m", setting="s")
+    curve = ((1e-4, 0.5), (1.0, 0.1))
+    records = [
+        subject.model_copy(update={"fabric": name}).of("extreme_error", value, 9, curve=points)
+        for name, value, points in (("a", 0.5, curve), ("b", 0.2, ((1.0, 0.2),)), (shiny.name, 0.9, curve))
+    ]
+    records += [subject.of("extreme_not_finite", 3.0, 90), subject.of("extreme_not_finite", 1.0, 90)]
+    (row,) = extremes_table([*records, subject.of("mse", 1.0, 9)]).to_dict("records")
+    assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
+    assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
+    assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
 
 
 def test_summary_is_one_row_a_method():
