@@ -71,7 +71,7 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
     queries = draw_queries(QueryOptions(behind=0.4, sigma=(0.3, 2.0), max_angle=60.0), (4, 4), 5, 0, 200)
     turned = queries.turned()
     assert (turned.wo[:, 2] < 0).all()
-    truth = estimate(fabric, turned, TruthOptions(relative_error=0.01), 1)
+    truth = estimate(fabric, turned, TruthOptions(relative_error=0.02), 1)
     for method in (SoftNodes(), selvage):
         fallback = Fallback(method, {"stretch", "behind"})
         assert not fallback.out_of_domain(fabric, turned).any()

@@ -15,7 +15,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 LEVEL = 0.01
-ROWS, COLUMNS, NODES = 16, 32, 12  # cells in cosine and azimuth; quadrature nodes along each side of a cell
+ROWS, COLUMNS, NODES = 16, 32, 8  # cells in cosine and azimuth; quadrature nodes along each side of a cell
 COUNT = 100_000
 # Fabric, deviations of the footprint, angle, and the viewer's angle to the normal and azimuth: more than 90 is behind.
 CONFIGURATIONS = {
@@ -121,7 +121,7 @@ def test_weights_have_the_integral_of_eval_as_their_mean(bsdfs):
     assert max(scores.values()) < limit, (limit, scores)
 
 
-@pytest.mark.parametrize("name", ["ellipse", "gauze", "behind"])
+@pytest.mark.parametrize("name", ["ellipse", "voile", "behind"])
 def test_a_sample_is_what_asking_for_it_gives(bsdfs, name):
     bsdf, looks, random = bsdfs[name], looks_of(name, 500), np.random.default_rng(1).random((500, 3))
     sample = bsdf.sample(looks, random)
