@@ -18,16 +18,20 @@ settings.load_profile("fixed")
 STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
 
-LONG = (
-    "tests/jobs/test_smoke.py",
+FIRST = (
     "tests/jobs/verbs/test_render.py",
+    "tests/jobs/recipe/",
+    "tests/jobs/plan/",
+    "tests/jobs/run/",
+    "tests/weaves/",
     "tests/pipeline/models/",
     "tests/pipeline/analytic/",
     "tests/pipeline/truth/",
     "tests/pipeline/training/",
     "tests/reports/",
 )
-"""Folders with long tests and kernels to compile: they start first, so that no core waits for one at the end."""
+"""The order of tests: one process compiles most kernels while another does tests without kernels; then the long ones,
+so that no core waits for one at the end."""
 
 QUICK = "not slow and not faults and not external"
 """The lane of `make test`, whose number of tests has a budget."""
@@ -39,8 +43,8 @@ def pytest_itemcollected(item):
 
 
 def pytest_collection_modifyitems(items):
-    order = {start: index for index, start in enumerate(LONG)}
-    items.sort(key=lambda item: next((order[start] for start in LONG if item.nodeid.startswith(start)), len(LONG)))
+    order = {start: index for index, start in enumerate(FIRST)}
+    items.sort(key=lambda item: next((order[start] for start in FIRST if item.nodeid.startswith(start)), len(FIRST)))
 
 
 def pytest_collection_finish(session):

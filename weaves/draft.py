@@ -8,6 +8,7 @@ first. A float is a run of cells, cyclic in the repeat, over which one yarn stay
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -99,6 +100,7 @@ class Draft:
         )
         return bool(connected_components(arrows, connection="strong", return_labels=False) == 1)
 
+    @lru_cache(maxsize=4096)  # noqa: B019, drafts are small and equal ones are often compared
     def canonical(self) -> tuple[tuple[int, int], bytes]:
         """Return a form that is equal for all shifts and mirror images of this cloth, and for no other cloth."""
         matrix = smallest_repeat(self.warp_over)

@@ -123,7 +123,7 @@ def test_it_is_near_the_truth(name, sigma, bound, clear):
 
 
 def test_no_light_changes_the_transparency():
-    fabric = load_fabric("organza")
+    fabric = load_fabric("gauze")
     table, queries = tabulate(fabric, behind=True), asked(fabric)
     found = read_behind(table, queries)[:, 4]
     np.testing.assert_allclose(found, read_behind(table, queries._replace(wi=-queries.wo))[:, 4], rtol=1e-5)
