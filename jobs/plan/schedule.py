@@ -19,9 +19,9 @@ from jobs.plan.task import Task
 LEAST_GAIN: Final = 0.05
 """Share of the time that twice the workers must save; else the plan has stopped scaling."""
 
-# Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. Short tasks, whose
-# cost is less than what any task takes, say nothing about long ones.
-_WEIGHTS: Final = (10.0, 10.0, 0.5)
+# Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. The first tasks of
+# a run, which load kernels and are short, say little about other stages.
+_WEIGHTS: Final = (200.0, 30.0, 0.5)
 _LEAST_SHARE: Final = 0.05  # of a task under way, from which its own speed is known
 _MOST_LOAD: Final = 0.02  # of the driver's time that goes into estimates
 _SECONDS_BETWEEN: Final = 1.0  # two estimates

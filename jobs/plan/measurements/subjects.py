@@ -80,9 +80,8 @@ class Trained(TaskPart):
 
     def seconds(self, queries: float, fabrics: float = 1.0) -> float:
         """Return the estimated seconds in which one core answers queries with every setting, of so many fabrics."""
-        settings = self.options.settings
-        preparing = self.options.prepare_seconds * (len(settings) or 1)
-        return fabrics * preparing + queries * self.options.seconds[1] * (sum(settings) or 1)
+        settings = sum(self.options.settings) or 1  # tables of all of them share what takes longest
+        return fabrics * self.options.prepare_seconds + queries * self.options.seconds[1] * settings
 
     def methods(self, out: Path) -> list[Method]:
         """Load its methods, one a setting."""

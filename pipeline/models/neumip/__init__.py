@@ -12,7 +12,7 @@ class NeumipOptions(TextureOptions):
 
     newer: ClassVar[tuple[str, ...]] = ("ignore_curvature",)
     any_physics: ClassVar[bool] = True
-    seconds: ClassVar[tuple[float, float]] = (1.9e-5, 2e-6)
+    seconds: ClassVar[tuple[float, float]] = (1.6e-5, 2e-6)
 
     model: Literal["neumip"] = "neumip"
     ignore_curvature: bool = False

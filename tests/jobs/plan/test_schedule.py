@@ -75,11 +75,12 @@ def costly(name, seconds, needs=()):
 def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
     estimate, first, other = Estimate(), costly("a 1", 100.0), costly("b 1", 100.0)
     assert estimate.seconds(first) == 100.0
-    for _ in range(2):
+    for _ in range(20):
         estimate.learn(first, 700.0)
     assert estimate.seconds(costly("a 2", 50.0)) == pytest.approx(350.0, rel=0.02)
     assert estimate.seconds(other) == pytest.approx(700.0, rel=0.02)
-    estimate.learn(other, 100.0)
+    for _ in range(2):
+        estimate.learn(other, 100.0)
     assert estimate.seconds(other) == pytest.approx(100.0, rel=0.02)
 
 

@@ -54,7 +54,7 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
     for task in new:
         assert 20 * task.cost < facts.seconds[task.id] < 200 * task.cost
     training = next(task for task in tasks if task.stage == "train")
-    assert facts.seconds[training.id] > 5 * training.cost
+    assert facts.seconds[training.id] > 2 * training.cost  # another stage, of which nothing was done
 
 
 def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys):
